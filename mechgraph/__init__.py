@@ -58,15 +58,13 @@ from mechgraph.pairs.factors import Bookkeeping, Component, Freedom
 from mechgraph.pairs.pair_type import PairType, pair_types
 from mechgraph.pairs.surfaces import Surface
 from mechgraph.response.course import Response
-from mechgraph.response.equilibrium import equilibrium
+from mechgraph.response.equilibrium import equilibrium, linearize
 from mechgraph.response.respond import respond
-from mechgraph.response.small_motion import linearize
 from mechgraph.result.free_body import FreeBody, free_body
 from mechgraph.result.over_time import OverTime, over_time
 from mechgraph.result.solution import Solution
 from mechgraph.transmission import Transmission, transmission
-from mechgraph.variants.result import Study
-from mechgraph.variants.study import study
+from mechgraph.variants.study import Study, study
 
 if TYPE_CHECKING:
     from mechgraph.compiled.compiled import Compiled, compile

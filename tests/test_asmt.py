@@ -13,9 +13,9 @@ from typer.testing import CliRunner
 import mechgraph as mg
 from mechgraph.cli import app
 from mechgraph.document import to_text
-from mechgraph.exchange.asmt_joints import JOINTS, REFUSED
+from mechgraph.exchange.asmt import JOINTS, REFUSED
 from mechgraph.exchange.comparison import compare
-from mechgraph.exchange.formula import FUNCTIONS, FormulaFault, evaluated
+from mechgraph.exchange.syntax import FUNCTIONS, FormulaFault, evaluated
 
 Z = (0, 0, 1)
 BODY = {"mass": 1.3, "inertia": np.diag([0.02, 0.03, 0.04])}

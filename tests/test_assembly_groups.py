@@ -9,9 +9,8 @@ import pytest
 from test_modes import FOUR, STEPHENSON, WATT, planar, platform
 
 import mechgraph as mg
-from mechgraph.modes import finding, product
-from mechgraph.modes.groups import Group, Undivided, groups_of
-from mechgraph.modes.question import Question
+from mechgraph.modes.assemblies import Question
+from mechgraph.modes.targets import Group, Undivided, groups_of
 
 ON_A_COUPLER = {
     "A": ("a", "b", 0.0, 2.0),
@@ -81,7 +80,7 @@ def test_group_by_group_the_modes_are_those_of_all_at_once(
     m: mg.Mechanism, at: dict[str, object], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     apart = mg.assemblies(m, at, cache=False)
-    monkeypatch.setattr(finding, "groups_of", lambda family: [Undivided(family)])
+    monkeypatch.setattr("mechgraph.modes.assemblies.groups_of", lambda family: [Undivided(family)])
     at_once = mg.assemblies(m, at, cache=False)
     for one, other in zip(*((s,) if isinstance(s, mg.Assemblies) else s for s in (apart, at_once)), strict=True):
         assert "groups are solved one after the other" in one.evidence[0]
@@ -96,7 +95,7 @@ def test_where_there_are_too_many_tracks_complex_modes_of_groups_are_left(monkey
     m = planar("Watt", "A", **WATT)
     closed, open_ = (mg.assemblies(m, {"A": angle}) for angle in (3.0, 2.0))
     assert [(len(one), len(one.complex)) for one in (closed, open_)] == [(4, 0), (0, 4)]
-    monkeypatch.setattr(product, "MOST_FOLLOWED", 3)
+    monkeypatch.setattr("mechgraph.modes.targets.MOST_FOLLOWED", 3)
     real, none = (mg.assemblies(m, {"A": angle}) for angle in (3.0, 2.0))
     assert real.poses == pytest.approx(closed.poses)
     assert [(one.total, len(one), len(one.complex), one.completeness) for one in (real, none)] == [

@@ -12,9 +12,8 @@ import mechgraph as mg
 from mechgraph.closure.assembly import close_all, closed_start, scaled_start
 from mechgraph.closure.configuration import Configuration
 from mechgraph.modes import certificate as certificates
-from mechgraph.modes.balls import Ball, loop_rows
-from mechgraph.modes.certificate import certificate, curvature, rows, told_apart
-from mechgraph.modes.question import Question
+from mechgraph.modes.assemblies import Question
+from mechgraph.modes.certificate import Ball, certificate, curvature, loop_rows, rows, told_apart
 
 
 def exactly(A: np.ndarray) -> np.ndarray:

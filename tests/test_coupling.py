@@ -12,7 +12,7 @@ import mechgraph as mg
 from mechgraph.equations.terms import State
 from mechgraph.model import toml
 from mechgraph.model.file_format import json_schema
-from mechgraph.variants.fields import find_field, stacked, varied
+from mechgraph.variants.numbers import find_field, stacked, varied
 
 Z = (0.0, 0.0, 1.0)
 UNITS = {"length": "m", "mass": "kg", "time": "s"}

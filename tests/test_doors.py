@@ -16,7 +16,7 @@ from mechgraph import show
 from mechgraph.equations.build import BOOKKEEPINGS, BookkeepingName
 from mechgraph.force.reactions import METHODS, MethodName
 from mechgraph.show.page.write import report_page
-from mechgraph.variants.sampling import SAMPLINGS, SamplingName
+from mechgraph.variants.study import SAMPLINGS, SamplingName
 
 M = mg.load("four-bar")
 Z = (0, 0, 1)

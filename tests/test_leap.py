@@ -5,11 +5,9 @@ import pytest
 
 import mechgraph as mg
 from mechgraph.closure.assembly import assembled_at
-from mechgraph.response.along_path import Arc
-from mechgraph.response.charts import Task
+from mechgraph.response.along_path import POINTS, Arc, Way, _coarse
+from mechgraph.response.charts import Prescribed, Task
 from mechgraph.response.motion_equations import Loads
-from mechgraph.response.prescribed import Prescribed
-from mechgraph.response.way import POINTS, Way, _coarse
 
 Z = np.eye(3)[2]
 

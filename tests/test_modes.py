@@ -16,22 +16,19 @@ from mechgraph.closure.configuration import Configuration
 from mechgraph.files import cache_folder
 from mechgraph.force.loads import user_poses
 from mechgraph.model.chain import chain_symbols
-from mechgraph.modes import store
-from mechgraph.modes.bounds import bound
+from mechgraph.modes import start_sets
+from mechgraph.modes.assemblies import Finder, Question
 from mechgraph.modes.family import Member
-from mechgraph.modes.finding import Finder
 from mechgraph.modes.homotopy import Equations
-from mechgraph.modes.monodromy import _tame, start_set
-from mechgraph.modes.question import Question
+from mechgraph.modes.start_sets import _beside, _poles, _tame, bound, rational, start_set, trace_test
 from mechgraph.modes.targets import Ends, _account, _Run
-from mechgraph.modes.trace import _beside, _poles, rational, trace_test
 
 
 @pytest.fixture
 def empty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """No start set is kept, and none came with the package."""
     monkeypatch.setenv("MECHGRAPH_CACHE", str(tmp_path))
-    monkeypatch.setattr(store, "PACKED", tmp_path / "none")
+    monkeypatch.setattr("mechgraph.modes.start_sets.PACKED", tmp_path / "none")
 
 
 def general(letters: str, seed: int = 3, **more: object) -> mg.Mechanism:
@@ -560,12 +557,12 @@ def test_the_trace_test_passes_with_all_assemblies_and_with_none_left_out(
         r"Trace test passed: over \d+ random mechanisms .* rational function of degree \d+", modes.evidence[0]
     )
     family = Question(m, {"O1": 0.2}).form.family
-    start = store.kept(family)
+    start = start_sets.kept(family)
     assert start is not None
     assert start.trace.passed
     assert start.trace.beyond < 1e-9 < start.trace.last
     equations = Equations(family, start.mixing)
-    monkeypatch.setattr("mechgraph.modes.trace.MOST_TRACKS", 200 * (start.x.shape[1] - 1))
+    monkeypatch.setattr("mechgraph.modes.start_sets.MOST_TRACKS", 200 * (start.x.shape[1] - 1))
     for i in range(start.x.shape[1]):
         some = np.delete(start.x, i, axis=1)
         assert not trace_test(equations, start.member, some, np.random.default_rng(i)).passed
@@ -579,7 +576,7 @@ def test_in_a_plane_a_sum_along_an_isotropic_direction_has_a_low_degree(monkeypa
     equations, rng = Equations(family, start.mixing), np.random.default_rng(1)
     whole = trace_test(equations, start.member, start.x, rng)
     assert (whole.degree, whole.samples) == (1, 16)
-    monkeypatch.setattr("mechgraph.modes.trace.MOST_TRACKS", 16 * 5)
+    monkeypatch.setattr("mechgraph.modes.start_sets.MOST_TRACKS", 16 * 5)
     assert not trace_test(equations, start.member, start.x[:, :5], rng).passed
 
 
@@ -634,7 +631,7 @@ def test_samples_beside_poles_tell_a_rational_function_and_no_other() -> None:
 
 
 def test_after_a_stated_effort_what_was_found_is_called_searched(empty: None, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("mechgraph.modes.monodromy.MOST_TRACKED", 1)
+    monkeypatch.setattr("mechgraph.modes.start_sets.MOST_TRACKED", 1)
     m = general("RCSR")
     modes = mg.assemblies(m, {"O1": 0.2})
     assert (modes.total, modes.completeness) == (4, "searched")

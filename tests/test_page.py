@@ -28,8 +28,8 @@ from test_hostile_names import NAMES, named
 import mechgraph as mg
 from mechgraph.show.canvas import PALETTE, REACTION
 from mechgraph.show.page import content, write
-from mechgraph.show.page.figures import json_for_script, packed
-from mechgraph.show.page.write import report_page
+from mechgraph.show.page.content import packed
+from mechgraph.show.page.write import json_for_script, report_page
 
 pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 

@@ -6,7 +6,7 @@ import scipy
 from test_response import slider_crank
 
 import mechgraph as mg
-from mechgraph.response.differentiated import differentiated, samples_fault
+from mechgraph.response.charts import differentiated, samples_fault
 
 X, Y, Z = np.eye(3)
 BEGIN, END, FORCE = 5.0, 5.05, 100.0

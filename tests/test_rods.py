@@ -14,14 +14,12 @@ import mechgraph as mg
 from mechgraph.algebra.se3 import quaternion_matrix, rotation_exp
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.indexing import indexed
-from mechgraph.modes.bounds import bound
+from mechgraph.modes.assemblies import Finder, Question
+from mechgraph.modes.continua import searched
 from mechgraph.modes.family import Member
-from mechgraph.modes.finding import Finder
 from mechgraph.modes.form import _ball, _two_turns, rods_of
 from mechgraph.modes.homotopy import Equations, Leg
-from mechgraph.modes.monodromy import distinct
-from mechgraph.modes.question import Question
-from mechgraph.modes.search import searched
+from mechgraph.modes.start_sets import bound, distinct
 from mechgraph.modes.targets import Ends, _account, _Run, ends
 from mechgraph.pairs.factors import ConstantScrew
 

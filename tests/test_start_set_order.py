@@ -14,14 +14,11 @@ from test_modes import FOUR, STEPHENSON, WATT, planar, platform
 
 import mechgraph as mg
 from mechgraph.graph.chains import least_order, least_orders
-from mechgraph.modes import finding
-from mechgraph.modes.family import Family
-from mechgraph.modes.groups import groups_of
+from mechgraph.modes.assemblies import Question
+from mechgraph.modes.family import Family, Labelling
 from mechgraph.modes.homotopy import Care, Equations, Leg, Linear, follow
-from mechgraph.modes.labelling import Labelling
-from mechgraph.modes.monodromy import MISSED, _Group
-from mechgraph.modes.question import Question
-from mechgraph.modes.store import kept
+from mechgraph.modes.start_sets import MISSED, _Group, kept
+from mechgraph.modes.targets import groups_of
 
 BOTH_WAYS = frozenset("RPCS")
 """Pairs that are the same with their links exchanged."""
@@ -110,7 +107,7 @@ def test_the_start_set_of_the_package_serves_every_order(
     m: mg.Mechanism, at: Mapping[str, float], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("MECHGRAPH_CACHE", str(tmp_path))
-    monkeypatch.setattr(finding, "start_set", lambda *_: pytest.fail("no start set was found"))
+    monkeypatch.setattr("mechgraph.modes.assemblies.start_set", lambda *_: pytest.fail("no start set was found"))
     first = mg.assemblies(m, at)
     other, sign = shuffled(m, 4)
     second = mg.assemblies(other, {name: sign[name] * value for name, value in at.items()})
@@ -125,7 +122,7 @@ def test_a_start_set_of_the_user_serves_every_order(tmp_path: Path, monkeypatch:
     first = mg.assemblies(m, {"A": 0.1})
     files = sorted(tmp_path.iterdir())
     assert len(files) == 2
-    monkeypatch.setattr(finding, "start_set", lambda *_: pytest.fail("no start set was found"))
+    monkeypatch.setattr("mechgraph.modes.assemblies.start_set", lambda *_: pytest.fail("no start set was found"))
     for seed in range(3):
         other, sign = shuffled(m, seed)
         same(first, mg.assemblies(other, {"A": 0.1 * sign["A"]}), sign)

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
-from mechgraph.response.events import LOOKS_IN_STEP
-from mechgraph.response.stops import Stops, _Limit
+from mechgraph.response.integration import LOOKS_IN_STEP, Stops, _Limit
 
 X, Y, Z = np.eye(3)
 G = 9.81

@@ -23,7 +23,7 @@ import mechgraph as mg
 from mechgraph.model.parameters import declared
 from mechgraph.variants import study as module
 from mechgraph.variants import work
-from mechgraph.variants.fields import Variants, field_values, find_field, varied
+from mechgraph.variants.numbers import Variants, field_values, find_field, varied
 
 ANGLES = np.deg2rad(np.arange(150.0, 190.0, 5.0))
 RCSR = {"O1": mg.Motion(ANGLES, 0.1, 0.2)}

@@ -15,7 +15,7 @@ from mechgraph.determinacy.report import KEYS, AdviceData, schemas
 from mechgraph.equations.terms import written
 from mechgraph.files import VERSION, Json, json_text, object_schema, patch, plain, schema_of
 from mechgraph.model.toml import to_data
-from mechgraph.modes.record import AssembliesData, BranchesData
+from mechgraph.modes.result import AssembliesData, BranchesData
 from mechgraph.response.course import ResponseData
 from mechgraph.result.over_time import OverTimeData
 from mechgraph.result.summary import SolutionData

@@ -23,7 +23,7 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Declared, declared
 from mechgraph.outcome import Options
 from mechgraph.quantities import shown
-from mechgraph.variants.fields import AnyField, Variants, clashes, field_values, find_field, varied
+from mechgraph.variants.numbers import AnyField, Variants, clashes, field_values, find_field, varied
 
 STATUSES = (
     ("OK", "ok", "solved"),

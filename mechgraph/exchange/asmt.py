@@ -1,4 +1,12 @@
-"""FreeCAD assemblies as files hold them: parts, markers, joints, motions, limits, and the results that were stored with them.
+"""Assemblies of Ondsel and FreeCAD (ASMT): what a file says, and where it stands.
+
+Joints of FreeCAD as pairs: a table of what marker J may do against marker I, and how the two are made to fit exactly.
+
+Source of the conditions: the joints of OndselSolver, each a list of conditions that a point of J lies at, on the z axis or in the plane of
+I (x, y or z of J in the frame of I, with an offset along z), and that axes of the two are perpendicular. Conditions on axes do not tell an
+axis from its opposite; a pair does, so J is turned half round where that fits better, which is said.
+
+FreeCAD assemblies as files hold them: parts, markers, joints, motions, limits, and the results that were stored with them.
 
 The format is that of FreeCAD's Assembly workbench and its solver (OndselSolver 2023 to 2026, class names ASMT...): an indented text whose
 first line names the program; `Position3D` and `RotationMatrix` place a part in the assembly, a `RefPoint` in its part and a `Marker` in
@@ -10,20 +18,172 @@ its joints, motions, limits and forces; what is of it has its name before its ow
 
 from __future__ import annotations
 
+import functools
 import itertools
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array, compose
-from mechgraph.errors import DeclarationError, FileError
-from mechgraph.exchange.asmt_joints import REFUSED
-from mechgraph.exchange.formula import is_name
-from mechgraph.exchange.indented import Node, numbers_of, tree_of
+from mechgraph.algebra.se3 import Array, compose, inverse, rotation_exp, rotation_log
+from mechgraph.errors import DeclarationError, FileError, listed
+from mechgraph.exchange.syntax import Node, is_name, numbers_of, tree_of
 from mechgraph.model.toml import LONGEST_SWEEP
+from mechgraph.pairs.factors import Freedom
+from mechgraph.pairs.pair_type import PairType
 from mechgraph.quantities import shown
+
+
+class Directions(NamedTuple):
+    """Orientations ``(3, 3)`` in the assembly where the parts stand: of I and of J as they shall be, and of J as the file has it.
+
+    ``angle``: the turn about z from I to J. ``turned``: whether J was taken half a turn further.
+    """
+
+    on_a: Array
+    on_b: Array
+    given: Array
+    angle: float = 0.0
+    turned: bool = False
+
+    @property
+    def error(self) -> float:
+        """Angle by which J misses."""
+        return float(np.linalg.norm(rotation_log(self.on_b.T @ self.given)))
+
+
+HALF_TURNS = [np.diag(signs) for signs in ([1.0, 1, 1], [1.0, -1, -1], [-1.0, 1, -1], [-1.0, -1, 1])]
+
+
+def same(RI: Array, RJ: Array, _: float) -> Directions:
+    """All three axes along those of I, or opposite."""
+    best = max(HALF_TURNS, key=lambda F: float(np.trace(RI.T @ RJ @ F)))
+    return Directions(RI, RI, RJ @ best, 0.0, best is not HALF_TURNS[0])
+
+
+def about_z(RI: Array, RJ: Array, _: float) -> Directions:
+    """Z along that of I, or opposite; x of J stays where it is."""
+    turned = bool(RI[:, 2] @ RJ[:, 2] < 0)
+    given = RJ @ HALF_TURNS[1] if turned else RJ
+    angle = float(np.arctan2(given[:, 0] @ RI[:, 1], given[:, 0] @ RI[:, 0]))
+    return Directions(RI, RI @ rotation_exp(np.array([0.0, 0.0, angle])), given, angle, turned)
+
+
+def free(RI: Array, RJ: Array, _: float) -> Directions:
+    """Any orientation: J's is taken as it is, and I's counts as the same."""
+    return Directions(RI, RI, RI)
+
+
+def inclined(RI: Array, RJ: Array, angle: float) -> Directions:
+    """Z of J at an angle to z of I; the markers of the pair have z of I, and z of J lies in their x-z plane."""
+    z, other = RI[:, 2], RJ[:, 2]
+    x = other - (other @ z) * z
+    x = x / np.linalg.norm(x) if np.linalg.norm(x) > 1e-9 else RI[:, 0]
+    made = np.column_stack([x, np.cross(z, x), z])
+    ideal = np.sin(angle) * x + np.cos(angle) * z
+    axis, sine = np.cross(ideal, other), np.linalg.norm(np.cross(ideal, other))
+    tilt = axis / sine * np.arctan2(sine, ideal @ other) if sine > 0 else np.zeros(3)
+    return Directions(made, made, rotation_exp(tilt) @ made)
+
+
+class Row(NamedTuple):
+    """A joint: its pair, which of x, y, z of J in I are free, what holds its axes, and the name of its number in the file.
+
+    ``type`` is a symbol, or a function of ``angle`` (between the z axes) that makes the row of the pair table.
+    """
+
+    type: str | Callable[[float], PairType]
+    slides: tuple[bool, bool, bool]
+    turns: Callable[[Array, Array, float], Directions]
+    number: str = ""
+    angle: float = np.pi / 2
+
+    @property
+    def anywhere(self) -> bool:
+        """Whether x, y and z of J in I are all free."""
+        return all(self.slides)
+
+    def pair_type(self) -> str | PairType:
+        """The pair."""
+        return self.type if isinstance(self.type, str) else self.type(self.angle)
+
+
+AT, ALONG, ACROSS, ANYWHERE = (False, False, False), (False, False, True), (True, True, False), (True, True, True)
+SLIDES = ("Tx", "Ty", "Tz")
+HELD_BY_MOTION = "held by a motion alone"
+
+
+def screw(_: float) -> PairType:
+    """Turn and slide in a fixed ratio, nothing else: in FreeCAD the bearings of a screw are joints of their own."""
+    return PairType("Screw", "turn and slide in a fixed ratio", freedoms=["Tx", "Ty", "Rz + pitch Tz", "Rx", "Ry"])
+
+
+def parallel(_: float) -> PairType:
+    """Z axes parallel."""
+    return PairType("Parallel", "z axes parallel", freedoms=[*SLIDES, "Rz"], reactions=["Mx", "My"])
+
+
+def no_rotation(_: float) -> PairType:
+    """All axes parallel."""
+    return PairType("NoRotation", "all axes parallel", freedoms=SLIDES, reactions=["Mx", "My", "Mz"])
+
+
+def at_angle(angle: float) -> PairType:
+    """Z axes at a constant angle: slides, a turn about z of I and one about z of J, which is ``(sin, 0, cos)`` there."""
+    axis = Freedom("Rj", (float(np.sin(angle)), 0.0, float(np.cos(angle)), 0.0, 0.0, 0.0))
+    return PairType("Angle", "z axes at a constant angle", freedoms=[*SLIDES, "Rz", axis])
+
+
+def turns_in(order: str) -> list[Freedom]:
+    """Turns about axes in some order, ``zxz``; an axis that comes again has the freedom ``Rz2``."""
+    found: list[Freedom] = []
+    for k, axis in enumerate(order):
+        twist = [0.0] * 6
+        twist["xyz".index(axis)] = 1.0
+        found.append(Freedom(f"R{axis}{order[: k + 1].count(axis)}".removesuffix("1"), tuple(twist)))  # type: ignore[arg-type]
+    return found
+
+
+def motion_type(order: str) -> str | PairType:
+    """A pair without any reaction, for a motion between markers that no joint connects: slides along the axes of I, then turns in order."""
+    if order == "xyz":
+        return "Fr"
+    return PairType(f"Motion{order}", HELD_BY_MOTION, freedoms=[*SLIDES, *turns_in(order)], reactions=[])
+
+
+def ball_type(row: Row, order: str) -> PairType:
+    """The pair of a ball in its seat, groove or on its plane whose rotation is turns in order, so that a motion can drive them."""
+    slides = [name for name, is_free in zip(SLIDES, row.slides, strict=True) if is_free]
+    return PairType(f"{row.type}{order}", "ball that turns in order", freedoms=[*slides, *turns_in(order)])
+
+
+JOINTS: dict[str, Row] = {
+    "FixedJoint": Row("W", AT, same),
+    "RevoluteJoint": Row("R", AT, about_z),
+    "TranslationalJoint": Row("P", ALONG, same),
+    "CylindricalJoint": Row("C", ALONG, about_z),
+    "SphericalJoint": Row("S", AT, free),
+    "UniversalJoint": Row("U", AT, inclined),
+    "PlanarJoint": Row("E", ACROSS, about_z, "offset"),
+    "PointInLineJoint": Row("Sg", ALONG, free),
+    "PointInPlaneJoint": Row("Sp", ACROSS, free, "offset"),
+    "LineInPlaneJoint": Row("Cp", ACROSS, inclined, "offset"),
+    "ScrewJoint": Row(screw, ANYWHERE, free, "pitch"),
+    "ParallelAxesJoint": Row(parallel, ANYWHERE, about_z),
+    "PerpendicularJoint": Row(at_angle, ANYWHERE, inclined),
+    "AngleJoint": Row(at_angle, ANYWHERE, inclined, "theIzJz"),
+    "NoRotationJoint": Row(no_rotation, ANYWHERE, same),
+}
+"""Joints that have a pair."""
+
+REFUSED = {
+    "CurveCurveContact": "its curves stand in sketches of the parts and may part and bounce (coeffRestitution), which no pair here does; "
+    "declare curves that stay in touch in Python: mg.Pair(..., 'Kc', curve=, curve_b=)",
+}
+"""Joints that have none, and what to do."""
+
 
 FIRST_LINES = ("OndselSolver", "FreeCADMbD", "freeCAD: 3D CAD with Motion Simulation  by  askoh.com")
 NOT_A_ROTATION = 1e-3
@@ -310,3 +470,107 @@ def results_of(assembly: Assembly, path: Path) -> Results:
     if not times.size or not series:
         raise FileError(path, "holds no results to compare with: simulate it in FreeCAD and save it again")
     return Results(times, series)
+
+
+FITS = 1e-5
+"""Angle [rad] and length / L to which markers count as meant to fit: OndselSolver closes to 1e-6, placements may have fewer digits."""
+
+
+class Snapping:
+    """Directions and lines met so far; a new one that is nearly parallel or perpendicular to them, or nearly the same, is made so."""
+
+    def __init__(self, near: float) -> None:
+        self.near, self.largest = near, 0.0
+        self.axes = np.eye(3)
+        self.points, self.along = np.zeros((0, 3)), np.zeros((0, 3))
+
+    def direction(self, z: Array) -> Array:
+        """The direction made exact; a new one is kept for the next ones."""
+        z = z / float(np.linalg.norm(z))
+        cosines = self.axes @ z
+        nearest = int(np.argmax(np.abs(cosines)))
+        if np.linalg.norm(np.cross(self.axes[nearest], z)) <= FITS:
+            exact = self.axes[nearest] * np.sign(cosines[nearest])
+        else:
+            exact = self._perpendicular(z, self.axes[np.abs(cosines) <= FITS])
+            self.axes = np.vstack([self.axes, exact])
+        self.largest = max(self.largest, float(np.linalg.norm(np.cross(exact, z))))
+        return exact
+
+    def _perpendicular(self, z: Array, across: Array) -> Array:
+        """The direction made perpendicular to the first two of ``across``; unchanged where that turns it by more than ``FITS``."""
+        if not len(across):
+            return z
+        exact = np.cross(across[0], across[1]) if len(across) > 1 else z - (z @ across[0]) * across[0]
+        exact = exact / (np.linalg.norm(exact) or 1.0) * np.sign(exact @ z)
+        return exact if np.linalg.norm(np.cross(exact, z)) <= FITS and exact.any() else z
+
+    def on_line(self, p: Array, z: Array) -> Array:
+        """The point moved onto a line of the same direction that passes it closely."""
+        away = p - self.points
+        away = away - (away * self.along).sum(axis=1, keepdims=True) * self.along
+        same = (np.abs(self.along @ z) > 1 - 1e-14) & (np.linalg.norm(away, axis=1) <= self.near)
+        if same.any():
+            return np.asarray(p - away[int(np.argmax(same))])
+        self.points, self.along = np.vstack([self.points, p]), np.vstack([self.along, z])
+        return p
+
+
+UNMENTIONED = 1e-12
+"""Corrections up to here are not worth a word."""
+
+
+@dataclass
+class Standing:
+    """Collects what is wrong (``faults``) and what was taken otherwise than it stands (``notes``, markers that were ``moved``)."""
+
+    assembly: Assembly
+    faults: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    moved: dict[str, tuple[float, float]] = field(default_factory=dict)
+
+    def part(self, name: str) -> Part:
+        """The part, or the ground."""
+        return self.assembly.parts.get(name, self.assembly.ground)
+
+    def ends(self, found: Connection) -> tuple[str, str] | None:
+        """The parts of the two markers; None, and a fault, where a marker is not there."""
+        markers = self.assembly.markers
+        missing = [path for path in (found.i, found.j) if path not in markers]
+        if missing:
+            known = listed(markers, 8)
+            self.faults.append(
+                f"{found.title}: there is no marker {', '.join(map(shown, missing))} (there are: {known})"
+            )
+            return None
+        return markers[found.i].part, markers[found.j].part
+
+    def pose(self, marker: str) -> Array:
+        """A marker in the assembly, where the parts stand."""
+        found = self.assembly.markers[marker]
+        return compose(self.part(found.part).pose, found.pose)
+
+    def own(self, part: str, X: Array) -> Array:
+        """A pose of the assembly in the frame of a part; that of the ground is global."""
+        return X if part == self.assembly.name else compose(inverse(self.part(part).pose), X)
+
+    def fits(self, joint: Connection, distance: float, angle: float) -> bool:
+        """Whether the markers of a joint meet; where they do not, or parts have to be moved for it, that is said."""
+        fits = distance <= FITS * self.size and angle <= FITS
+        if not fits:
+            self.notes.append(
+                f"{joint.kind} {joint.name!r} does not fit as the parts stand: its markers are {distance:.3g} and {angle:.3g} rad "
+                "off; the loops are closed by moving the parts"
+            )
+        elif max(distance / self.size, angle) > UNMENTIONED:
+            self.moved[joint.j] = (distance, angle)
+        return fits
+
+    @functools.cached_property
+    def size(self) -> float:
+        """Mean radius of the markers and of the mass centres; 1 where all are one point."""
+        a = self.assembly
+        centers = [part.pose @ [*part.center, 1.0] for part in a.parts.values() if part.center is not None]
+        points = np.array([self.pose(path)[:, 3] for path in a.markers] + centers or [np.zeros(3)])
+        radius = float(np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=1).mean()))
+        return radius if radius > UNMENTIONED * max(1.0, float(np.abs(points).max())) else 1.0

@@ -1,4 +1,35 @@
-"""From a FreeCAD assembly to a mechanism: parts are links, joints are pairs by markers, motions are drives.
+"""The mechanism of an ASMT assembly.
+
+Constant distances of FreeCAD as rods without mass: the pairs at the ends of a rod are those of the joint's name.
+
+A joint holds two points (``Sph``), axes (``Rev``: at a point of the axis; ``Cyl``: anywhere on it) at the distance ``distanceIJ``.
+
+Gears and racks of FreeCAD as couplings of the turns and slides of their parts against a common carrier.
+
+The solver relates markers I and J themselves. With the angle a_I of the direction from I to J, seen in I and about its z, and a_J of that
+from J to I, seen in J,
+
+    GearJoint:        a_J + (radiusI / radiusJ) a_I = const
+    RackPinionJoint:  x + pitchRadius b = const,   x of J in I, b the turn of J against I about z of I.
+
+A gear that turns by q about its z against the carrier sees the line of centres turn by -q; a rack that slides by s along its x sees the
+pinion slide by -s. So ``q_J + (radiusI / radiusJ) q_I`` and ``q_J - s / pitchRadius`` are constant. Where pairs about one axis lie between
+a gear and the carrier (a sun wheel on the frame, its planet on an arm), their turns are added. Source: OndselSolver, constraints of these
+joints.
+
+Forces of FreeCAD along the line of two markers: springs where their formula is one, else force laws.
+
+``InLineForceTorque``: the force on marker I is ``tension`` towards J, that on J opposite; a formula of ``rIJ(self)``, their distance,
+``vrIJ(self)``, its rate, and ``time``. Source: OndselSolver, ForTorActionInLine.
+
+Joints of constant velocity of FreeCAD: a link without mass between two universal joints about one point, which bend by equal halves.
+
+The solver's condition is ``x_I . y_J + y_I . x_J = 0``, where each z leaves the joint along its own shaft. With J turned half round about
+its x or y, it says that the rotation vector from I to J has no part along z. Such rotations are ``Rx(p) Ry(q) Ry(q) Rx(p)``: the first half
+leads from I to a link in between, the second on to J, and couplings hold the halves to each other. Source: OndselSolver, constraint of this
+joint.
+
+From a FreeCAD assembly to a mechanism: parts are links, joints are pairs by markers, motions are drives.
 
 Names, placements and the zeros of joint coordinates are FreeCAD's. CAD writes about as many digits as its solver closes loops to (1e-6), so
 markers that fit to ``FITS`` are made to fit exactly where the parts stand: first axes that are parallel or perpendicular to that accuracy,
@@ -8,7 +39,7 @@ fit less are left as they are, and the loops are closed from there.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,30 +48,272 @@ import scipy
 from mechgraph.algebra.inertia import physical_faults
 from mechgraph.algebra.se3 import Array, compose, inverse
 from mechgraph.errors import DeclarationError, listed
-from mechgraph.exchange.asmt import Assembly, Connection, Part
-from mechgraph.exchange.asmt_bends import CONSTANT_VELOCITY, bent
-from mechgraph.exchange.asmt_forces import force
-from mechgraph.exchange.asmt_gears import GEARED, geared
-from mechgraph.exchange.asmt_joints import (
+from mechgraph.exchange.asmt import (
+    FITS,
+    HALF_TURNS,
     JOINTS,
     REFUSED,
     SLIDES,
+    UNMENTIONED,
+    Assembly,
+    Connection,
     Directions,
+    Part,
     Row,
+    Snapping,
+    Standing,
     ball_type,
     free,
     motion_type,
     turns_in,
 )
-from mechgraph.exchange.asmt_rods import RODS, rod
-from mechgraph.exchange.asmt_standing import UNMENTIONED, Standing
-from mechgraph.exchange.exact import FITS, Snapping
-from mechgraph.exchange.formula import FormulaFault, evaluated
-from mechgraph.model.loads import Gravity
+from mechgraph.exchange.syntax import FormulaFault, evaluated, law
+from mechgraph.fields import second_direction
+from mechgraph.model.couplings import Coupling
+from mechgraph.model.loads import ForceLaw, Gravity, Spring
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.quantities import shown
+
+BALL, HINGE, SLEEVE = ("S", False), ("R", False), ("C", True)
+RODS = {
+    "SphSphJoint": (BALL, BALL),
+    "RevRevJoint": (HINGE, HINGE),
+    "CylSphJoint": (SLEEVE, BALL),
+    "RevCylJoint": (HINGE, SLEEVE),
+}
+"""The pairs at I and at J, and whether they slide along the axis of the marker."""
+
+
+def rod(builder: Standing, joint: Connection) -> tuple[Link, list[Pair]] | None:
+    """The rod of a joint and its two pairs; None, and a fault, where its ends say no direction.
+
+    The rod's frame is that of the assembly where the parts stand; where the distance is another there, the loops are closed from there.
+    """
+    if builder.ends(joint) is None:
+        return None
+    kinds = RODS[joint.kind]
+    length = float(joint.node.numbers("distanceIJ", (1,), joint.title.partition(": ")[2], builder.faults)[0])
+    poses = [builder.pose(path) for path in (joint.i, joint.j)]
+    points, axes = [X[:, 3] for X in poses], [X[:, 2] for X in poses]
+    if np.linalg.norm(np.cross(axes[0], axes[1])) <= FITS:
+        axes[1] = axes[0] * np.sign(axes[0] @ axes[1])
+    feet = [
+        p + z * (z @ (q - p)) if slides else p
+        for (_, slides), p, q, z in zip(kinds, points, points[::-1], axes, strict=True)
+    ]
+    across = feet[1] - feet[0]
+    if not (length > 0 and np.linalg.norm(across) > FITS * builder.size):
+        builder.faults.append(
+            f"{joint.title}: distanceIJ = {length:g}: expected a distance above 0 of what is apart as the parts stand"
+        )
+        return None
+    ends = [feet[0], feet[0] + length * across / np.linalg.norm(across)]
+    pairs = []
+    for side, (kind, _), path, foot, end, z in zip("IJ", kinds, (joint.i, joint.j), feet, ends, axes, strict=True):
+        part = builder.assembly.markers[path].part
+        X = np.column_stack([_axes(z), foot])
+        markers = [
+            Marker(tuple(Y[:, 3]), tuple(Y[:, 2]), tuple(Y[:, 0]))
+            for Y in (builder.own(part, X), np.column_stack([X[:, :3], end]))
+        ]
+        pairs.append(Pair(f"{joint.name} {side}", kind, part, joint.name, on_a=markers[0], on_b=markers[1]))
+    return Link(joint.name), pairs
+
+
+def _axes(z: Array) -> Array:
+    """A rotation with the third axis ``z``."""
+    x = np.asarray(second_direction(tuple(z.tolist())), dtype=float)
+    x = x - (x @ z) * z
+    x = x / np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+GEARED = ("GearJoint", "RackPinionJoint")
+"""Joints that are couplings."""
+Terms = dict[str, float]
+"""Freedoms with coefficients."""
+
+
+def geared(builder: Standing, joint: Connection, pairs: Sequence[Pair]) -> Coupling | None:
+    """The coupling of a gear or rack joint; None, and a fault, where its parts have no carrier in common or a radius is zero."""
+    if builder.ends(joint) is None:
+        return None
+    names = ("radiusI", "radiusJ") if joint.kind == "GearJoint" else ("pitchRadius",)
+    radii = [float(joint.node.numbers(name, (1,), joint.title.partition(": ")[2], builder.faults)[0]) for name in names]
+    if not all(radii):
+        builder.faults.append(
+            f"{joint.title}: {', '.join(names)} = {', '.join(f'{r:g}' for r in radii)}: expected no zero"
+        )
+        return None
+    J = builder.pose(joint.j)
+    if joint.kind == "GearJoint":
+        first, second, what = _turns(builder, joint.i, pairs, builder.pose(joint.i)[:, 2]), J[:, 2], "turn about"
+        ratio = radii[0] / radii[1]
+    else:
+        first, second, what = _slides(builder, joint.i, pairs), builder.pose(joint.i)[:, 2], "slide along x of"
+        ratio = -1.0 / radii[0]
+    others = _turns(builder, joint.j, pairs, second)
+    carrier = next((part for part in first if part in others), None)
+    if carrier is None:
+        builder.faults.append(
+            f"{joint.title}: no part carries both: I must {what} its marker, J turn about its own, against one part; join them to it"
+        )
+        return None
+    terms: Terms = dict(others[carrier])
+    for name, value in first[carrier].items():
+        terms[name] = terms.get(name, 0.0) + ratio * value
+    return Coupling({name: value for name, value in terms.items() if value}, name=joint.name)
+
+
+def _turns(builder: Standing, marker: str, pairs: Sequence[Pair], z: Array) -> dict[str, Terms]:
+    """Parts to which pairs about the z axis of a marker lead, the nearest first, and the turn about ``z`` of its part against them."""
+    at, part = builder.pose(marker)[:, 3], builder.assembly.markers[marker].part
+    found: dict[str, Terms] = {part: {}}
+    queue = [part]
+    for here in queue:
+        for pair in pairs:
+            names = {freedom.name for freedom in pair.type.freedoms}
+            if here not in (pair.a, pair.b) or not {"Rz"} <= names <= {"Rz", "Tz"}:
+                continue
+            axis, other = _marker(builder, pair), pair.a if here == pair.b else pair.b
+            off = np.linalg.norm(np.cross(at - axis[:, 3], axis[:, 2])) / builder.size
+            if other not in found and off <= FITS and np.linalg.norm(np.cross(axis[:, 2], z)) <= FITS:
+                sense = float(np.sign(axis[:, 2] @ z)) * (1.0 if here == pair.b else -1.0)
+                found[other] = {**found[here], f"{pair.name}.Rz": sense}
+                queue.append(other)
+    del found[part]
+    return found
+
+
+def _slides(builder: Standing, marker: str, pairs: Sequence[Pair]) -> dict[str, Terms]:
+    """Parts on which the part of a marker slides along its x, and the slide against them."""
+    x, part = builder.pose(marker)[:, 0], builder.assembly.markers[marker].part
+    found: dict[str, Terms] = {}
+    for pair in pairs:
+        if part in (pair.a, pair.b) and [freedom.name for freedom in pair.type.freedoms] == ["Tz"]:
+            z = _marker(builder, pair)[:, 2]
+            if np.linalg.norm(np.cross(z, x)) <= FITS:
+                sense = float(np.sign(z @ x)) * (1.0 if part == pair.b else -1.0)
+                found.setdefault(pair.a if part == pair.b else pair.b, {f"{pair.name}.Tz": sense})
+    return found
+
+
+def _marker(builder: Standing, pair: Pair) -> Array:
+    """The marker of a pair on link a, in the assembly."""
+    own = pair.markers[0].pose()
+    return own if pair.a == builder.assembly.name else compose(builder.part(pair.a).pose, own)
+
+
+LINEAR = 1e-12
+"""Part of the force by which a formula may differ from a line in distance and rate."""
+LOOKED_AT = np.array([[0.0, 1.0, 0.0, 0.7, 1.9, 0.7], [0.0, 0.0, 1.0, -1.3, 0.4, -1.3], [0.0, 0.0, 0.0, 0.0, 0.6, 2.0]])
+"""Distances, rates and times at which it is looked at."""
+
+
+def force(builder: Standing, found: Connection) -> Spring | ForceLaw | None:
+    """The load of a force; None, and a fault, where a marker is not there or a formula is none."""
+    ends = builder.ends(found)
+    if ends is None:
+        return None
+    try:
+        tension = law(found.node.word("tension"), builder.assembly.variables)
+        if law(found.node.word("twist") or "0", builder.assembly.variables)(*LOOKED_AT).any():
+            builder.faults.append(
+                f"{found.title}: twist: a couple about the line of two points is no load here; delete it there"
+            )
+            return None
+        T = tension(*LOOKED_AT)
+    except FormulaFault as fault:
+        builder.faults.append(f"{found.title}: {fault}")
+        return None
+    markers = builder.assembly.markers
+    p, q = (
+        tuple((builder.pose(path) if part == builder.assembly.name else markers[path].pose)[:, 3].tolist())
+        for path, part in zip((found.i, found.j), ends, strict=True)
+    )
+    stiffness, damping = float(T[1] - T[0]), float(T[2] - T[0])
+    off = np.abs(T - (T[0] + stiffness * LOOKED_AT[0] + damping * LOOKED_AT[1])).max()
+    if np.isfinite(T).all() and stiffness and T[0] / stiffness <= 0 and off <= LINEAR * np.abs(T).max():
+        return Spring(*ends, p, q, stiffness, float(-T[0] / stiffness), damping)
+
+    def push(x: Array, v: Array, t: Array | None) -> Array:
+        return -tension(x, v, np.zeros_like(x) if t is None else np.broadcast_to(t, x.shape))
+
+    return ForceLaw((*ends, p, q), law=push)
+
+
+CONSTANT_VELOCITY = "ConstantVelocityJoint"
+AXES = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
+"""The first axis of a universal joint, z, along x of the marker, its second, x, along y."""
+
+
+@dataclass(frozen=True)
+class Bend:
+    """What stands for a joint of constant velocity."""
+
+    link: Link
+    pairs: tuple[Pair, ...]
+    couplings: tuple[Coupling, ...]
+    start: Mapping[str, float]
+
+
+def bent(builder: Standing, joint: Connection) -> Bend | None:
+    """The parts of a joint of constant velocity; None, and a fault, where a marker is not there or both z point the same way."""
+    if builder.ends(joint) is None:
+        return None
+    I, J = builder.pose(joint.i), builder.pose(joint.j)
+    if I[:, 2] @ J[:, 2] > np.cos(FITS):
+        builder.faults.append(
+            f"{joint.title}: z of both markers points the same way, where the condition of this joint holds no turn; "
+            "each z is to leave the joint along its own shaft: turn one marker half round"
+        )
+        return None
+    half = max(HALF_TURNS[1:3], key=lambda F: float(np.trace(I[:, :3].T @ J[:, :3] @ F)))
+    given = np.column_stack([J[:, :3] @ half, J[:, 3]])
+    x, y, z, w = scipy.spatial.transform.Rotation.from_matrix(I[:, :3].T @ given[:, :3]).as_quat(canonical=True)
+    p, q = float(np.arctan2(x, w)), float(np.arctan2(y, np.hypot(x, w)))
+    turn = scipy.spatial.transform.Rotation.from_euler("XY", [p, q]).as_matrix()
+    back = scipy.spatial.transform.Rotation.from_euler("YX", [q, p]).as_matrix()
+    distance, angle = (
+        float(np.linalg.norm(J[:, 3] - I[:, 3])),
+        2 * float(np.arctan2(abs(z), np.hypot(np.hypot(x, y), w))),
+    )
+    fits = builder.fits(joint, distance, angle)
+    between = np.column_stack([I[:, :3] @ turn, I[:, 3]])
+    end = np.column_stack([between[:, :3] @ back, I[:, 3]]) if fits else given
+    pairs = tuple(
+        Pair(
+            f"{joint.name} {side}",
+            "U",
+            part,
+            joint.name,
+            on_a=_universal_marker(builder.own(part, X)),
+            on_b=_universal_marker(between),
+        )
+        for side, path, X in (("I", joint.i, I), ("J", joint.j, end))
+        for part in [builder.assembly.markers[path].part]
+    )
+    names = [f"{joint.name} {side}" for side in "IJ"]
+    couplings = tuple(
+        Coupling(
+            dict.fromkeys([f"{name}.{turn}" for name in names], 1.0), name=f"{joint.name} halves {turn}", constant=0.0
+        )
+        for turn in ("Rz", "Rx")
+    )
+    start = {
+        f"{name}.{turn}": sign * value
+        for name, sign in zip(names, (1, -1), strict=True)
+        for turn, value in (("Rz", p), ("Rx", q))
+    }
+    return Bend(Link(joint.name), pairs, couplings, start)
+
+
+def _universal_marker(X: Array) -> Marker:
+    """The marker of a universal joint at a pose."""
+    R = X[:, :3] @ AXES
+    return Marker(tuple(X[:, 3]), tuple(R[:, 2]), tuple(R[:, 0]))
 
 
 @dataclass

@@ -16,7 +16,7 @@ import scipy
 from mechgraph.algebra.inertia import physical_faults
 from mechgraph.algebra.se3 import Array, compose
 from mechgraph.errors import DeclarationError, listed
-from mechgraph.exchange.xml_tree import Element, read_xml
+from mechgraph.exchange.syntax import Element, read_xml
 from mechgraph.model.couplings import Coupling
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Marker, Pair, second_direction

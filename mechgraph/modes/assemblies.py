@@ -1,15 +1,495 @@
-"""All assemblies of a mechanism at given values of its drivers: what a user calls."""
+"""All assemblies of a mechanism at given values of its drivers."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, cmp_to_key
+from math import prod
 from typing import Any
 
+import numpy as np
+
+from mechgraph.closure.assembly import CLOSED, close_all, closed_start, named_columns
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.driver_motion import DriverMotion
+from mechgraph.closure.indexing import Index, System
+from mechgraph.determinacy.mobility import free_motion
+from mechgraph.determinacy.report import dead_point_error, undriven_error
+from mechgraph.errors import DeclarationError, counted
+from mechgraph.force.loads import user_poses
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.modes.finding import GUESSED_TURNS, GUESSES, Finder, Progress
-from mechgraph.modes.question import Question
-from mechgraph.modes.result import AssembliesOver
-from mechgraph.quantities import Count, Index, Positive, door
+from mechgraph.modes.certificate import TINY, Certificate, certificate, told_apart
+from mechgraph.modes.continua import Found, Nearby, continua, irregular, least_value, searched
+from mechgraph.modes.family import NO_NUMBERS, SPAN, Array, Family, at_rest
+from mechgraph.modes.form import Form, Rod, Whole, WithoutRods, rods_of
+from mechgraph.modes.result import Assemblies, AssembliesOver, ComplexModes, Continuum, weakest
+from mechgraph.modes.start_sets import ONE_ASSEMBLY, Irregular, StartSet, bound, distinct, keep, kept, start_set
+from mechgraph.modes.targets import (
+    MOST_FOLLOWED,
+    REAL,
+    REAL_SINGULAR,
+    Ends,
+    Group,
+    Product,
+    Undivided,
+    groups_of,
+    is_real,
+)
+from mechgraph.numerics.linear import rank_of, singular_values
+from mechgraph.quantities import Count, Positive, door
+from mechgraph.quantities import Index as Seed
+
+OFF_DEAD_POINT = 0.3
+"""Motion (radians, or lengths over L) of what moves most from a singular start to where the class is read."""
+
+
+class Question:
+    """Values given at one position or at several, and a closed position of the mechanism, beside the start where that is singular.
+
+    ``m`` is the mechanism with free pairs for points and links that are given (see ``closure.prescription``), ``drive (d, n)`` are the
+    values in internal units; ``batch`` is ``()`` or ``(n,)``; ``declared`` is the closed position next to the start, singular or not.
+
+    Raises
+    ------
+    DeclarationError, AssemblyError, IndeterminateError, DeadPointError
+    """
+
+    start: Configuration
+
+    def __init__(self, m: Mechanism, values: Mapping[str, Any] | None) -> None:
+        given = DriverMotion(m, values, asked="assemblies of")
+        if len(given.batch) > 1:
+            raise DeclarationError(
+                f"assemblies of {m.name!r}",
+                [f"values of shape {given.batch}: expected single values or a list of them"],
+            )
+        self.asked, self.m, self.batch, self.names = m, given.m, given.batch, given.names
+        self.start = closed_start(self.m)
+        if given.free:
+            self.m = given.whole(self.start)
+            self.start = closed_start(self.m)
+        self.system = self.start.system
+        self.columns, _ = named_columns(self.m, self.system, dict.fromkeys(self.names, 0.0))
+        self.unit = np.where(self.system.is_length[self.columns], self.system.par.L, 1.0)
+        self.values = given.values("position", self.batch)
+        self.drive = self.values / self.unit[:, None]
+        self.declared = self.start
+        self._read()
+        if self._loose or self.freedoms.passive:
+            self._leave()
+
+    def _read(self) -> None:
+        """What can move at the start, and the class there."""
+        self.x = self.start.x[:, 0]
+        self.freedoms = free_motion(self.system, self.x, self.columns)
+        idle = np.stack([*(p.rates for p in self.freedoms.passive), np.zeros(self.system.n_freedoms)], axis=1)[:, :-1]
+        held = self._held(idle)
+        self.rods = [] if self.m.couplings else rods_of(self.system, np.concatenate([self.columns, held]))
+        links = np.array([link for rod in self.rods for link in rod.links], dtype=np.intp)
+        self.family = Family(self.start, self.columns, idle, held, links)
+
+    def _held(self, idle: Array) -> Index:
+        """Freedoms that may rest, as one of the passive motions ``idle (F, p)`` goes on for ever with them, evenly in all freedoms.
+
+        Other members of the class need not have such a motion; that of a rod between balls they all have.
+        """
+        s, out = self.system, []
+        for k in np.flatnonzero((s.single_rows >= 0) & (np.abs(idle) > SPAN).any(axis=1)).tolist():
+            part = idle[k] @ idle[k]
+            if (
+                part > SPAN**2
+                and Configuration(s, s.advance(self.start.x, idle @ idle[[k]].T / part)).closure[0] < CLOSED
+            ):
+                out.append(k)
+                idle = at_rest(idle, np.array([k]))
+        return np.array(out, dtype=np.intp)
+
+    @cached_property
+    def form(self) -> Form:
+        """The equations in which assemblies are looked for: without couplings and rods, where these can be left out."""
+        family, drive, rods = self._uncoupled()
+        if rods:
+            found = WithoutRods(family, drive, rods, rods)
+            if found.family.fault:
+                found = WithoutRods(family, drive, rods, found.needed)
+            if not found.family.fault:
+                return found
+        return Whole(family, drive)
+
+    def _uncoupled(self) -> tuple[Family, Array, list[Rod]]:
+        """The class, what is given, and rods; without couplings, where these say as much of freedoms as there are that are not given.
+
+        With ``G_d`` and ``G`` the coefficients of what is given and of the others, ``q = q_0 - G^-1 G_d (d - d_0)``.
+        """
+        if not self.m.couplings:
+            return self.family, self.drive, self.rods
+        s, terms = self.system, self.system.coupling_matrix[:, :, 0]
+        others = np.setdiff1d(s.coupled_freedoms, self.columns)
+        if rank_of(singular_values(terms[:, others])) < max(len(terms), len(others)):
+            return self.family, self.drive, []
+        begin = self.start.x[:, :1]
+        turned = np.linalg.solve(
+            terms[:, others], terms[:, self.columns] @ (self.drive - begin[s.single_rows[self.columns]])
+        )
+        columns = np.concatenate([self.columns, others])
+        bare = System(self.m.replace(couplings=[]), None, s.par)
+        idle, held = self.family.idle, self.family.held
+        rods = rods_of(bare, np.concatenate([columns, held]))
+        links = np.array([link for rod in rods for link in rod.links], dtype=np.intp)
+        family = Family(Configuration(bare, begin), columns, idle, np.setdiff1d(held, others), links)
+        return family, np.concatenate([self.drive, begin[s.single_rows[others]] - turned]), rods
+
+    @property
+    def _loose(self) -> bool:
+        """Whether what is given leaves motions free at the start."""
+        return bool(self.freedoms.undriven) and (self.family.unknowns > self.family.rank or bool(self.family.fault))
+
+    def _leave(self) -> None:
+        """Read the class beside the start, where motions are left free, or are passive, at the start alone."""
+        loose, passive = self._loose, len(self.freedoms.passive)
+        for moved in self._beside():
+            self.start = moved
+            self._read()
+            if not self._loose and (loose or len(self.freedoms.passive) < passive):
+                return
+        self.start = self.declared
+        self._read()
+        if loose:
+            self._refuse()
+
+    def _beside(self) -> Iterator[Configuration]:
+        """Closed positions a little away from the start either way: drivers moved, those too that stand still there, or free to move."""
+        x0, motions, still = self.start.x, self.freedoms.null, self.columns[self.freedoms.still(self.columns)]
+        rates = motions @ np.random.default_rng(0).normal(size=motions.shape[1])
+        rates *= OFF_DEAD_POINT / max(float(np.abs(rates).max(initial=0.0)), SPAN)
+        for held in (self.columns, NO_NUMBERS):
+            for sign in (1.0, -1.0):
+                dq = sign * rates[:, None]
+                dq[still] = sign * OFF_DEAD_POINT * bool(held.size)
+                x, error = close_all(self.system, self.system.advance(x0, dq), held)
+                if error[0] < CLOSED:
+                    yield Configuration(self.system, x)
+
+    def _refuse(self) -> None:
+        """What is given leaves motions free where the mechanism is declared, and beside it."""
+        names = [name for name, rests in zip(self.names, self.freedoms.still(self.columns), strict=True) if rests]
+        if names and len(self.names) <= self.freedoms.mobility:
+            raise dead_point_error(self.m, names, {name: self.m.start.get(name, 0.0) for name in names}, None)
+        raise undriven_error(self.m, self.freedoms.undriven)
+
+    def coordinates(self, x: Array) -> Array:
+        """User coordinates ``(M, F)`` of real states ``(nx, M)``: whole rounds nearest to the start, given ones exactly as given."""
+        s = self.system
+        start = s.start_coordinates(self.m.start)
+        q = np.stack([s.coordinates_of(x[:, [i]], start)[:, 0] for i in range(x.shape[1])] or [np.zeros(0)])
+        q = q.reshape(x.shape[1], s.n_freedoms)
+        period = self.periods.copy()
+        period[self.columns] = np.inf
+        back = np.isfinite(period)
+        q[:, back] -= period[back] * np.round((q - start)[:, back] / period[back])
+        return q
+
+    @property
+    def periods(self) -> Array:
+        """By how much single freedoms grow until all is as it was, user units; infinite where they go on or are coupled, and for balls."""
+        s, alone = self.system, self.system.single_rows >= 0
+        alone[s.coupled_freedoms] = False
+        return np.where(alone, s.in_user_units(self.family.periods), np.inf)
+
+    def complex_coordinates(self, x: Array) -> Array:
+        """User coordinates ``(n, F)`` of complex states ``(nx, n)``."""
+        s = self.system
+        q = s.difference(x, s.state_of(np.zeros((s.n_freedoms, 1))))
+        q[s.is_length] *= s.par.L
+        return q.T
+
+
+REAL_CLOSED = 1e-12
+"""Closure error of what is real in the equations that are solved: some roundings."""
+PUT_BACK = 1e-9
+"""Closure error of what is real with its rods put back."""
+UNFIT = 1e-3
+"""Closure error from which on a rod that has no row does not fit; between this and that of what is closed it is open whether it does."""
+GUESSES = 400
+"""Random guesses where no class is known."""
+GUESSED_TURNS = 1.0
+"""Turns on either side of the start within which angles are guessed."""
+ORDER = 1e-7
+"""Difference of link poses (and coordinates) below which the next number decides the order of assemblies."""
+
+BESIDE = "What can move with the drivers at rest is not counted, and there may be more of that kind."
+"""What is said beside continua."""
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class _Solutions:
+    """Real states ``(nx, M)`` at a position and ``others`` that are not real, with what is said of them (see ``Assemblies``).
+
+    ``solved`` are the real ones as they stand in the equations that were solved, ``continua`` lie in those of the mechanism.
+    """
+
+    x: Array
+    solved: Array
+    others: Array
+    word: str
+    evidence: tuple[str, ...]
+    total: int | None
+    infinite: int = 0
+    on_continua: int = 0
+    continua: Sequence[Found] = ()
+
+
+class Finder:
+    """Finds the assemblies of a question."""
+
+    def __init__(self, question: Question, seed: int, cache: bool, progress: Progress | None) -> None:
+        self.question, self.progress = question, progress
+        self.form: Form = question.form
+        self.family = self.form.family
+        self.rng, self.cache = np.random.default_rng(seed), cache
+        self.fault = self.family.fault
+
+    @cached_property
+    def groups(self) -> Sequence[Undivided | Group]:
+        """What is solved, one after the other."""
+        return groups_of(self.family)
+
+    @cached_property
+    def starts(self) -> list[StartSet]:
+        """The start sets of the groups; none where no class is known."""
+        if self.fault:
+            return []
+        try:
+            return [self._start(group.family) for group in self.groups]
+        except Irregular:
+            if len(self.groups) > 1:
+                self.groups = [Undivided(self.family)]
+                return self.starts
+            self.fault = "random mechanisms of its class are not closed by regular equations"
+            self.form = Whole(self.question.family, self.question.drive)
+            self.family = self.form.family
+            return []
+
+    def _start(self, family: Family) -> StartSet:
+        known = kept(family) if self.cache else None
+        if known is not None:
+            return known
+        made = start_set(family, self.rng, self.progress)
+        if self.cache and made.whole:
+            keep(family, made)
+        return made
+
+    def solutions(self, guesses: int = GUESSES, turns: float = GUESSED_TURNS) -> list[_Solutions]:
+        """What is found at all positions."""
+        q = self.question
+        if not self.starts:
+            return [self._searched(q.drive[:, i], guesses, turns) for i in range(q.drive.shape[1])]
+        found = Product(self.family, self.groups, self.starts, self.form.drive).ends(self.rng, self.progress)
+        return [self._tracked(one, i) for i, one in enumerate(found)]
+
+    def singular(self, found: _Solutions, i: int) -> bool:
+        """Whether a real assembly of those found at a position is, or nearly so, or can move."""
+        return bool(found.continua or irregular(self.family, Configuration(self.form.at(i), found.solved)).any())
+
+    def positions(self, guesses: int, turns: float) -> list[Assemblies]:
+        """The assemblies at all positions."""
+        return [self._result(found, i) for i, found in enumerate(self.solutions(guesses, turns))]
+
+    def _distinct(self, x: Array, i: int) -> Array:
+        return x[:, distinct(self.family.prints(Configuration(self.form.at(i), x)))]
+
+    def _searched(self, drive: Array, guesses: int, turns: float) -> _Solutions:
+        q = self.question
+        x = searched(q.system, q.x, q.columns, drive, guesses, turns, self.rng, self.progress)
+        x = np.concatenate([x, *([q.start.x] if np.allclose(q.start.x[self.family.rows, 0], drive) else [])], axis=1)
+        why = (
+            f"No class is known: {self.fault}. Searched from {guesses} random guesses within {turns:g} turns of the start; "
+            "others may exist."
+        )
+        system = q.system
+        # those that are singular are known to the root of rounding only
+        least = np.where(irregular(self.family, Configuration(system, x)), REAL_SINGULAR, ONE_ASSEMBLY)
+        x = x[:, distinct(q.family.prints(Configuration(system, x)), None, least)]
+        moving = np.array([Nearby(q.family, system, x[:, [i]]).moves for i in range(x.shape[1])], dtype=bool)
+        more = continua(q.family, system, x[:, moving], drive, self.progress) if moving.any() else []
+        others = np.zeros((system.n_state, 0), dtype=complex)
+        return _Solutions(
+            x[:, ~moving], x[:, ~moving], others, "searched", (why, *([BESIDE] if more else [])), None, continua=more
+        )
+
+    def _tracked(self, found: Ends, i: int) -> _Solutions:
+        system, real = self.form.at(i), np.flatnonzero(is_real(found.poses, found.error))
+        solved, error = close_all(system, found.x[:, real].real, self.family.columns)
+        # two that meet at a place that is not real are next to one another there
+        real, solved = real[error < REAL_CLOSED], solved[:, error < REAL_CLOSED]
+        solved, once = self._distinct(solved, i), solved.shape[1]
+        word, evidence = _completeness(found, self.groups, self.starts)
+        if solved.shape[1] < once:
+            word, evidence = "searched", (*evidence, "Different ends came to one real assembly.")
+        more = self._continua(found.moving, i)
+        N = prod(start.x.shape[1] for start in self.starts)
+        # rods that would need complex turns to be put back are not real
+        x, others = self.form.lifted(solved, i), self.form.lifted(np.delete(found.x, real, axis=1), i)
+        complex_ = np.abs(x.imag).max(axis=0, initial=0.0) > REAL
+        system = self.question.system
+        off = Configuration(system, x.real).closure
+        made, unfit = ~complex_ & (off < PUT_BACK), ~complex_ & bool(self.form.spare) & (off > UNFIT)
+        if self.form.spare:
+            others = others[:, Configuration(system, others).closure < UNFIT]
+        if (lost := int((~made & ~complex_ & ~unfit).sum())) > 0:
+            word, evidence = "searched", (*evidence, f"Of {counted(lost, 'mode')} the rods could not be put back.")
+        others = np.concatenate([others, x[:, complex_]], axis=1)
+        evidence = (*evidence, *self.form.told, *([BESIDE] if more else []))
+        return _Solutions(
+            x[:, made].real, solved[:, made], others, word, evidence, N, found.infinite, found.on_continua, more
+        )
+
+    def _continua(self, moving: Array, i: int) -> list[Found]:
+        """Continua of the mechanism, where tracks came to such."""
+        q = self.question
+        if not moving.shape[1]:
+            return []
+        return continua(q.family, q.system, self.form.lifted(moving, i), q.drive[:, i], self.progress)
+
+    def _result(self, found: _Solutions, i: int) -> Assemblies:
+        q, m, x = self.question, self.question.asked, found.x
+        here = Configuration(q.system, x)
+        poses = np.moveaxis(user_poses(here), 1, 0)
+        order = _ordered(q.family.prints(here).T)
+        x, poses, solved = x[:, order], poses[order], found.solved[:, order]
+        coordinates = self._coordinates(x, i)
+        own = [q.m.freedom_names().index(name) for name in m.freedom_names()]
+        names = m.freedom_names()
+        told = [self._point(self.form.at(i), solved[:, [j]]) for j in range(x.shape[1])]
+        sure = told_apart(self.family, solved, [proof for _, _, proof in told])
+        away = Configuration(q.system, found.others)
+        return Assemblies(
+            m,
+            dict(zip(q.names, q.values[:, i].tolist(), strict=True)),
+            tuple(self._assembly(row[own]) for row in coordinates),
+            poses,
+            coordinates[:, own],
+            tuple(kind for kind, _, _ in told),
+            np.array([condition for _, condition, _ in told]),
+            tuple(sure),
+            ComplexModes(q.complex_coordinates(found.others)[:, own], np.moveaxis(user_poses(away), 1, 0)),
+            found.word,
+            (*found.evidence, *_said_apart(sure)),
+            found.total,
+            found.infinite,
+            found.on_continua,
+            tuple(
+                Continuum(
+                    self._assembly(self._coordinates(one.x[:, None], i)[0, own]),
+                    one.dimension,
+                    tuple(name for name, k in zip(names, own, strict=True) if one.moves[k]),
+                )
+                for one in found.continua
+            ),
+        )
+
+    def _coordinates(self, x: Array, i: int) -> Array:
+        """User coordinates ``(M, F)`` of states at a position, given ones as given."""
+        out = self.question.coordinates(x)
+        out[:, self.question.columns] = self.question.values[:, i]
+        return out
+
+    def _assembly(self, row: Array) -> Mechanism:
+        m = self.question.asked
+        return m.replace(start=dict(zip(m.freedom_names(), row.tolist(), strict=True)))
+
+    def _point(self, system: System, x: Array) -> tuple[str, float, Certificate | None]:
+        """Kind, condition and certificate of a real assembly that cannot move."""
+        family, here = self.family, Configuration(system, x)
+        condition = float(1.0 / max(least_value(family, here)[0], TINY))
+        sure = certificate(here, family.free, family.passive.shape[1], not self.fault)
+        # what is proved is regular, be it ever so close to a double point; so is what is far from any other
+        if (sure is not None and sure.proved) or Nearby(family, system, x).gap > ONE_ASSEMBLY:
+            return "regular", condition, sure
+        return "double", np.inf, None
+
+
+def _completeness(
+    found: Ends, groups: Sequence[Undivided | Group], starts: Sequence[StartSet]
+) -> tuple[str, tuple[str, ...]]:
+    """The word for how sure it is that no assembly is missing, and what it rests on."""
+    told = [_of_class(group.family, start) for group, start in zip(groups, starts, strict=True)]
+    N = prod(start.x.shape[1] for start in starts)
+    evidence = list(told[0][1])
+    if len(groups) > 1:
+        counts = ", ".join(
+            f"{start.x.shape[1]} ({' '.join(group.names)})" for group, start in zip(groups, starts, strict=True)
+        )
+        evidence = [f"{len(groups)} groups are solved one after the other, modes of each: {counts}."]
+        evidence += [
+            f"{group.names[0]}: {text}" for group, (_, texts) in zip(groups, told, strict=True) for text in texts
+        ]
+    if found.left_out:
+        evidence.append(
+            f"Complex modes of a group that lie far away, or lead to more than {MOST_FOLLOWED} tracks, are not gone on with, nor counted."
+        )
+    single, meet = int((found.count == 1).sum()), found.count[found.count > 1]
+    parts = [f"{single} alone", *([f"{meet.sum()} that meet in {len(meet)}"] if meet.size else [])]
+    parts += [
+        f"{number} {where}"
+        for number, where in ((found.on_continua, "on continua"), (found.left_out, "left out"))
+        if number
+    ]
+    evidence.append(
+        f"{counted(found.tracks, 'track')} to this position in {counted(found.runs, 'run')}: of {N} modes "
+        f"{', '.join(parts)}, {found.infinite} at infinity; {found.lost} lost in the best run."
+    )
+    adds_up = int(found.count.sum()) + found.on_continua + found.infinite + found.left_out == N
+    if not found.clean or not adds_up:
+        return "searched", (*evidence, "Tracks that are lost, or meet, leave open whether these are all.")
+    return weakest(word for word, _ in told), tuple(evidence)
+
+
+def _of_class(family: Family, start: StartSet) -> tuple[str, tuple[str, ...]]:
+    """The word for a start set, and what it rests on."""
+    N, known, trace = start.x.shape[1], bound(family), start.trace
+    loops = (
+        f"A random complex mechanism of the class has {counted(N, 'mode')}: {counted(start.loops, 'loop')} of such mechanisms brought no "
+        f"further one (chance of one missed {start.chance:.1g} where all permutations are as likely), {start.lost} of {start.followed} "
+        "tracks lost."
+    )
+    if not start.whole:
+        return "searched", (loops, f"After {counted(start.followed, 'track')} others were not looked for any further.")
+    if known is not None and known.count == N:
+        return "proved", (f"The class has at most {N}: {known.source}.",)
+    if not trace.passed:
+        return "searched", (loops, "No trace test was passed, so that others may exist.")
+    words = (
+        f"Trace test passed: over {trace.samples} random mechanisms of the class a sum over all assemblies is a rational function of "
+        f"degree {trace.degree} (the singular values of its Loewner matrix end there: {trace.last:.1g}, {trace.beyond:.1g})."
+    )
+    return "tested", (words, loops)
+
+
+def _said_apart(sure: Sequence[Certificate | None]) -> tuple[str, ...]:
+    """What certificates say of how far apart roots are."""
+    apart = [one.apart for one in sure if one is not None and one.apart is not None]
+    if not apart:
+        return ()
+    if min(apart) > 0:
+        return (
+            f"Roots of {counted(len(apart), 'certificate')} are proved to be {min(apart):.1g} apart or more (radians, lengths over L).",
+        )
+    return ("Of some certificates it is not proved that their roots are two.",)
+
+
+def _ordered(numbers: Array) -> list[int]:
+    """The order of rows by their numbers, of which smaller differences than rounding do not count."""
+
+    def compare(i: int, j: int) -> int:
+        apart = numbers[i] - numbers[j]
+        first = int(np.argmax(np.abs(apart) > ORDER * max(1.0, float(np.abs(numbers).max()))))
+        return int(np.sign(apart[first]))
+
+    return sorted(range(len(numbers)), key=cmp_to_key(compare))
 
 
 @door
@@ -17,7 +497,7 @@ def assemblies(
     m: Mechanism,
     values: Mapping[str, Any] | None = None,
     *,
-    seed: Index = 0,
+    seed: Seed = 0,
     guesses: Count = GUESSES,
     turns: Positive = GUESSED_TURNS,
     cache: bool = True,

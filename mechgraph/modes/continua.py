@@ -1,18 +1,190 @@
-"""Continua: assemblies that can move with the drivers at rest, told by what moves in them and by where all else is."""
+"""Assemblies that are not isolated: sought by Newton steps and near singular ends.
+
+What lies about an assembly at which the closure rows are nearly singular: a root alone, two that meet, or a continuum.
+
+Let ``sigma`` be the smallest singular value beside those of passive motions, ``n`` and ``u`` its directions of freedoms and of rows. Along
+``n``, all else closed,
+
+    u . f(x + s n) = u . f(x) + sigma s + kappa s^2 / 2 + ...,    kappa = u . f''(n, n),
+
+which has two roots ``2 sqrt(sigma^2 - 2 kappa u . f) / kappa`` apart, real or not: near each other at a fold, far from each other where
+equations are ill-conditioned. Where a step along what the rows leave free is closed again elsewhere, the assembly can move. Source:
+Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria, 2000, chapter 3 (reduction of Lyapunov and Schmidt).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from mechgraph.closure.assembly import CLOSED, close_all
 from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import System
-from mechgraph.modes.family import Array, Family
-from mechgraph.modes.nearby import Nearby, irregular
-from mechgraph.modes.search import searched
+from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.ranges import BEYOND_END, beyond
+from mechgraph.modes.family import Array, Family, parts
+
+GUESSES_TOGETHER = 200
+"""Guesses closed together."""
+SLIDE_SPREAD = 1.5
+"""Standard deviation of guessed slides, over L."""
+
+
+def searched(
+    system: System,
+    x: Array,
+    columns: Index,
+    drive: Array,
+    starts: int,
+    turns: float,
+    rng: np.random.Generator,
+    progress: Callable[[str], None] | None = None,
+) -> Array:
+    """Closed states ``(nx, n)`` from ``starts`` random guesses within so many ``turns`` about ``x (nx,)``, drivers at ``drive (d,)``.
+
+    None has a pair beyond an end of its curve or surface.
+    """
+    found = []
+    turning = ~system.is_length
+    for i in range(0, starts, GUESSES_TOGETHER):
+        n = min(GUESSES_TOGETHER, starts - i)
+        if progress is not None:
+            progress(f"guess {i + 1} to {i + n} of {starts}")
+        dq = rng.uniform(-2 * np.pi * turns, 2 * np.pi * turns, (system.n_freedoms, n))
+        dq[~turning] = rng.normal(0.0, SLIDE_SPREAD, (int((~turning).sum()), n))
+        guess = system.advance(np.repeat(x[:, None], n, axis=1), dq)
+        guess[system.single_rows[columns]] = drive[:, None]
+        closed, error = close_all(system, guess, columns)
+        found.append(closed[:, (error <= CLOSED) & (beyond(system, closed) <= BEYOND_END).all(axis=0)])
+    return np.concatenate(found, axis=1)
+
+
+VANISHED = 1e-200
+"""What stands for a curvature of zero, by which is divided."""
+SINGULAR = 1e-5
+"""Smallest singular value of the closure rows, as part of the largest, below which an assembly is looked at more closely."""
+LARGE_STATE = 10.0
+"""Imaginary part, or length over L, in a state from which on small singular values are a matter of scale."""
+AWAY = 1e-2
+"""Step along motions that the rows leave free, after which a continuum is still closed: closing takes back what rows hold to a rank."""
+GONE = 0.2
+"""Part of that step by which what tells assemblies apart must have changed."""
+CURVED = 1e-3
+"""Step of second differences: their rounding is 1e-10."""
+INDEPENDENT_WAYS = 0.1
+"""Singular value of motions, as part of the largest, from which on they count for the dimension of a continuum."""
+
+
+def least_value(family: Family, here: Configuration) -> Array:
+    """Smallest singular values ``(T,)`` of the closure rows beside those of passive motions, as parts of the largest."""
+    if not family.unknowns:
+        return np.ones(here.T)
+    sigma = np.linalg.svd(here.J[:, family.free].transpose(2, 0, 1), compute_uv=False)
+    return np.asarray(np.maximum(parts(sigma)[:, family.unknowns - 1], VANISHED))
+
+
+def irregular(family: Family, here: Configuration) -> Array:
+    """Which states ``(T,)`` are to be looked at more closely."""
+    s = here.system
+    lengths = here.x[s.single_rows[s.is_length]]
+    large = np.maximum(np.abs(here.x.imag).max(axis=0, initial=0.0), np.abs(lengths).max(axis=0, initial=0.0))
+    return np.asarray((least_value(family, here) < SINGULAR) & (large <= LARGE_STATE))
+
+
+class Nearby:
+    """The closure rows of a class about a closed state ``x (nx, 1)``, real or complex, of a system with its drivers at rest."""
+
+    def __init__(self, family: Family, system: System, x: Array) -> None:
+        self.family, self.system, self.here = family, system, Configuration(system, x)
+        self._U, sigma, Vt = np.linalg.svd(self.here.J[:, family.free, 0])
+        size = parts(sigma)
+        wanted = family.unknowns
+        self.rank = min(int((size > SINGULAR).sum()), wanted)
+        self._left = Vt[self.rank :].conj().T
+
+    @property
+    def regular(self) -> bool:
+        """Whether the rows are far from singular, as far as the state is not large."""
+        return not irregular(self.family, self.here)[0]
+
+    @cached_property
+    def motions(self) -> Array:
+        """Motions ``(free, k)`` of largest rate 1 that the rows leave free, or nearly so, beside passive ones, which tell nothing apart."""
+        rates = self._prints(self._stepped(CURVED * self._left)) - self._prints(self._stepped(-CURVED * self._left))
+        told = np.linalg.svd(rates)[2][: self.family.unknowns - self.rank]
+        out = self._left @ told.conj().T
+        return np.asarray(out / np.abs(out).max(axis=0))
+
+    @cached_property
+    def landed(self) -> Array:
+        """Closed states ``(nx, n)`` elsewhere to which steps along these motions lead; none where the assembly cannot move."""
+        k = self.motions.shape[1]
+        mixed = (
+            np.concatenate([np.eye(k), np.random.default_rng(0).normal(size=(k, k))], axis=1) if k > 1 else np.eye(k)
+        )
+        ways = self.motions @ mixed
+        ways = ways / np.abs(ways).max(axis=0)
+        x, error = close_all(
+            self.system, self._stepped(AWAY * np.concatenate([ways, -ways], axis=1)), self.family.columns
+        )
+        gone = np.abs(self._prints(x) - self._prints(self.here.x)).max(axis=0, initial=0.0)
+        return x[:, (error < CLOSED) & (gone > GONE * AWAY)]
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is a point of a continuum."""
+        return not self.regular and self.landed.shape[1] > 0
+
+    @property
+    def dimension(self) -> int:
+        """Of the continuum here, where it does not cross others: independent motions along which it goes on."""
+        ways = self._prints(self.landed) - self._prints(self.here.x)
+        sigma = np.linalg.svd(ways, compute_uv=False)
+        return int((sigma > INDEPENDENT_WAYS * sigma[0]).sum()) if sigma.size else 0
+
+    @cached_property
+    def _bent(self) -> tuple[complex, complex, float]:
+        """What the rows leave open, its rate and ``kappa`` along the only motion, each in the direction of rows that these two have."""
+        dq = self.motions
+        ahead, back = (Configuration(self.system, self._stepped(sign * CURVED * dq)).residual[:, 0] for sign in (1, -1))
+        f = self.here.residual[:, 0]
+        across = self._U[:, self.rank :].conj().T
+        kappa = across @ (ahead + back - 2 * f) / CURVED**2
+        size = max(float(np.linalg.norm(kappa)), VANISHED)
+        u = kappa.conj() / size
+        rates = self.here.J[:, self.family.free, 0] @ dq[:, 0]
+        return complex(u @ (across @ f)), complex(u @ (across @ rates)), size
+
+    @property
+    def gap(self) -> float:
+        """How far the other root is (largest increment); infinite where there is none near, 0 where more than two may meet."""
+        if self.regular:
+            return np.inf
+        if self.motions.shape[1] > 1:
+            return 0.0
+        f, sigma, kappa = self._bent
+        return float(2 * np.abs(np.sqrt(sigma**2 - 2 * kappa * f + 0j)) / kappa)
+
+    def both(self) -> Array:
+        """The two roots near here ``(nx, 2)``, closed each for itself, the nearer one first."""
+        f, sigma, kappa = self._bent
+        apart = np.sqrt(sigma**2 - 2 * kappa * f + 0j)
+        larger = max(sigma + apart, sigma - apart, key=abs)
+        s = np.array([-2 * f / larger, -larger / kappa])
+        return close_all(self.system, self._stepped(self.motions * s), self.family.columns)[0]
+
+    def _stepped(self, part: Array) -> Array:
+        """States ``(nx, T)`` after increments ``part (free, T)``."""
+        dq = np.zeros((self.system.n_freedoms, part.shape[1]), dtype=part.dtype)
+        dq[self.family.free] = part
+        x = np.repeat(self.here.x, part.shape[1], axis=1)
+        return self.system.advance(x.astype(np.result_type(x, dq)), dq)
+
+    def _prints(self, x: Array) -> Array:
+        return self.family.prints(Configuration(self.system, x))
+
 
 LOOKED_FOR = 100
 """Random guesses from which real points of continua are looked for, the same ones for any seed."""

@@ -1,4 +1,17 @@
-"""Stages along a path, for mobility 1: what the equation of motion needs is tabulated once along the path, which is then cheap to follow.
+"""Stages along a path, for mobility 1.
+
+Loads along a path: what depends on the place alone is tabulated, other laws of place, rate and time are asked for one state.
+
+At a rate ``u'`` of the path's coordinate a freedom has the rate ``z(u) u'`` and a link the twist ``V(u) u'``; a load that exerts the
+force ``F`` on a link and the effort ``e`` in a freedom has the generalized force ``V . F + z e``. A law, a table or a function reads a few
+tabulated values, as ``model.load_base.LoadSite`` says, and no loop is closed for it.
+
+A path followed one way from a closed state and tabulated: closed states and the terms of its equation of motion, place by place.
+
+Places are distances of the coordinate from the start. Change points are leapt over where that can be proved (see ``numerics.leap``), and
+otherwise passed by the careful march, or the table ends.
+
+Stages along a path, for mobility 1: what the equation of motion needs is tabulated once along the path, which is then cheap to follow.
 
 On the path every state is a function of one coordinate ``u``, that of the freedom which moves fastest, and
 
@@ -19,23 +32,377 @@ with certificates. In pieces of the path the terms are Chebyshev series.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from bisect import bisect_right
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
+from mechgraph.algebra.se3 import Array, cross, rotate
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_path import DriverPath
-from mechgraph.closure.indexing import System
+from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.rank import closure_rank
-from mechgraph.closure.solver import closure_solver
-from mechgraph.response.along_terms import OF_LOADS, AlongTerms
-from mechgraph.response.chart import Closed, Stopped
+from mechgraph.closure.solver import FactoredClosure, closure_solver
+from mechgraph.errors import DeclarationError
+from mechgraph.force.loads import NOT_FINITE, Site, user_poses, user_twists
+from mechgraph.model.loads import Load
+from mechgraph.numerics.continuation import End, Follower
+from mechgraph.numerics.crossings import WINDOW, Crossing, passed
+from mechgraph.numerics.hermite import Interpolation
+from mechgraph.numerics.leap import leapt
+from mechgraph.numerics.tolerances import PATH
+from mechgraph.numerics.tracks import Nodes, Paths
 from mechgraph.response.charts import Task
-from mechgraph.response.motion_equations import MASSLESS, along_one
-from mechgraph.response.way import POINTS, Piece, Way
+from mechgraph.response.motion_equations import MASSLESS, Closed, Loads, Stopped, along_one
+
+OF_LOADS = 4
+"""Tabulated terms of the loads that depend on the place, and on rates linearly: see ``along_one``."""
+VALUES_OF_FREEDOM, VALUES_OF_LINK = 2, 18
+"""Tabulated values of a freedom, ``q`` and ``z``, and of a link, its pose ``(3, 4)`` and ``V``; in the user's units."""
+
+
+class AlongTerms:
+    """What is tabulated for loads along a path of one coordinate, and what the other loads do there."""
+
+    def __init__(self, system: System, loads: Loads) -> None:
+        self.system, m = system, system.m
+        parts = [loads.stored, loads.rest]
+        self.smooth = Loads(*(tuple(load for load in some if load.smooth) for some in parts))
+        self.stored, self.rest = (tuple(load for load in some if not load.smooth) for some in parts)
+        others = (*self.stored, *self.rest)
+        named = dict.fromkeys(load.in_freedom for load in others if load.in_freedom is not None)
+        self.columns = {name: i for i, name in enumerate(named)}
+        links = dict.fromkeys(
+            link for load in others if load.in_freedom is None or not load.by_position for link in load.links(m)
+        )
+        self.links = {name: len(self.columns) * VALUES_OF_FREEDOM + i * VALUES_OF_LINK for i, name in enumerate(links)}
+        places = [m.freedom(name) for name in self.columns]
+        self._columns = np.array([int(system.first_column[k]) + j for k, j in places], dtype=np.intp)
+        self._links = [m.link_index[name] for name in self.links]
+        L, lengths = system.par.L, system.is_length[self._columns]
+        unit = np.where(lengths, L, 1.0)
+        of_link = np.ones((VALUES_OF_LINK, len(self.links)))
+        of_link[[3, 7, 11, 15, 16, 17]] = L
+        self.sizes = np.concatenate([np.repeat(unit, VALUES_OF_FREEDOM), of_link.T.ravel()])
+        """The units of the values behind the first terms."""
+
+    def tabulated(self, here: Configuration, f: FactoredClosure) -> Array:
+        """All terms ``(OF_LOADS + m, T)`` at closed states."""
+        Z = f.sensitivity()[:, 0]
+        s, columns = self.system, self._columns
+        unit = np.where(s.is_length[columns], s.par.L, 1.0)[:, None]
+        freedoms = np.stack([s.coordinates_of(here.x)[columns], unit * Z[columns]], axis=1)
+        poses = user_poses(here)[self._links, :, :3].transpose(0, 2, 3, 1).reshape(-1, 12, here.T)
+        twists = user_twists(here, here.link_twists(Z))[:, self._links].transpose(1, 0, 2)
+        links = np.concatenate([poses, twists], axis=1)
+        more = np.concatenate([freedoms.reshape(-1, here.T), links.reshape(-1, here.T)]) / self.sizes[:, None]
+        return np.concatenate([along_one(here, f, self.smooth), more])
+
+    def after_turns(self, advance: Array, turns: float) -> Array:
+        """What the values behind the first terms have grown by after turns in which the state advances ``(nx,)``."""
+        s, out = self.system, np.zeros(len(self.sizes))
+        rows = s.single_rows[self._columns]
+        moved = np.where(rows >= 0, advance[rows], 0.0) * np.where(s.is_length[self._columns], s.par.L, 1.0)
+        out[: len(rows) * VALUES_OF_FREEDOM : VALUES_OF_FREEDOM] = turns * moved
+        return out
+
+    def forces(self, values: Array, rate: float, t: Array) -> tuple[Array, Array]:
+        """Generalized forces ``(T,)`` of the other loads, stored and not, at one place with a rate and times ``(T,)``; internal units."""
+        stored, rest = (
+            _AlongSite(self, values, rate, t).collected(some) if some else np.zeros(len(t))
+            for some in (self.stored, self.rest)
+        )
+        return stored, rest
+
+
+class _AlongSite(Site):
+    """What loads see at one place of a path at times ``(T,)``, about the global origin; ``found`` is their power for a unit rate."""
+
+    def __init__(self, terms: AlongTerms, values: Array, rate: float, t: Array) -> None:
+        self.m, self.L = terms.system.m, terms.system.par.L
+        self.terms, self.rate, self.t = terms, rate, t
+        self.batch, self.good = (len(t),), np.arange(len(t))
+        self.tabulated = values
+        self.found = np.zeros(len(t))
+
+    def collected(self, loads: Iterable[Load]) -> Array:
+        """The generalized force ``(T,)``."""
+        for load in loads:
+            load.act(self)
+            if not np.isfinite(self.found).all():
+                raise DeclarationError(f"load {load.where.removesuffix(': ')}", [NOT_FINITE])
+        return self.found / self.L**2
+
+    def _of_link(self, link: str) -> tuple[Array, Array]:
+        """Pose ``(3, 4, 1)`` and unit twist ``(6, 1)``."""
+        at = self.terms.links[link]
+        values = self.tabulated[at : at + VALUES_OF_LINK, None]
+        return values[:12].reshape(3, 4, 1), values[12:]
+
+    def _of_freedom(self, name: str) -> tuple[float, float]:
+        at = VALUES_OF_FREEDOM * self.terms.columns[name]
+        return float(self.tabulated[at]), float(self.tabulated[at + 1])
+
+    def rotation(self, link: str) -> Array:
+        """See ``LoadSite``."""
+        return self._spread(self._of_link(link)[0][:, :3])
+
+    def point(self, link: str, p: Any) -> tuple[Array, Array]:
+        """See ``LoadSite``."""
+        X, V = self._of_link(link)
+        local = np.asarray(self.m.link(link).point(p) if isinstance(p, str) else p, dtype=float).reshape(3, -1)
+        at = rotate(X[:, :3], local) + X[:, 3]
+        return self._spread(at), self._spread(self.rate * (V[3:] + cross(V[:3], at)))
+
+    def center(self, link: str) -> Any:
+        """See ``LoadSite``."""
+        return self.m.link(link).center
+
+    def motion_of(self, link: str) -> tuple[Array, Array]:
+        """See ``Site``."""
+        X, V = self._of_link(link)
+        pose = np.concatenate([X[..., 0], [[0.0, 0.0, 0.0, 1.0]]])
+        return tuple(np.broadcast_to(one, (*self.batch, *one.shape)) for one in (pose, self.rate * V[:, 0]))  # type: ignore[return-value]
+
+    def _spread(self, value: Array) -> Array:
+        return np.broadcast_to(value, (*value.shape[:-1], *self.batch))
+
+    def freedom(self, name: str) -> tuple[Array, Array]:
+        """See ``LoadSite``."""
+        q, z = self._of_freedom(name)
+        return np.full(self.batch, q), np.full(self.batch, z * self.rate)
+
+    def add_force(self, link: str, force: Array, at: Array) -> None:
+        """See ``LoadSite``."""
+        V = self._of_link(link)[1]
+        self.found = self.found + ((V[3:] + cross(V[:3], at)) * force).sum(axis=0)
+
+    def add_couple(self, link: str, moment: Array) -> None:
+        """See ``LoadSite``."""
+        self.found = self.found + (self._of_link(link)[1][:3] * moment).sum(axis=0)
+
+    def add_effort(self, name: str, effort: Array) -> None:
+        """See ``LoadSite``."""
+        self.found = self.found + self._of_freedom(name)[1] * effort
+
+
+FIRST_PART = 0.8
+"""Length of path that is tabulated first (radians, or lengths / L); every further part is twice as long as the one before."""
+AGAIN = 0.1
+"""First step where the path is taken up again."""
+PIECE = 0.64
+"""Longest piece of one series (radians, or lengths / L)."""
+POINTS = 16
+"""Points of a series; even, so that none lies in the middle."""
+FASTEST = 6.0
+"""Rate of another freedom against that of the coordinate at which the table ends."""
+AROUND = 0.64
+"""Length of the piece with a change point in its middle: the accelerations of states beside it lose rounding over the cube of the
+distance, 5e-12 at the nearest point of the series."""
+SERIES_TAIL = 1e-12
+"""Part of the largest coefficient that the last two of a series may have; what a smooth series leaves out behind them is far smaller."""
+COEFFICIENT_NOISE = 1e-14
+"""Rounding of what a series is made of, times the square of the condition."""
+SHORTEST_PIECE = 1e-8
+"""Shortest piece: where branches all but cross, a path turns from one towards the other within the root of what opens the crossing."""
+AT_CROSSING = 0.01
+"""Distance from a change point up to which a place counts as it."""
+NOT_FALLING = 0.3
+"""Part of the coefficients before them that the last ones of a series have where they are noise: those of a smooth series of that size
+(``NOISE``, against the largest term) fall by a hundred from four to four."""
+NOISE = 1e-9
+
+
+@dataclass(frozen=True)
+class Piece:
+    """The path between two values of its coordinate: Chebyshev series ``(POINTS, 4 + m)`` of the terms (see ``along_terms``).
+
+    ``steepness``: the largest rate of another freedom for a unit rate of the coordinate.
+    """
+
+    begin: float
+    end: float
+    series: Array
+    steepness: float
+
+
+class Way:
+    """The path from a closed state ``x (nx,)`` on; tabulated up to ``length``, and no further where it is ``closed``."""
+
+    def __init__(self, path: DriverPath, terms: AlongTerms, x: Array, sense: float) -> None:
+        self.path, self.terms, self.sense = path, terms, sense
+        self.begin = float(x[path.rows[0]])
+        path.variant_of = np.zeros(1, dtype=np.intp)
+        self.follower = Follower(path)
+        self.length, self.closed = 0.0, False
+        self.crossings: list[Crossing] = []
+        self._next, self._ended = FIRST_PART, False
+        self._pieces: list[Piece] = []
+        self._starts: list[float] = []
+        here = Paths([self._drives(np.zeros(2))])
+        self._nodes = self.follower.follow(x[:, None], here).nodes
+
+    def piece(self, at: float) -> Piece:
+        """The piece in which a place lies."""
+        return self._pieces[max(0, bisect_right(self._starts, at) - 1)]
+
+    def extend(self, most: float) -> None:
+        """Tabulate the next part, up to ``most`` at first."""
+        place = min(self.length + self._next, most)
+        self._next *= 2.0
+        self._follow(place + AROUND / 2)
+        # a part does not end beside a change point
+        while near := [c.place for c in self.crossings if abs(place - c.place) < AROUND / 2 - AT_CROSSING]:
+            place = max(near) + AROUND / 2
+            self._follow(place + AROUND / 2)
+        known = self._known()
+        self.closed = place > known
+        place = min(place, known)
+        self._interpolation = Interpolation(self.path, self._nodes)
+        if place > self.length:
+            pieces = self._tabulated(self.length, place)
+            self._pieces += pieces
+            self._starts += [self.sense * (p.begin - self.begin) for p in pieces]
+            self.length = place
+
+    # --- following -------------------------------------------------------------------------------------------------------
+
+    def _follow(self, goal: float) -> None:
+        """Follow the path to a place, or to where it cannot be followed on."""
+        there = goal - PATH.shortest  # by rounding the last node may lie before the goal
+        while not self._ended and self._reached < there:
+            self._take(self._march(goal, careful=False), [])
+            if self._reached >= there or self._known() < self._reached:
+                return
+            self.follower.paths = Paths([self._drives(np.array([0.0, goal]))])
+            found = leapt(self.follower, self._nodes)
+            if found is not None:
+                self._take(found[1], [found[0]])
+                continue
+            start = self._reached
+            nodes = self._march(goal, careful=True)
+            places = [start + at for _, at in self.follower.crossings]
+            self._ended = self.follower.ends[0] is not End.REACHED
+            self._take(nodes, [])
+            self.follower.paths = Paths([self._drives(np.array([0.0, goal]))])
+            across = [passed(self.follower, self._nodes, 0, at) for at in places]
+            self.crossings += [crossing for crossing in across if crossing is not None]
+
+    def _march(self, goal: float, careful: bool) -> Nodes:
+        """Nodes from the last one on."""
+        last = self._nodes.take(np.array([-1]))
+        start, first = float(last.place[0]), AGAIN if len(self._nodes) > 1 else PATH.first
+        paths = Paths([self._drives(np.array([start, goal]))])
+        found = self.follower.follow(last.x, paths, first, last.which, careful).nodes
+        return replace(found, place=start + found.place)
+
+    def _take(self, nodes: Nodes, crossings: list[Crossing]) -> None:
+        """Add nodes, without another one of the form and place of the last, and crossings."""
+        last = self._nodes.take(np.array([-1]))
+        new = (nodes.place > last.place) | (nodes.which != last.which)
+        self._nodes = Nodes.join([self._nodes, nodes.take(new)])
+        self.crossings += crossings
+
+    def _drives(self, at: Array) -> Array:
+        """Values ``(1, n)`` of the coordinate at places."""
+        return np.asarray(self.begin + self.sense * at[None])
+
+    @property
+    def _reached(self) -> float:
+        return float(self._nodes.place[-1])
+
+    def _known(self) -> float:
+        """How far the coordinate serves: to before the first node at which another freedom moves much faster."""
+        nodes, singles = self._nodes, self.path.system.single_rows >= 0
+        near = np.array([np.abs(nodes.place - c.place) < AT_CROSSING for c in self.crossings]).any(axis=0)
+        steep = np.flatnonzero((np.abs(nodes.Z[singles]).max(axis=(0, 1)) > FASTEST) & ~near)
+        return float(nodes.place[max(int(steep[0]) - 1, 0)]) if steep.size else self._reached
+
+    # --- tabulating ------------------------------------------------------------------------------------------------------
+
+    def states(self, at: Array) -> tuple[Array, Index]:
+        """Closed states ``(nx, T)`` at places ``(T,)``, and their forms."""
+        u, track = self._drives(at), np.zeros(len(at), dtype=np.intp)
+        step = self._interpolation.find(track, at)
+        x = self._interpolation(step, at, u)
+        found = self.follower.newton.close(x, u, track, self._nodes.which[self._interpolation.left[step]])
+        x = found.x.copy()
+        for c in self.crossings:
+            near = np.abs(at - c.place) < WINDOW
+            x[:, near] = c.states(at[near])
+        return x, found.which
+
+    def _tabulated(self, begin: float, end: float) -> list[Piece]:
+        """Pieces between two places with their series, halved until these have converged."""
+        spans, out = self._spans(begin, end), []
+        middles = np.array([c.place for c in self.crossings])
+        while spans:
+            again = []
+            for (a, b), c, steepness, noise in zip(spans, *self._series(spans), strict=True):
+                if (
+                    (_coarse(c, noise) or b - a > POINTS * self._step(a, b))
+                    and b - a > SHORTEST_PIECE
+                    and not (np.abs(middles - 0.5 * (a + b)) < 0.25 * (b - a)).any()
+                ):
+                    again += [(a, 0.5 * (a + b)), (0.5 * (a + b), b)]
+                else:
+                    begin, end = self._drives(np.array([a, b]))[0].tolist()
+                    out.append(Piece(begin, end, c, float(steepness)))
+            spans = again
+        return sorted(out, key=lambda piece: self.sense * piece.begin)
+
+    def _step(self, begin: float, end: float) -> float:
+        """The shortest step of the path between two places: where it turns between two points of a series, its nodes are close."""
+        places = self._nodes.place
+        steps = np.diff(places[max(0, np.searchsorted(places, begin) - 1) : np.searchsorted(places, end) + 1])
+        return float(steps[steps > 0.0].min())
+
+    def _spans(self, begin: float, end: float) -> list[tuple[float, float]]:
+        """Places between which pieces are tried first: change points in the middle of theirs."""
+        places = sorted(c.place for c in self.crossings if begin < c.place < end)
+        cuts = [begin, end]
+        for i, place in enumerate(places):
+            room = min(place - begin, end - place, *np.abs(np.delete(places, i) - place) / 2, AROUND / 2)
+            cuts += [place - room, place + room]
+        out = []
+        for a, b in pairwise(np.unique(cuts).tolist()):
+            whole = any(a < place < b for place in places)
+            edges = np.linspace(a, b, 1 + (1 if whole else max(1, int(np.ceil((b - a) / PIECE - 1e-9)))))
+            out += list(pairwise(edges.tolist()))
+        return out
+
+    def _series(self, spans: list[tuple[float, float]]) -> tuple[Array, Array, Array]:
+        """Series ``(spans, POINTS, 4 + m)`` over spans of places, how steep the path is in each, and the noise of the series."""
+        nodes = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
+        at = np.concatenate([0.5 * (a + b) + 0.5 * (b - a) * nodes for a, b in spans])
+        x, which = self.states(at)
+        here = Configuration(self.path.system, x)
+        f = self.path.solver.factored(here, which)
+        values = self.terms.tabulated(here, f).T.reshape(len(spans), POINTS, -1)
+        T = np.polynomial.chebyshev.chebvander(nodes, POINTS - 1) * (2.0 / POINTS)
+        T[:, 0] *= 0.5
+        singles = self.path.system.single_rows >= 0
+        steepness = np.abs(f.sensitivity()[singles, 0]).max(axis=0).reshape(len(spans), POINTS).max(axis=1)
+        # rounding over the square of the distance from a singular position, which the condition measures
+        noise = COEFFICIENT_NOISE * (f.condition**2).reshape(len(spans), POINTS).max(axis=1)
+        return np.einsum("pk,spq->skq", T, values), steepness, noise
+
+
+def _coarse(c: Array, noise: float) -> bool:
+    """Whether series ``(POINTS, 4 + m)`` leave more out than rounding, which stays however short the piece is."""
+    late, last = np.abs(c[-8:-4]).max(axis=0), np.abs(c[-4:]).max(axis=0)
+    tail, size = np.abs(c[-2:]).max(axis=0), np.abs(c).max(axis=0)
+    # the mass beside itself, forces beside what gives the mass an acceleration of one as well, places beside one (radian, length / L)
+    of_forces, others = np.full(OF_LOADS - 1, size[:2].max()), np.maximum(size[OF_LOADS:], 1.0)
+    largest = np.concatenate([size[:1], of_forces, others])
+    rounding = (last > NOT_FALLING * late) & (last < max(NOISE, noise) * largest)
+    small = tail <= SERIES_TAIL * np.maximum(size, 1e-3 * largest)
+    return bool(not (small | rounding).all())
+
 
 FAST = 2.0
 """Rate of another freedom against that of the coordinate above which it becomes the coordinate."""

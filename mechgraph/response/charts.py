@@ -1,27 +1,273 @@
-"""Stages of independent freedoms, for any mobility: the loops are closed at every evaluation."""
+"""Stages of independent freedoms, and motions that are prescribed.
+
+Whether the rates that a prescribed motion states are those of its position, and where it jumps or bends.
+
+In a panel from ``a`` to ``b`` a motion ``q, q', q''`` of time is that of one function where
+
+    q(b) - q(a) = int q' dt,    q'(b) - q'(a) = int q'' dt
+
+A panel in which it is not is halved, and the worse half taken on. Rates that are wrong stay wrong in every half by the same part; what is
+merely fast is resolved at some length; a jump is left over in one half alone, and stays however short that is, while a jump of ``q''``
+falls with it: there steps of an integration had better end.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
+import scipy
 
 from mechgraph.algebra.se3 import Array
 from mechgraph.by_kernel import COMPILED
+from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_path import in_blocks
 from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.passive_motion import PassiveMotion
-from mechgraph.closure.rates import Velocities
+from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.determinacy.mobility import free_motion
-from mechgraph.force.loads import kinetic_energy
+from mechgraph.errors import DeclarationError
+from mechgraph.force.block import ForceTask, forces_of_block
+from mechgraph.force.loads import Site, kinetic_energy
 from mechgraph.model.loads import Load
-from mechgraph.response.chart import Chart, Closed, Stopped
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.motion import Motion
 from mechgraph.response.kernel_rates import Evaluated, KernelRates
-from mechgraph.response.motion_equations import Loads, Moved, accelerations, applied, moved, positions_together
-from mechgraph.response.prescribed import Prescribed
+from mechgraph.response.motion_equations import (
+    Chart,
+    Closed,
+    Loads,
+    Moved,
+    Stopped,
+    accelerations,
+    applied,
+    moved,
+    positions_together,
+)
+from mechgraph.result.kept import BlockMotion
+from mechgraph.result.trajectory import Trajectory
+
+Law = Callable[[float], tuple[float, float, float]]
+"""Position, velocity and acceleration at a time."""
+PANELS = 256
+"""Panels from the beginning to the end."""
+AGREEING_CHANGE = 1e-5
+"""Part of the change in a panel up to which it agrees with the rate: what interpolated tables of both may differ by."""
+NOISE_OF_MOTION = 1e-13
+"""The same of the quantity itself."""
+PANEL_HALVINGS = 24
+"""Most halvings of a panel."""
+HALVINGS_ALIKE = 6
+"""Halvings in which the part by which a rate is off stays alike, in both halves, where the rate is wrong."""
+IS_JUMP = 10.0
+"""Change against what the rate says from which on it is a jump."""
+OF_SAMPLES = (0.1, 0.75)
+"""Part of the largest rate by which changes between samples may miss it; of accelerations more, as they may jump between two samples."""
+QUANTITIES = ("position", "velocity", "acceleration")
+_PLACES, _WEIGHTS = np.polynomial.legendre.leggauss(6)
+
+
+@dataclass(frozen=True)
+class _Panel:
+    """A panel, and by how much the changes ``(2,)`` of position and velocity miss the integrals of the rates.
+
+    ``part``: the worse of both, against what is allowed; ``order`` which it is; ``said`` the integral, ``size`` the largest change by rate.
+    """
+
+    begin: float
+    end: float
+    part: float
+    order: int
+    change: float
+    said: float
+    size: float
+
+
+def differentiated(law: Law, begin: float, end: float) -> str | tuple[float, ...]:
+    """Times at which the acceleration of a motion jumps, or what is wrong with its rates between two times."""
+    breaks, edges = [], np.linspace(begin, end, PANELS + 1).tolist()
+    rounding = NOISE_OF_MOTION * np.abs([law(t) for t in edges]).max(axis=0)[:2]
+    for a, b in pairwise(edges):
+        panel = _panel(law, a, b, rounding)
+        if panel.part > 1.0:
+            found = _narrowed(law, panel, rounding)
+            if isinstance(found, str):
+                return found
+            breaks += found
+    return tuple(breaks)
+
+
+def _panel(law: Law, a: float, b: float, rounding: Array) -> _Panel:
+    h = b - a
+    inside = np.array([law(float(t)) for t in a + 0.5 * h * (1.0 + _PLACES)])
+    ends = np.array([law(a), law(b)])
+    change, said = (ends[1] - ends[0])[:2], 0.5 * h * (_WEIGHTS @ inside)[1:]
+    largest = np.abs(np.concatenate([ends, inside])).max(axis=0)
+    allowed = AGREEING_CHANGE * h * largest[1:] + rounding
+    part = np.abs(change - said) / np.where(allowed > 0.0, allowed, np.inf)
+    k = int(np.argmax(part))
+    return _Panel(a, b, float(part[k]), k, float(change[k]), float(said[k]), float(h * largest[k + 1]))
+
+
+def _narrowed(law: Law, panel: _Panel, rounding: Array) -> str | list[float]:
+    """What is wrong in a panel, or the time at which an acceleration jumps there, if any."""
+    parts: list[float] = []
+    for _ in range(PANEL_HALVINGS):
+        middle = 0.5 * (panel.begin + panel.end)
+        halves = [_panel(law, *ends, rounding) for ends in ((panel.begin, middle), (middle, panel.end))]
+        worse = max(halves, key=lambda half: half.part)
+        if worse.part <= 1.0:
+            return []
+        parts = [*parts, worse.part] if min(half.part for half in halves) > 1.0 else []
+        panel = worse
+        if len(parts) > HALVINGS_ALIKE and parts[-1] > 0.5 * parts[-1 - HALVINGS_ALIKE]:
+            return (
+                f"its {QUANTITIES[panel.order]} changes by {panel.change:.6g} from t = {panel.begin:.9g} to {panel.end:.9g}, where its "
+                f"{QUANTITIES[panel.order + 1]} says {panel.said:.6g}; give the derivatives of the position"
+            )
+    if abs(panel.change - panel.said) > IS_JUMP * panel.size:
+        jump = f"jumps by {panel.change - panel.said:.6g} at t = {panel.begin:.6g}"
+        return f"its {QUANTITIES[panel.order]} {jump}; give a motion that goes there"
+    return [_jump(law, panel.begin, panel.end)]
+
+
+def _jump(law: Law, a: float, b: float) -> float:
+    """The first time behind a jump of the acceleration between two times."""
+    before, behind = law(a)[2], law(b)[2]
+    while a < (middle := 0.5 * (a + b)) < b:
+        here = law(middle)[2]
+        a, b = (middle, b) if abs(here - before) < abs(here - behind) else (a, middle)
+    return b
+
+
+def samples_fault(t: Array, rows: Array) -> str:
+    """What is wrong with the rates of samples ``rows (T, 3)`` at times ``(T,)``; empty where nothing is."""
+    h, change, mean = np.diff(t), np.diff(rows, axis=0), 0.5 * (rows[1:] + rows[:-1])
+    said = h * mean[:, 1] - h**2 / 12.0 * change[:, 2], h * mean[:, 2]
+    for order, (integral, most) in enumerate(zip(said, OF_SAMPLES, strict=True)):
+        off = np.abs(change[:, order] - integral)
+        allowed = most * h * np.abs(rows[:, order + 1]).max() + NOISE_OF_MOTION * np.abs(rows[:, order]).max()
+        i = int(np.argmax(off - allowed))
+        if off[i] > allowed[i]:
+            return (
+                f"the {QUANTITIES[order]} of its samples changes by {change[i, order]:.6g} from t = {t[i]:.6g} to {t[i + 1]:.6g}, where "
+                f"its {QUANTITIES[order + 1]} says {integral[i]:.6g}; give the derivatives of the position, or leave them out"
+            )
+    return ""
+
+
+OVER_POSITIONS = "is an array over positions, which a motion in time does not have; give a number or a function"
+"""What is wrong with a load that holds such an array."""
+
+
+class Sampled:
+    """The quintic spline through samples of position, velocity and acceleration; refuses times outside of them."""
+
+    def __init__(self, name: str, motion: Motion) -> None:
+        assert motion.t is not None
+        self.name, self.t = name, motion.t
+        rows = np.stack([motion.position, motion.velocity, motion.acceleration], axis=1)
+        self._spline = scipy.interpolate.BPoly.from_derivatives(motion.t, rows)
+        self._rates = (self._spline, self._spline.derivative(1), self._spline.derivative(2))
+
+    def __call__(self, t: float) -> tuple[float, float, float]:
+        """Position, velocity and acceleration at a time."""
+        slack = 1e-9 * float(self.t[-1] - self.t[0])
+        if not self.t[0] - slack <= t <= self.t[-1] + slack:
+            raise DeclarationError(
+                "respond",
+                [
+                    f"motion of {self.name!r}: its samples end at t = {self.t[-1]:g} (they begin at {self.t[0]:g}), asked for t = {t:g}; "
+                    "give samples for the whole time"
+                ],
+            )
+        at = min(max(t, self.t[0]), self.t[-1])
+        q, rate, acceleration = (float(part(at)) for part in self._rates)
+        return q, rate, acceleration
+
+
+class Called:
+    """A callable ``t -> (position, velocity, acceleration)``."""
+
+    def __init__(self, name: str, law: Callable[[float], Any]) -> None:
+        self.name, self.law = name, law
+
+    def __call__(self, t: float) -> tuple[float, float, float]:
+        """Position, velocity and acceleration at a time."""
+        try:
+            values = tuple(float(v) for v in self.law(t))
+        except TypeError:
+            values = ()
+        if len(values) != 3 or not np.isfinite(values).all():
+            raise DeclarationError(
+                "respond",
+                [
+                    f"motion of {self.name!r} at t = {t:g}: expected (position, velocity, acceleration), three finite numbers, got "
+                    f"{self.law(t)!r}"
+                ],
+            )
+        return values[0], values[1], values[2]
+
+
+def law_of(name: str, motion: Any) -> Law | str:
+    """A motion as a function of time, or what is wrong with it."""
+    if isinstance(motion, Motion):
+        if motion.t is None or motion.t.ndim != 1 or len(motion.t) < 2:
+            return (
+                f"motion of {name!r}: has no times; give Motion(..., t=t) with at least two samples, or a callable of t"
+            )
+        if not (np.diff(motion.t) > 0).all():
+            return f"motion of {name!r}: its times do not rise"
+        fault = samples_fault(motion.t, np.stack([motion.position, motion.velocity, motion.acceleration], axis=1))
+        return f"motion of {name!r}: {fault}" if fault else Sampled(name, motion)
+    if callable(motion):
+        return Called(name, motion)
+    return f"motion of {name!r} = {type(motion).__name__}: expected a Motion with t, or a callable t -> (position, velocity, acceleration)"
+
+
+class Prescribed:
+    """The prescribed freedoms of a mechanism: names, and their values ``(3, p)`` in the user's units at a time.
+
+    ``breaks``: times at which their accelerations jump.
+    """
+
+    def __init__(self, laws: Mapping[str, Law], breaks: Sequence[float] = ()) -> None:
+        self.laws, self.breaks = dict(laws), tuple(breaks)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Full names of the prescribed freedoms."""
+        return tuple(self.laws)
+
+    def at(self, t: float) -> Array:
+        """Positions, velocities and accelerations ``(3, p)``."""
+        return np.array([law(t) for law in self.laws.values()], dtype=float).reshape(-1, 3).T
+
+
+def read_motions(m: Mechanism, motions: Mapping[str, Any], times: Array, faults: list[str]) -> Prescribed:
+    """The motions of a call over its times, and those that drives carry; adds what is wrong with them to ``faults``."""
+    named: dict[str, Any] = {m.full_name(d.freedom): d.motion for d in m.drives if d.motion is not None}
+    for name, motion in motions.items():
+        fault = m.freedom_fault(name, single=True)
+        if fault:
+            faults.append(f"motion of {name!r}: {fault}")
+        else:
+            named[m.full_name(name)] = motion
+    laws = {name: law_of(name, motion) for name, motion in named.items()}
+    breaks: list[float] = []
+    for name, law in laws.items():
+        found = differentiated(law, float(times[0]), float(times[-1])) if isinstance(law, Called) else ()
+        if isinstance(found, str):
+            faults.append(f"motion of {name!r}: {found}")
+        else:
+            breaks += found
+    faults += [law for law in laws.values() if isinstance(law, str)]
+    return Prescribed({name: law for name, law in laws.items() if not isinstance(law, str)}, breaks)
+
 
 NUDGE = 1e-7
 """Part of a coordinate (or of one) by which it is changed for a derivative."""
@@ -234,3 +480,51 @@ def _by_time(task: Task, at: Moved, loads: tuple[Load, ...], t: Array) -> Array:
         force[:, some] = (columns.Z[..., :1] * (efforts + many.tree_efforts(wrenches))[:, None]).sum(axis=0)
     own = accelerations(np.repeat(columns.mass[..., :1], len(t), axis=2), force)[0]
     return np.concatenate([own, task.prescribed_at(t)[2]])
+
+
+Block = tuple[Index, Task, Closed, Array]
+"""Places, the task by which they were followed, closed states, and the rates ``v (n, T)`` of the independent columns of their factors."""
+
+
+def trajectory_of(
+    task: Task, m: Mechanism, times: Array, blocks: Iterable[Block], at_rest: bool = False
+) -> tuple[Trajectory, Array, Array]:
+    """The trajectory at times (a number or ``(T,)``) from blocks of states, with kinetic and potential energy ``(T,)``.
+
+    The efforts of the prescribed freedoms of ``task`` are those of drives; what else holds the tasks of the blocks acts as a load.
+    ``at_rest``: nothing moves nor is about to, also where no inertia resists.
+    """
+    s, t, blocks = task.system, times.reshape(-1), list(blocks)
+    x = np.full((s.n_state, t.size), np.nan)
+    for places, _, closed, _ in blocks:
+        x[:, places] = closed.here.x
+    coordinates = s.coordinates_of(x, s.start_coordinates(m.start))
+    out = Trajectory(s, partial(_same, s), times.shape, times, task.columns, coordinates, True, task.held)
+    out.engine, out.method = task.engine, "loop_wrench"
+    kinetic, potential = np.zeros(t.size), np.zeros(t.size)
+    for places, own, closed, v in blocks:
+        # the batch of a block is its own: loads are functions of time here, not arrays over positions
+        at, count, q = t[places], len(places), coordinates[:, places]
+        rates = _still(closed.here) if at_rest else moved(closed, v, own.prescribed_at(at)[1:], own.loads, at).rates
+        idle = None if closed.held is None else closed.held.places
+        force_task = ForceTask(out.method, m.loads, own.columns, own.held, (count,), at, "nan", idle)
+        forces = forces_of_block(force_task, rates, closed.f, q, np.arange(count))
+        held = np.setdiff1d(own.columns, task.columns)
+        given = forces.given.copy()
+        given[held] = (forces.efforts - forces.coupled)[held]
+        out.put(BlockMotion(places, rates), replace(forces, given=given))
+        kinetic[places] = kinetic_energy(closed.here, rates.V) * s.par.L**2
+        site = Site(closed.here, rates, q, (count,), np.arange(count), at)
+        for load in task.loads.stored:
+            potential[places] += load.energy(site)
+    return out, kinetic, potential
+
+
+def _still(here: Configuration) -> Rates:
+    nothing = np.zeros((here.system.n_freedoms, here.T))
+    return Rates(Velocities(here, nothing), nothing, np.zeros(here.T))
+
+
+def _same(system: System, places: Any) -> System:
+    """The one system of all positions; a function of the module, so that solutions can be pickled."""
+    return system

@@ -25,12 +25,9 @@ from mechgraph.force.loads import Site
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import declared
 from mechgraph.quantities import real_array, wrong
-from mechgraph.response.chart import Closed
-from mechgraph.response.charts import Task
-from mechgraph.response.events import Occurrence
-from mechgraph.response.integration import Integration
-from mechgraph.response.motion_equations import moved, positions_together
-from mechgraph.response.reading import trajectory_of
+from mechgraph.response.charts import Task, trajectory_of
+from mechgraph.response.integration import Integration, Occurrence
+from mechgraph.response.motion_equations import Closed, moved, positions_together
 from mechgraph.result.solution import Solution
 from mechgraph.result.summary import SolutionData, solution_data, summary
 from mechgraph.result.trajectory import Trajectory

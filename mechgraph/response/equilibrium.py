@@ -1,22 +1,223 @@
-"""Positions in which loads balance: sought downhill, where a stable one is wished for, or by Newton, for the nearest one."""
+"""Positions in which loads balance, and small motions about them.
+
+Derivatives by central differences at several lengths, of which two that agree are believed.
+
+One length does not know what bends within it: the slope of ``-tanh(x / 0.001)`` over 0.004 is off by two thirds. The lengths fall by four
+until two derivatives agree; where none do, as at a jump or a corner, that is said.
+
+A mechanism at rest: the generalized forces about a position in independent freedoms, and their derivatives.
+
+    M u'' + C u' + K u = 0,   C = -dQ/du',   K = -dQ/du,   Q the generalized forces at rest
+
+in the independent freedoms of a chart (see ``response.chart``); drives of the mechanism stand still.
+"""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property, partial
 from typing import Any, Literal
 
 import numpy as np
 import scipy
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.closure.solver import EngineName
+from mechgraph.closure.assembly import assembled_at, named_columns
+from mechgraph.closure.rates import Velocities
+from mechgraph.closure.solver import EngineName, engine_for
 from mechgraph.determinacy.mobility import free_motion
-from mechgraph.document import Document, Paragraph
-from mechgraph.errors import ResponseError, listed
+from mechgraph.document import Document, Paragraph, Shown, Table
+from mechgraph.errors import DeclarationError, MechgraphWarning, ResponseError, counted, listed
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.quantities import door
-from mechgraph.response.place import STEP, Derivatives, Place
+from mechgraph.quantities import door, unit_of
+from mechgraph.response.charts import OVER_POSITIONS, Prescribed, Task, trajectory_of
+from mechgraph.response.motion_equations import MASSLESS, Chart, Closed, Columns, Loads, applied, in_unit_inertias
 from mechgraph.result.solution import Solution
+from mechgraph.result.values import bracket, number
+
+STENCIL = ((1, 4 / 5), (2, -1 / 5), (3, 4 / 105), (4, -1 / 280))
+"""Steps and weights of the first derivative by central differences of eighth order."""
+LENGTHS = 8
+"""Most lengths."""
+SHRINK = 0.25
+"""Every length against the one before."""
+SETTLED = 1e-10
+"""Difference of two derivatives, of the largest, from which on they agree as well as rounding lets them."""
+UNSETTLED = 1e-3
+"""The same above which no derivative is known."""
+CORNER = 1e-6
+"""Difference of the slopes to both sides, or of the values there, of the largest, that is one where it does not fall with the length."""
+FALLS = 0.5
+"""Part of it that is left at the next length where it falls: a quarter of what is smooth."""
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Values ``(r,)`` at the place, their derivatives ``(r, n)``, and by how much these differ at two lengths.
+
+    ``unsettled``: coordinates by which no derivative is known.
+    """
+
+    values: Array
+    slopes: Array
+    error: Array
+    unsettled: tuple[int, ...]
+
+
+def settled_slopes(values: Callable[[Array], Array], n: int, first: float) -> Slopes | None:
+    """Derivatives of ``values(u (n, T)) -> (r, T)`` at 0; NaN where values are unknown. None where they are known at no length."""
+    eye, signs = np.eye(n), [(sign * k, sign * weight) for k, weight in STENCIL for sign in (1.0, -1.0)]
+    known: list[tuple[Array, Array, Array, Array]] = []
+    best: tuple[Array, Array] | None = None
+    for i in range(LENGTHS):
+        h = first * SHRINK**i
+        f = values(np.concatenate([np.zeros((n, 1)), *(k * h * eye for k, _ in signs)], axis=1))
+        if not np.isfinite(f).all():
+            continue
+        parts = f[:, 1:].reshape(len(f), len(signs), n)
+        slopes = np.einsum("rkn,k->rn", parts, [weight for _, weight in signs]) / h
+        corner = np.abs(parts[:, 0] + parts[:, 1] - 2.0 * f[:, :1]) / h
+        known.append((f[:, 0], slopes, corner, np.abs(parts[:, 0] - parts[:, 1])))
+        if len(known) < 2:
+            continue
+        error = np.abs(known[-1][1] - known[-2][1])
+        scale = max(float(np.abs(one[1]).max(initial=0.0)) for one in known) or 1.0
+        if best is None or error.max() < best[1].max():
+            # of the first two the longer one has less rounding, later on the shorter one bends less
+            best = (known[0][1] if len(known) == 2 else slopes), error
+        if error.max() <= SETTLED * scale:
+            break
+    if not known:
+        return None
+    if best is None:
+        best = known[0][1], np.full(known[0][1].shape, np.inf)
+    largest = max(float(np.abs(one[1]).max(initial=0.0)) for one in known) or 1.0
+    off = (best[1] > UNSETTLED * largest).any(axis=0)
+    if len(known) > 1:
+        (*_, wide, apart), (*_, corner, jump) = known[-2], known[-1]
+        off |= ((corner > FALLS * wide) & (corner > CORNER * largest)).any(axis=0)
+        off |= ((jump > FALLS * apart) & (jump > CORNER * first * largest)).any(axis=0)
+    return Slopes(known[0][0], best[0], best[1], tuple(np.flatnonzero(off).tolist()))
+
+
+STEP = 0.004
+"""First length of differences (radians, lengths / L); their error and rounding are both near 1e-13 where forces bend within 0.3."""
+RATE_STEP = 0.25
+"""The same of rates (radians, lengths / L, a unit of time)."""
+NOISE_OF_FORCES = 1e-12
+"""Rounding of the differences, of the largest force."""
+
+
+@dataclass(frozen=True)
+class Derivatives:
+    """Force ``Q (n,)``, ``M``, ``C``, ``K (n, n)`` and the ``noise (n, n)`` of K.
+
+    ``bent, dry``: coordinates in which K, rates in which C is not known, as at a corner of a force or where it jumps with a rate.
+    """
+
+    Q: Array
+    M: Array
+    C: Array
+    K: Array
+    noise: Array
+    bent: tuple[int, ...]
+    dry: tuple[int, ...]
+
+
+class Place:
+    """Forces about a chart at rest."""
+
+    def __init__(self, m: Mechanism, call: str, at: Mapping[str, float] | None, engine: EngineName) -> None:
+        faults = [
+            f"{one.where}{', '.join(one.over_positions)}: {OVER_POSITIONS}" for one in m.loads if one.over_positions
+        ]
+        if faults:
+            raise DeclarationError(f"{call} {m.name!r}", faults)
+        self.m = m
+        system, x = assembled_at(m, dict(at or {}))
+        columns, _ = named_columns(m, system, {d.freedom: 0.0 for d in m.drives})
+        q = system.coordinates_of(x[:, None])[columns, 0].tolist()
+        still = Prescribed({d.freedom: partial(_still, value) for d, value in zip(m.drives, q, strict=True)})
+        self.task = Task(system, Loads.of(m.loads), still, columns, engine_for(system.n_rows, 1, engine))
+        self.go(x)
+        if not self.n:
+            raise DeclarationError(
+                f"{call} {m.name!r}", ["nothing can move while its drives are held; m.replace(drives=[]) frees them"]
+            )
+
+    def go(self, x: Array) -> None:
+        """Lay out a chart at a closed state."""
+        self.chart = Chart(self.task.system, x, self.task.columns, self.task.engine)
+        self.held = x[self.task.system.single_rows[self.task.columns]][:, None]
+        self.n = len(self.chart.free)
+
+    def closed(self, u: Array) -> Closed:
+        """Closed states at coordinates ``u (n, T)`` in the chart."""
+        guess = self.task.system.advance(self.chart.x0[:, None], self.motions @ u)
+        return self.chart.close(guess, u, np.repeat(self.held, u.shape[1], axis=1))
+
+    @property
+    def motions(self) -> Array:
+        """Rates of all freedoms ``(F, n)`` for unit rates of the independent ones."""
+        return self.chart.solver.factored(self.chart.start, self.chart.which).sensitivity()[:, : self.n, 0]
+
+    def forces(self, closed: Closed, v: Array) -> tuple[Array, Array]:
+        """Generalized forces ``(n, T)`` and masses ``(n, n, T)`` at closed states with rates ``v (n, T)``, the drives at rest."""
+        columns, loads = Columns(closed.here, closed.f, self.n), self.task.loads
+        velocities, _, inertia = columns.bound((columns.Z * v).sum(axis=1))
+        wrenches, efforts = applied(closed.here, (*loads.stored, *loads.rest), velocities, np.zeros(closed.here.T))
+        return columns.force(wrenches + inertia, efforts), columns.mass
+
+    def largest(self) -> float:
+        """The largest part that a component of a load has in a generalized force, at rest."""
+        closed, loads = self.closed(np.zeros((self.n, 1))), self.task.loads
+        columns = Columns(closed.here, closed.f, self.n)
+        still = Velocities(closed.here, np.zeros((self.task.system.n_freedoms, 1)))
+        acting = [applied(closed.here, some, still, np.zeros(1)) for some in (loads.stored, loads.rest)]
+        return columns.largest(*zip(*acting, strict=True))
+
+    def derivatives(self) -> Derivatives:
+        """Force, mass, damping and stiffness where the chart was laid out."""
+        n = self.n
+
+        def at_rest(u: Array) -> Array:
+            at = self.closed(u)
+            return np.where(at.done, self.forces(at, np.zeros(u.shape))[0], np.nan)
+
+        place = settled_slopes(at_rest, n, STEP)
+        if place is None:
+            raise ResponseError(f"mechanism {self.m.name!r}: the loops do not close beside this position")
+        one = self.closed(np.zeros((n, 1)))
+
+        def moving(v: Array) -> Array:
+            here = one.here.part(np.zeros(v.shape[1], dtype=np.intp))
+            f = self.chart.solver.factored(here, np.repeat(self.chart.which, v.shape[1]))
+            return self.forces(Closed(here, f, np.ones(v.shape[1], dtype=bool)), v)[0]
+
+        rates = settled_slopes(moving, n, RATE_STEP)
+        assert rates is not None  # the position is closed
+        M = self.forces(one, np.zeros((n, 1)))[1][..., 0]
+        noise = NOISE_OF_FORCES * self.largest() + place.error
+        return Derivatives(place.values, M, -rates.slopes, -place.slopes, noise, place.unsettled, rates.unsettled)
+
+    def solution(self) -> Solution:
+        """Everything at rest where the chart was laid out."""
+        closed = self.closed(np.zeros((self.n, 1)))
+        block = np.zeros(1, dtype=np.intp), self.task, closed, np.zeros((self.n, 1))
+        trajectory, _, _ = trajectory_of(self.task, self.m, np.zeros(()), [block], at_rest=True)
+        return Solution(trajectory)
+
+    def start(self) -> dict[str, float]:
+        """Coordinates of all freedoms where the chart was laid out."""
+        q = self.task.system.coordinates_of(self.chart.x0[:, None])[:, 0]
+        return dict(zip(self.m.freedom_names(), q.tolist(), strict=True))
+
+
+def _still(value: float, t: float) -> tuple[float, float, float]:
+    return value, 0.0, 0.0
+
 
 EQUILIBRIUM_STEPS = 60
 """Most steps to an equilibrium."""
@@ -217,3 +418,175 @@ def _stability(d: Derivatives, kept: Array) -> bool | None:
     s = s[np.isfinite(s)]
     slow = GROWS * float(np.abs(s).max(initial=0.0))
     return False if (s.real > slow).any() else True if (s.real < -slow).all() and not d.bent else None
+
+
+UNBALANCED = 1e-6
+"""Generalized force, against the largest that a load exerts, above which a position is said to be none of equilibrium."""
+MODES_SHOWN, AMPLITUDES_SHOWN = 8, 4
+"""Most motions, and of each the most amplitudes, that are shown."""
+SAME_MOTION = 1e-9
+"""Difference of the rates of two freedoms up to which they move alike, as two hinges on one line do."""
+STANDING = 1e-12
+"""Rate of a motion, of the fastest, that is none."""
+UNRESISTED = 10.0
+"""Stiffness, against its rounding, up to which there is none."""
+
+
+@dataclass(frozen=True, repr=False)
+class Linearized(Shown):
+    """Small motions about a position of equilibrium.
+
+    ``freedoms``: names of the independent ones ``(n,)``; ``M, C, K (n, n)`` in the user's units (coordinates of these freedoms);
+    ``force (n,)`` what is left of the balance, zero in an equilibrium; ``motions (F, n)`` rates of all freedoms for unit rates of the
+    independent ones, user's units; ``unresisted (n, k)`` the motions against which there is no stiffness (K takes nothing of them);
+    ``solution`` everything at rest there.
+    """
+
+    mechanism: Mechanism
+    freedoms: tuple[str, ...]
+    M: Array
+    C: Array
+    K: Array
+    force: Array
+    motions: Array
+    unresisted: Array
+    solution: Solution
+
+    def document(self) -> Document:
+        """Frequencies, damping and shapes of the motions."""
+        time = self.mechanism.units.get("time", "")
+        per = unit_of(self.mechanism.units, (0, 0, -1))
+        rows = []
+        for w, ratio, shape in zip(
+            self.frequencies[:MODES_SHOWN], self.damping[:MODES_SHOWN], self.modes[:MODES_SHOWN], strict=False
+        ):
+            swings = (number(w), number(w / (2 * np.pi))) if np.isfinite(w) else ("none", "")
+            told = (number(ratio),) if w != 0.0 else ("free",)
+            rows.append((*swings, *told, " ".join(f"{name} {abs(shape[name]):.3g}" for name in self._told(shape))))
+        head = (
+            f"frequency{bracket(per)}",
+            f"cycles{bracket(f'1/{time}' if time else '')}",
+            "damping",
+            "greatest amplitudes",
+        )
+        count = f"{counted(len(self.freedoms), 'independent freedom')}: {listed(self.freedoms)}"
+        return Document(f"Small motions of {self.mechanism.name}", (Paragraph(f"{count}."), Table(head, rows, "rrrl")))
+
+    def _told(self, shape: Mapping[str, complex]) -> list[str]:
+        """The freedoms that tell a mode: those of which the declaration says something, then the largest; no two that move alike."""
+        m, names = self.mechanism, self.mechanism.freedom_names()
+        said = {*m.start, *(d.freedom for d in m.drives), *(one.in_freedom for one in m.loads if one.in_freedom)}
+        said |= m.response.freedoms if m.response else set()
+        said = {m.full_name(name) for name in said}
+        largest = max(map(abs, shape.values()))
+        moving = [name for name in names if abs(shape[name]) > 1e-3 * largest]
+        told: list[int] = []
+        for name in sorted(moving, key=lambda name: (name not in said, -abs(shape[name]))):
+            i = names.index(name)
+            rows = [self.motions[i] - sign * self.motions[j] for j in told for sign in (1.0, -1.0)]
+            if not any(np.abs(row).max() <= SAME_MOTION * np.abs(self.motions[i]).max() for row in rows):
+                told.append(i)
+        return [names[i] for i in told[:AMPLITUDES_SHOWN]]
+
+    @cached_property
+    def A(self) -> Array:
+        """State matrix ``(2 n, 2 n)``: ``d(u, u')/dt = A (u, u')``."""
+        n = len(self.M)
+        lower = -np.linalg.solve(self.M, np.concatenate([self.K, self.C], axis=1))
+        return np.concatenate([np.concatenate([np.zeros((n, n)), np.eye(n)], axis=1), lower])
+
+    @cached_property
+    def _modes(self) -> tuple[Array, Array]:
+        n, k = self.unresisted.shape
+        if not self.C.any() and np.abs(self.K - self.K.T).max(initial=0.0) <= 1e-9 * np.abs(self.K).max(initial=0.0):
+            w, U = scipy.linalg.eigh(0.5 * (self.K + self.K.T), self.M)
+            w[np.argsort(np.abs(w))[:k]] = 0.0
+            order = np.argsort(np.abs(w), kind="stable")
+            return np.emath.sqrt(-w[order].astype(complex)), U[:, order].astype(complex)
+        # along what is unresisted the place tells nothing: only the rates count, so that its zero is simple and exact
+        R = scipy.linalg.null_space(self.unresisted.T) if k else np.eye(n)
+        lower = -np.linalg.solve(self.M, np.concatenate([self.K @ R, self.C], axis=1))
+        w, V = np.linalg.eig(np.concatenate([np.concatenate([np.zeros((n - k, n - k)), R.T], axis=1), lower]))
+        still = np.abs(w) <= STANDING * np.abs(w).max(initial=0.0)
+        w, V = w[~still], V[n - k :, ~still]
+        kept = np.flatnonzero(w.imag > 0) if 2 * (w.imag > 0).sum() == len(w) else np.flatnonzero(w.imag >= 0)
+        kept = kept[np.argsort(np.abs(w[kept]), kind="stable")]
+        return np.append(np.zeros(k), w[kept]), np.concatenate([self.unresisted, V[:, kept]], axis=1)
+
+    @property
+    def eigenvalues(self) -> Array:
+        """Exponents ``s`` of the motions ``exp(s t)``, one of every conjugate pair, slowest first."""
+        return self._modes[0]
+
+    @property
+    def frequencies(self) -> Array:
+        """Undamped natural frequencies ``|s|`` in rad a unit of time; 0 of a motion that nothing resists, NaN of one that grows or creeps
+        without swinging.
+        """
+        s = self.eigenvalues
+        return np.where((np.abs(s.imag) > 0) | (s == 0), np.abs(s), np.nan)
+
+    @property
+    def damping(self) -> Array:
+        """Damping ratios ``-Re s / |s|``."""
+        s = self.eigenvalues
+        return np.asarray(-s.real / np.where(np.abs(s) > 0, np.abs(s), 1.0))
+
+    @property
+    def modes(self) -> tuple[dict[str, complex], ...]:
+        """Mode shapes: amplitudes of all freedoms by name, the largest one 1."""
+        shapes = (self.motions @ self._modes[1]).T
+        names = self.mechanism.freedom_names()
+        return tuple(
+            dict(zip(names, (shape / shape[np.argmax(np.abs(shape))]).tolist(), strict=True)) for shape in shapes
+        )
+
+
+@door
+def linearize(m: Mechanism, at: Mapping[str, float] | None = None, *, engine: EngineName = "auto") -> Linearized:
+    """Small motions about the declared ``start`` or the coordinates ``at``, the drives at rest; meant for an equilibrium.
+
+    Raises
+    ------
+    DeclarationError, AssemblyError
+    """
+    place = Place(m, "linearize", at, engine)
+    d = place.derivatives()
+    if np.linalg.eigvalsh(in_unit_inertias(d.M)).min() <= MASSLESS:
+        raise DeclarationError(
+            f"linearize {m.name!r}", ["has a motion without inertia; give mass or inertia to what moves so"]
+        )
+    largest = max(place.largest(), float(np.abs(d.K).max()) * STEP)
+    s, free, names = place.task.system, place.chart.free, m.freedom_names()
+    said = []
+    if np.abs(d.Q).max() > UNBALANCED * largest:
+        said.append(
+            f"is not in equilibrium there (generalized forces of {np.abs(d.Q).max() / largest:.2g} of the largest that a load exerts); "
+            "mg.equilibrium(m) finds a position that is"
+        )
+    for what, which, hint in (
+        ("stiffness", d.bent, "a force has a corner or a jump there, as a one-sided spring at its contact"),
+        ("damping", d.dry, "a force jumps with the sign of a rate, as dry friction does"),
+    ):
+        if which:
+            where = listed(names[free[i]] for i in which)
+            said.append(
+                f"has no {what} in {where}: slopes at several lengths differ ({hint}); what is given is doubtful"
+            )
+    for one in said:
+        warnings.warn(f"mechanism {m.name!r}: {one}", MechgraphWarning, stacklevel=3)
+    zero = _unresisted(d.K, d.noise)
+    K = d.K - d.K @ zero @ zero.T
+    L = s.par.L
+    unit = np.where(s.is_length, L, 1.0)
+    u = unit[free]
+    work = L**2 / np.outer(u, u)
+    motions: Any = unit[:, None] * place.motions / u
+    parts = (work * d.M, work * d.C, work * K, L**2 / u * d.Q, motions, scipy.linalg.orth(u[:, None] * zero))
+    return Linearized(m, tuple(names[i] for i in free), *parts, place.solution())
+
+
+def _unresisted(K: Array, noise: Array) -> Array:
+    """Orthonormal motions ``(n, k)`` of which the stiffness is rounding."""
+    _, sizes, V = np.linalg.svd(K)
+    return np.asarray(V[sizes <= UNRESISTED * np.linalg.norm(noise)].T)

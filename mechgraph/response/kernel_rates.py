@@ -15,8 +15,7 @@ from mechgraph.closure.indexing import System
 from mechgraph.kernel import build
 from mechgraph.kernel.loads import in_tables
 from mechgraph.kernel.tables import layout, tables, why_not
-from mechgraph.response.chart import Chart
-from mechgraph.response.motion_equations import SPARSE_FROM, Loads
+from mechgraph.response.motion_equations import SPARSE_FROM, Chart, Loads
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,25 @@
-"""The equations of motion in independent rates: accelerations beside the loads, for a batch of states.
+"""Equations of motion: charts of the freedoms, and accelerations.
+
+Charts: independent freedoms in which the motion is followed for a while, and states closed for given values of them.
+
+A chart is laid out at a closed state: its independent freedoms are those that a pivoted QR of the motions picks, so that all others move
+at like rates there. Rotations are measured from the state at which the chart was laid out, so that no rotation has a singular place. When
+the other freedoms come to move much faster, a new chart takes over.
+
+Accelerations of many freedoms by one sparse factorization a state: the accelerations of all links stay unknowns.
+
+The mass matrix of the independent rates is full: every link moves with all freedoms on its way to the frame. Gauss' principle with the
+accelerations ``A`` of the links as unknowns of their own, and the way along the tree as a constraint, is sparse (a saddle point system),
+so that the effort grows with the number of links, not with its square or third power:
+
+    [ I   0        D^T  ] [A ]   [W            ]
+    [ 0   0     -(SZ)^T ] [v'] = [Z^T tau      ]     D A = A_link - A_parent,   (SZ)_kl = sum over freedoms j of the pair: s S_j Z_jl
+    [ D  -SZ       0    ] [mu]   [0            ]
+
+for the tree's pairs ``k``, independent rates ``l`` and the sense ``s`` of the tree; ``-mu`` are the wrenches that carry the loads along it.
+Source of the form: Featherstone, Rigid Body Dynamics Algorithms, 2008, section 3.2 (Gauss' principle), chapter 10.
+
+The equations of motion in independent rates: accelerations beside the loads, for a batch of states.
 
 The rates of all freedoms are ``q' = Z v + Z_p p'`` with the independent rates ``v (n,)`` and those of the prescribed freedoms ``p``; ``Z``
 solves the closure ``J Z = 0``. The principle of virtual power along every column of ``Z`` eliminates the reactions:
@@ -12,24 +33,242 @@ the reactions. Source of the form: Kane and Levinson, Dynamics: Theory and Appli
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
+from typing import Literal
 
 import numpy as np
+import scipy
 
 from mechgraph.algebra.se3 import Array, cross, rotate, rotate_back
 from mechgraph.closure.configuration import Configuration
 from mechgraph.closure.driver_path import BLOCK
-from mechgraph.closure.indexing import System
-from mechgraph.closure.passive_motion import PassiveMotions
+from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.passive_motion import PassiveMotion, PassiveMotions
+from mechgraph.closure.rank import closure_rank
 from mechgraph.closure.rates import Rates, Velocities
-from mechgraph.closure.solver import FactoredClosure
+from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_solver
+from mechgraph.closure.tree import Tree
 from mechgraph.force.loads import Site, inertia_wrenches
 from mechgraph.model.loads import Load
-from mechgraph.response.chart import Closed, Held, Stopped
-from mechgraph.response.saddle import saddle_accelerations
+from mechgraph.numerics.sparse import Factors
+from mechgraph.numerics.tolerances import PATH
+
+STEEPEST = 3.0
+"""Largest rate of a freedom for unit rates of the independent ones, against that where the chart was laid out, before a new one is; and
+the same of a condition that is poor."""
+MOST_TURNED = 1.0
+"""Angle of an independent rotation from where the chart was laid out above which a new one is."""
+CLOSING_STEPS = 12
+"""Most Newton steps to a closed state."""
+LAST_STEP = 1e-13
+"""Newton step from which on a state counts as closed; the step before it was a millionth, so that only rounding is left."""
+NOISE_OF_STEP = 1e-15
+"""The same of a step that is rounding, as a part of the condition."""
+LOST = 1.0
+"""Correction above which closing is given up: the step was too long."""
+UNMOVED_BY_SPIN = 1e-9
+"""Rate of a freedom in a unit passive motion below which it has no part in it."""
+
+
+class Stopped(Exception):
+    """The motion cannot be followed on; the message says why."""
+
+
+@contextmanager
+def stopping(what: str) -> Iterator[None]:
+    """What a function of a user raises stops the motion, which is kept up to there."""
+    try:
+        yield
+    except Exception as error:
+        raise Stopped(f"{what} raised {type(error).__name__}: {error}") from error
+
+
+@dataclass(frozen=True)
+class Held:
+    """Passive motions that are held at rest, and the ``places`` of the independent freedoms that stand for them in a chart."""
+
+    motions: tuple[PassiveMotion, ...]
+    places: Index
+
+
+@dataclass(frozen=True)
+class Closed:
+    """A closed state: evaluated, factored, which positions were closed ``(T,)``, and the passive motions held."""
+
+    here: Configuration
+    f: FactoredClosure
+    done: Array
+    held: Held | None = None
+
+
+class Chart:
+    """Independent freedoms ``free`` beside the ``prescribed`` ones, from the closed state ``x0 (nx,)``.
+
+    Those that are ``moving`` have rates of their own; the others stand for the passive motions ``held`` at that state, whose rates follow.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        x0: Array,
+        prescribed: Index,
+        engine: Literal["dense", "sparse"],
+        held: tuple[PassiveMotion, ...] = (),
+    ) -> None:
+        self.system, self.x0, self.prescribed = system, x0, prescribed
+        here = Configuration(system, x0[:, None])
+        null = closure_rank(here, prescribed, engine).motions
+        passive, moving = _apart(null, held) if held else (np.zeros(0, dtype=np.intp), _leading(null))
+        self.free: Index = np.sort(np.append(passive, moving)).astype(np.intp)
+        self.moving: Index = np.sort(moving)
+        self.held = Held(held, np.flatnonzero(np.isin(self.free, passive))) if held else None
+        self.solver: ClosureSolver = closure_solver(engine, np.concatenate([self.free, prescribed]))
+        self.which = self.solver.chosen(here, np.full(1, -1))
+        self.start = here
+        f = self.solver.factored(here, self.which)
+        self.steepness, self.condition = self.shape(f)
+        self._singles = system.single_rows[self.free]
+        self.turns = bool((self._singles < 0).any())
+        self._rows = system.single_rows[prescribed]
+
+    def shape(self, f: FactoredClosure) -> tuple[float, float]:
+        """The largest rate of a freedom for unit rates of the independent ones, and the condition, at a state."""
+        return float(np.abs(f.sensitivity()[:, : len(self.free)]).max(initial=1.0)), float(f.condition[0])
+
+    def worn(self, steepness: float, condition: float, u: Array) -> bool:
+        """Whether another chart should take over at a state with coordinates ``u (n,)``, so steep and of this condition."""
+        far = self.turns and np.abs(u[self._singles < 0]).max(initial=0.0) > MOST_TURNED
+        poor = not condition < max(PATH.doubtful, STEEPEST * self.condition)
+        return bool(far or poor or steepness > STEEPEST * self.steepness)
+
+    def coordinates(self, x: Array) -> Array:
+        """Independent coordinates ``u (n, T)`` of states: how far they are from where the chart was laid out."""
+        return self.system.difference(x, self.x0[:, None])[self.free]
+
+    def rates_of_coordinates(self, x: Array, dq: Array) -> Array:
+        """``u' (n, T)`` from the rates ``dq (F, T)`` of the freedoms."""
+        if not self.turns:
+            return dq[self.free]
+        return self.system.tangent(self.system.difference(x, self.x0[:, None]), dq)[self.free]
+
+    def close(self, x: Array, u: Array, p: Array, first: Configuration | None = None) -> Closed:
+        """States near ``x (nx, T)`` with independent coordinates ``u (n, T)`` and prescribed positions ``p (p, T)``, all loops closed.
+
+        Newton on the closure and on ``difference(x, x0) = u``; what the first leaves free the second settles.
+        """
+        s, n = self.system, len(self.free)
+        x = x.copy()
+        x[self._rows] = p
+        single = self._singles >= 0
+        x[self._singles[single]] = self.x0[self._singles[single], None] + u[single]
+        total, before = np.zeros(x.shape[1]), np.full(x.shape[1], np.inf)
+        for _ in range(CLOSING_STEPS):
+            here = Configuration(s, x)
+            f = self.solver.factored(here, np.repeat(self.which, here.T))
+            step = f.solve(-here.residual[:, None])[:, 0]
+            size = np.abs(step).max(axis=0, initial=0.0)
+            if self.turns:
+                y = s.difference(x, self.x0[:, None])
+                Z = f.sensitivity()[:, :n]
+                A = np.stack([s.tangent(y, Z[:, k])[self.free] for k in range(n)], axis=1)
+                wanted = u - y[self.free] - s.tangent(y, step)[self.free]
+                a = np.linalg.solve(np.moveaxis(A, -1, 0), wanted.T[..., None])[..., 0].T
+                step = step + (Z * a).sum(axis=1)
+                size = np.maximum(size, np.abs(u - y[self.free]).max(axis=0, initial=0.0))
+            total = total + size
+            with np.errstate(invalid="ignore"):
+                # below what is asked for, or twice below what rounding allows where the condition is poor
+                most = np.maximum(10 * LAST_STEP, NOISE_OF_STEP * f.condition)
+                closed = (size <= LAST_STEP) | ((size <= most) & (before <= most))
+            before = size
+            if closed.all() or not np.isfinite(size).all() or (total > LOST).any():
+                break
+            x = s.advance(x, step)
+        return Closed(here, f, closed & (here.closure <= PATH.accepted), self.held)
+
+
+def _leading(null: Array) -> Index:
+    """As many freedoms as there are motions ``null (F, n)``, by pivots: with them all others move at like rates."""
+    n = null.shape[1]
+    order = scipy.linalg.qr(null.T, mode="economic", pivoting=True)[2] if n else np.zeros(0)
+    return np.asarray(order[:n], dtype=np.intp)
+
+
+def _apart(null: Array, held: tuple[PassiveMotion, ...]) -> tuple[Index, Index]:
+    """Freedoms that stand for the passive motions among ``null (F, n)``, and those for the others, which no passive motion moves."""
+    passive = np.stack([motion.rates / np.linalg.norm(motion.rates) for motion in held], axis=1)
+    still = np.flatnonzero(np.abs(passive).max(axis=1) < UNMOVED_BY_SPIN)
+    count = null.shape[1] - len(held)
+    moving = still[_leading(null[still])[:count]]
+    if np.linalg.matrix_rank(null[moving]) < count:
+        raise Stopped(
+            "no freedoms that the passive motions leave alone tell where the mechanism stands, so that these cannot be held"
+        )
+    return _leading(passive), moving
+
+
+SIX = np.arange(6)
+SOUND = 1e-7
+"""Smallest pivot, against unit rows, from which on a factorization is trusted; below, motions may have no inertia."""
+
+
+def saddle_accelerations(
+    tree: Tree, pair_of: Index, S: Array, Z: Array, inertia: Array, loads: Array, forces: Array
+) -> Array | None:
+    """``v' (n,)`` at one state; None where the system is nearly singular.
+
+    ``pair_of (F,)``: pair of every freedom; ``S (6, F)``, ``Z (F, n)``; ``inertia (6, N, 6)`` of the links about the origin of ``S``;
+    ``loads (6, N)`` on the links, generalized ``forces (n,)`` of efforts.
+    """
+    n, N = Z.shape[1], len(tree.children)
+    place = np.full(tree.n_links, -1, dtype=np.intp)
+    place[tree.children] = np.arange(N)
+    inner = np.flatnonzero(place[tree.parents] >= 0)
+    masses = inertia[:, tree.children].transpose(1, 0, 2)
+    size = np.abs(masses).max(initial=0.0) or 1.0
+    link = 6 * np.arange(N)[:, None, None]
+    D = scipy.sparse.eye_array(6 * N) - _entries(
+        6 * inner[:, None] + SIX,
+        6 * place[tree.parents[inner]][:, None] + SIX,
+        np.ones((len(inner), 6)),
+        (6 * N, 6 * N),
+    )
+    rows, cols, values = np.broadcast_arrays(link + SIX[:, None], link + SIX, masses / size)
+    mass = _entries(rows, cols, values, (6 * N, 6 * N))
+    SZ = _tree_twists(tree, pair_of, S) @ scipy.sparse.csr_array(Z)
+    A = scipy.sparse.block_array(
+        [[mass, None, D.T], [None, scipy.sparse.csr_array((n, n)), -SZ.T], [D, -SZ, None]], format="csc"
+    )
+    try:
+        factors = Factors(A)
+    except RuntimeError:  # exactly singular
+        return None
+    if np.abs(factors.lu.U.diagonal()).min() < SOUND:
+        return None
+    b = np.concatenate([loads[:, tree.children].T.ravel(), forces, np.zeros(6 * N)]) / size
+    x = factors.solve(b)
+    return np.asarray(x + factors.solve(b - A @ x))[6 * N : 6 * N + n]
+
+
+def _entries(rows: Index, cols: Index, values: Array, shape: tuple[int, int]) -> scipy.sparse.csr_array:
+    return scipy.sparse.csr_array((values.ravel(), (rows.ravel(), cols.ravel())), shape=shape)
+
+
+def _tree_twists(tree: Tree, pair_of: Index, S: Array) -> scipy.sparse.csr_array:
+    """Twists ``(6 N, F)`` of the links against those before them on the tree, for unit rates of the freedoms."""
+    step = np.full(int(max(tree.pairs.max(initial=-1), pair_of.max(initial=-1))) + 1, -1, dtype=np.intp)
+    step[tree.pairs] = np.arange(len(tree.pairs))
+    freedom = np.flatnonzero(step[pair_of] >= 0)
+    k = step[pair_of[freedom]]
+    values = (S[:, freedom] * np.where(tree.forward[k], 1.0, -1.0)).T
+    return _entries(
+        6 * k[:, None] + SIX, np.repeat(freedom[:, None], 6, axis=1), values, (6 * len(tree.pairs), S.shape[1])
+    )
+
 
 MASSLESS = 1e-12
 """Eigenvalue of the mass matrix, of which the diagonal is one, below which a motion has no inertia."""

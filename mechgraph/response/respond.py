@@ -7,21 +7,26 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
-from typing import Any, Literal, get_args
+from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
+import scipy
 
 from mechgraph.algebra.se3 import Array
+from mechgraph.closure.assembly import assembled_at, named_columns
 from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.indexing import Index, System
 from mechgraph.closure.ranges import BEYOND_END, beyond
 from mechgraph.closure.rank import closure_rank
 from mechgraph.closure.solver import MotionEngineName, engine_for
+from mechgraph.determinacy.finite_motion import branches, branches_text, finite_motion
 from mechgraph.determinacy.mobility import free_motion
 from mechgraph.determinacy.report import hinted
 from mechgraph.determinacy.snapping import meant
 from mechgraph.errors import AssemblyError, DeclarationError, MechgraphWarning, ResponseError
+from mechgraph.force.loads import Site
 from mechgraph.model.declaration import mapping_faults
-from mechgraph.model.loads import Load
+from mechgraph.model.loads import Law, Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.response_setup import (
     METHODS,
@@ -33,20 +38,194 @@ from mechgraph.model.response_setup import (
     read_times,
     tolerance_faults,
 )
-from mechgraph.quantities import Limit, door, items_of, option_faults
+from mechgraph.numerics.linear import rank_of, singular_values
+from mechgraph.numerics.tolerances import MOTIONS
+from mechgraph.quantities import Limit, door, is_numeric, items_of, option_faults, without_units, wrong
 from mechgraph.response.along_path import Arc, PathStage
-from mechgraph.response.chart import Stopped, stopping
-from mechgraph.response.charts import ChartStage, Task
-from mechgraph.response.chatter import Chatter
+from mechgraph.response.charts import OVER_POSITIONS, ChartStage, Prescribed, Task, read_motions
 from mechgraph.response.course import Course, Response
-from mechgraph.response.events import LOOKS_IN_STEP, Occurrence, Watch, first_root, read_events, with_turns
-from mechgraph.response.initial import read_rates, read_start, start_rates, started
-from mechgraph.response.integration import Integration, Stage
+from mechgraph.response.integration import (
+    LOOKS_IN_STEP,
+    OF_ALL,
+    Integration,
+    Occurrence,
+    Stage,
+    Stops,
+    Watch,
+    first_root,
+    read_events,
+    read_stops,
+    with_turns,
+)
 from mechgraph.response.kernel_rates import library_for
-from mechgraph.response.looks import OF_ALL
-from mechgraph.response.motion_equations import Loads
-from mechgraph.response.prescribed import OVER_POSITIONS, read_motions
-from mechgraph.response.stops import Stops, read_stops
+from mechgraph.response.motion_equations import Columns, Loads, Stopped, stopping
+
+AGREEING = 1e-9
+"""Part of the given rates by which they may miss the closure before they contradict it."""
+
+
+def read_start(
+    m: Mechanism, start: Mapping[str, Any], given: Prescribed, begin: float, faults: list[str]
+) -> dict[str, float]:
+    """Coordinates at the beginning by full names, those prescribed among them; adds what is wrong to ``faults``."""
+    out: dict[str, float] = {}
+    known = dict(zip(given.names, given.at(begin)[0].tolist(), strict=True))
+    for name, value in start.items():
+        fault = m.freedom_fault(name, single=True)
+        number = value if fault else m.in_own_units(name, value)
+        if fault:
+            faults.append(f"start of {name!r}: {fault}")
+        elif not is_numeric(number, ()):
+            faults.append(wrong(number, f"start of {name!r}", "a finite number"))
+        elif m.full_name(name) in out:
+            faults.append(f"start of {name!r}: is given twice")
+        elif known.get(m.full_name(name), number) != number:
+            faults.append(
+                f"start of {name!r} = {number!r}: its motion is prescribed, {known[m.full_name(name)]:g} at t = {begin:g}; leave it out"
+            )
+        else:
+            out[m.full_name(name)] = float(number)
+    return {**out, **known}
+
+
+def read_rates(m: Mechanism, rates: Mapping[str, Any], faults: list[str]) -> dict[str, float]:
+    """Rates at the beginning by full names; adds what is wrong to ``faults``."""
+    out: dict[str, float] = {}
+    for name, value in rates.items():
+        fault = m.freedom_fault(name, single=False)
+        number = value if fault else without_units(value, (0 if m.turns(name) else 1, 0, -1), m.units)
+        if fault:
+            faults.append(f"rate of {name!r}: {fault}")
+        elif not is_numeric(number, ()):
+            faults.append(wrong(number, f"rate of {name!r}", "a finite number"))
+        else:
+            out[m.full_name(name)] = float(number)
+    return out
+
+
+def started(m: Mechanism, start: Mapping[str, float], given: Prescribed) -> tuple[System, Array, Index]:
+    """The scaled system, the closed state at the beginning, and the prescribed columns."""
+    system, x = assembled_at(m, start)
+    columns, _ = named_columns(m, system, dict.fromkeys(given.names, 0.0))
+    return system, x, columns
+
+
+def start_rates(m: Mechanism, task: Task, x: Array, rates: Mapping[str, float], begin: float) -> Array:
+    """Rates ``(F,)`` at the beginning: those given and prescribed, the others as small as the closure lets them be.
+
+    Raises
+    ------
+    DeclarationError
+        where they contradict the closure.
+    Stopped
+        where they do not tell how the motion begins, as at a change point.
+    """
+    s = task.system
+    names = [*task.prescribed.names, *rates]
+    values = [*task.prescribed.at(begin)[1].tolist(), *rates.values()]
+    places = [m.freedom(name) for name in names]
+    columns = np.array([int(s.first_column[k]) + j for k, j in places], dtype=np.intp)
+    wanted = np.array(values) / np.where(s.is_length[columns], s.par.L, 1.0)
+    closure = closure_rank(Configuration(s, x[:, None]), engine=task.engine)
+    N = closure.motions
+    if N.shape[1] > 1 and closure.rank < closure.count:
+        beside = finite_motion(s, x, closure, task.engine).mobility
+        if beside < N.shape[1]:
+            raise Stopped(_where_branches_meet(s, x, N, beside))
+    if task.held:
+        N = _at_rest(task, x)
+    if not len(names):
+        return np.zeros(s.n_freedoms)
+    a = np.linalg.lstsq(N[columns], wanted, rcond=MOTIONS.dependent)[0]
+    left = np.abs(N[columns] @ a - wanted)
+    if left.max() > AGREEING * max(1.0, float(np.abs(wanted).max())):
+        rank = rank_of(singular_values(N[columns]), MOTIONS.dependent)
+        held = " with the passive freedoms at rest" if task.held else ""
+        closed = ", ".join(f"{n} {v:.6g}" for n, v in zip(names, (N[columns] @ a).tolist(), strict=True))
+        raise DeclarationError(
+            f"respond {m.name!r}",
+            [
+                f"rates of {', '.join(names)}: contradict the closure{held}, which lets {rank} of these {len(names)} move independently; "
+                f"nearest rates that it allows (radians, or lengths / {s.par.L:.4g}, a unit of time): {closed}"
+            ],
+        )
+    return np.asarray(N @ a)
+
+
+def _where_branches_meet(s: System, x: Array, motions: Array, beside: int) -> str:
+    """What is said of a start in a singular position: its motions are not those that the mechanism has ``beside`` it."""
+    fastest = int(np.argmax(np.where(s.single_rows >= 0, np.abs(motions).max(axis=1), 0.0)))
+    ways = branches(s, x, np.array([fastest], dtype=np.intp)) if beside == 1 else ()
+    meet = f" ({branches_text(ways, s.m.freedom_names()[fastest])})" if ways else ""
+    return (
+        f"it begins in a singular position{meet}: its mobility is {motions.shape[1]} there and {beside} beside it, so that rates do not "
+        "tell how the motion goes on; start beside it, on the branch that is meant"
+    )
+
+
+def _at_rest(task: Task, x: Array) -> Array:
+    """Orthonormal motions that leave the passive links at rest."""
+    chart = task.chart(x)
+    f = chart.solver.factored(chart.start, chart.which)
+    columns = Columns(chart.start, f, len(chart.free), chart.held)
+    Z = np.concatenate([columns.Z, columns.Zp], axis=1)[..., 0]
+    return np.asarray(scipy.linalg.orth(Z))
+
+
+TINY_STEP = 1e-5
+"""Part of the time of a motion below which a step is one of those that chatter."""
+IN_A_ROW = 12
+"""Such steps, one after the other, after which the laws are looked at."""
+NEARER_RATES = 1e-4
+"""Part of the rates at which a law is asked again: what jumps does so however near to zero they are."""
+JUMPS = 0.5
+"""Part of the difference of the forces to both sides that is left then."""
+
+
+class Followed(Protocol):
+    """What is seen of a motion."""
+
+    def site(self, t: Array) -> Site:
+        """What loads see of it at times ``(T,)``."""
+
+
+class Chatter:
+    """Watches short steps for laws that jump with the sign of their rate."""
+
+    def __init__(self, motion: Followed, loads: tuple[Load, ...], span: float) -> None:
+        self.motion, self.span = motion, span
+        self.laws = [load for load in loads if isinstance(load, Law) and load.of_time]
+        self._ends: list[float] = []
+
+    def look(self, begin: float, end: float) -> None:
+        """Look at an accepted step.
+
+        Raises
+        ------
+        Stopped
+            where a law makes steps chatter.
+        """
+        if not self.laws or end - begin > TINY_STEP * self.span:
+            self._ends = []
+            return
+        self._ends.append(end)
+        if len(self._ends) < IN_A_ROW:
+            return
+        site, self._ends = self.motion.site(np.array(self._ends)), []
+        for law in self.laws:
+            x, v = law.coordinate(site)
+            if (np.diff(np.sign(v)) != 0).sum() < 2:
+                continue
+            fast = np.abs(v).max()
+            both = (np.full(len(v), rate) for rate in (fast, NEARER_RATES * fast))
+            wide, near = (law.force(site, x, rate) - law.force(site, x, -rate) for rate in both)
+            if np.abs(near).min() > JUMPS * np.abs(wide).max():
+                raise Stopped(
+                    f"{law.where}its force jumps by {abs(near[-1]):.4g} where its rate changes sign, as dry friction does; at "
+                    f"t = {end:.6g}, x = {x[-1]:.6g}, it holds what it acts on, and steps chatter about a rate of zero. A force law "
+                    "carries no friction that sticks; let it rise over a small rate, as np.tanh(v / v0) does"
+                )
+
 
 OnStopName = Literal["raise", "return"]
 CROWDED = 1000

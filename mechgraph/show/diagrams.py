@@ -40,7 +40,7 @@ from mechgraph.show.canvas import (
 )
 from mechgraph.show.curves import Abscissa, lay_out
 from mechgraph.show.skeleton import draw_skeleton
-from mechgraph.variants.result import Study
+from mechgraph.variants.study import Study
 
 STRAND, BULGE = 0.035, 0.22
 """Distance of the strands of an edge in several loops, and of edges between the same two links, over that of neighbours."""

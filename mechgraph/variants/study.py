@@ -1,4 +1,4 @@
-"""Studies of many variants: tolerances, sweeps of a design, Monte Carlo, with quantiles and sensitivities."""
+"""Studies of many variants: how they are sampled, and what was found."""
 
 from __future__ import annotations
 
@@ -7,25 +7,429 @@ import os
 import pickle
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+import scipy
+from numpy.typing import ArrayLike, NDArray
 
+from mechgraph.algebra.se3 import Array
 from mechgraph.closure.driver_motion import Motions, actuators, driven
 from mechgraph.closure.solver import MotionEngineName
 from mechgraph.determinacy.snapping import meant
+from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, MechgraphError, MechgraphWarning, StudyError, counted
+from mechgraph.files import optional
 from mechgraph.force.reactions import MethodName
 from mechgraph.kinetostatics import RedundantName
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
-from mechgraph.quantities import Count, Index, door, wrong
-from mechgraph.variants.fields import AnyField, clashes, field_values, find_field
-from mechgraph.variants.outputs import named_outputs
-from mechgraph.variants.result import Study
-from mechgraph.variants.sampling import SAMPLINGS, SamplingName, distributions, grid_size, spread
-from mechgraph.variants.work import Part, Source, Task, as_rows, motion_of_case, solved, unsolved
+from mechgraph.quantities import Count, Index, door, has_quantity, is_numeric, real_array, shown, wrong
+from mechgraph.result.values import number
+from mechgraph.variants.numbers import AnyField, clashes, field_values, find_field
+from mechgraph.variants.work import (
+    STATUSES,
+    Output,
+    Part,
+    Source,
+    Task,
+    as_rows,
+    motion_of_case,
+    named_outputs,
+    solved,
+    unit_of_output,
+    unsolved,
+    worst,
+)
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+IGNORED_TAIL = 0.00135
+"""Part of a distribution without end that is ignored at either end: three standard deviations of a normal one."""
+SPREAD = (0.15866, 0.84134)
+"""Quantiles whose half distance is called the spread: the standard deviation of a normal distribution."""
+
+
+@dataclass(frozen=True)
+class Levels:
+    """Numbers that a parameter may take, each as likely as the others; in place of a distribution."""
+
+    values: Array
+
+    def ppf(self, u: Any) -> Array:
+        """The number at quantile ``u`` (0 to 1)."""
+        at = np.minimum((np.asarray(u) * len(self.values)).astype(int), len(self.values) - 1)
+        return np.asarray(self.values[at])
+
+    def support(self) -> tuple[float, float]:
+        """Smallest and largest number."""
+        return float(self.values[0]), float(self.values[-1])
+
+    def std(self) -> float:
+        """Standard deviation of the numbers."""
+        return float(self.values.std())
+
+
+@dataclass(frozen=True)
+class InverseDistribution:
+    """A distribution that speaks ``icdf`` and ``standard_deviation`` in place of ``ppf`` and ``std`` (``scipy.stats.Normal``)."""
+
+    distribution: Any
+
+    def ppf(self, u: Any) -> Array:
+        """The number at quantile ``u`` (0 to 1)."""
+        return np.asarray(self.distribution.icdf(u))
+
+    def support(self) -> tuple[float, float]:
+        """Smallest and largest number."""
+        low, high = self.distribution.support()
+        return float(low), float(high)
+
+    def std(self) -> float:
+        """Standard deviation."""
+        return float(self.distribution.standard_deviation())
+
+
+def distributions(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Every parameter as something with quantiles ``ppf``.
+
+    Raises
+    ------
+    DeclarationError
+        where a value is neither a distribution nor a sequence of numbers.
+    """
+    if not isinstance(parameters, Mapping):
+        raise DeclarationError(
+            "study: parameters", [wrong(parameters, "parameters", "a mapping name -> distribution or numbers")]
+        )
+    out, faults = {}, []
+    for name, given in parameters.items():
+        distribution = _with_quantiles(given)
+        if isinstance(distribution, str):
+            faults.append(f"{name!r} = {shown(given)}: {distribution}")
+        else:
+            out[name] = distribution
+    if faults:
+        raise DeclarationError("study: parameters", faults)
+    return out
+
+
+def _with_quantiles(given: Any) -> Any:
+    """Something with quantiles, or what is wrong with it."""
+    found = InverseDistribution(given) if hasattr(given, "icdf") else given
+    if hasattr(found, "ppf") and not hasattr(found, "freeze"):
+        return found if _has_median(found) else "has no median; check the arguments of the distribution"
+    if has_quantity(given):
+        return "has units; a study takes plain numbers, in the units in which the number is declared"
+    levels = real_array(given)
+    if levels is None or levels.ndim != 1 or not levels.size or not np.isfinite(levels).all():
+        return "expected a distribution of scipy.stats with its numbers, e.g. scipy.stats.norm(10, 0.1), or a sequence of numbers"
+    return Levels(np.sort(levels))
+
+
+def _has_median(distribution: Any) -> bool:
+    try:
+        return is_numeric(distribution.ppf(0.5), ())
+    except Exception:  # whatever the numbers that it was given do in the methods of a distribution
+        return False
+
+
+def deviation(distribution: Any) -> float:
+    """Standard deviation; where a distribution has none, its spread."""
+    found = float(distribution.std())
+    return found if np.isfinite(found) else spread(distribution)
+
+
+def reach(distribution: Any) -> tuple[float, float]:
+    """Smallest and largest value; where a distribution has no end, its quantiles at ``IGNORED_TAIL``."""
+    low, high = (float(end) for end in distribution.support())
+    return (
+        low if np.isfinite(low) else float(distribution.ppf(IGNORED_TAIL)),
+        high if np.isfinite(high) else float(distribution.ppf(1 - IGNORED_TAIL)),
+    )
+
+
+def spread(distribution: Any) -> float:
+    """Half the distance of the quantiles ``SPREAD``; where that is zero, half the reach."""
+    low, high = (float(distribution.ppf(u)) for u in SPREAD)
+    if high == low:
+        low, high = reach(distribution)
+    return (high - low) / 2
+
+
+def _random(distributions: Sequence[Any], n: int, rng: np.random.Generator) -> Array:
+    return _quantiles(distributions, rng.random((n, len(distributions))))
+
+
+def _latin(distributions: Sequence[Any], n: int, rng: np.random.Generator) -> Array:
+    return _quantiles(distributions, scipy.stats.qmc.LatinHypercube(d=len(distributions), seed=rng).random(n))
+
+
+def _grid(distributions: Sequence[Any], n: int, rng: np.random.Generator) -> Array:
+    levels = [w.values if isinstance(w, Levels) else w.ppf((np.arange(n) + 0.5) / n) for w in distributions]
+    return np.stack([part.reshape(-1) for part in np.meshgrid(*levels, indexing="ij")])
+
+
+def _quantiles(distributions: Sequence[Any], u: Array) -> Array:
+    return np.stack([np.asarray(w.ppf(column), dtype=float) for w, column in zip(distributions, u.T, strict=True)])
+
+
+def grid_size(distributions: Sequence[Any], n: int) -> float:
+    """Number of variants of a grid with ``n`` levels of every distribution."""
+    return float(np.prod([float(len(w.values)) if isinstance(w, Levels) else n for w in distributions]))
+
+
+SamplingName = Literal["random", "latin", "grid"]
+SAMPLINGS: dict[str, Callable[[Sequence[Any], int, np.random.Generator], Array]] = {
+    "random": _random,
+    "latin": _latin,
+    "grid": _grid,
+}
+"""Ways of sampling by name: ``(distributions, n, generator) -> (parameters, samples)``."""
+
+
+VARIANTS_LISTED = 10
+"""Most variants that are named with the reason why they were not solved."""
+
+
+class Study(Shown):
+    """Results of ``study``; arrays have the variants first, then the positions, then components.
+
+    Attributes
+    ----------
+    parameters : name -> values ``(n,)``.
+    outputs : name -> array ``(n, ...)``, NaN where a variant or position was not solved.
+    nominal : name -> array ``(...)`` of the mechanism itself (with the motion of the first variant, where each has its own).
+    units : name -> unit of an output, one for every entry of its last axis where they differ; empty where it is not known.
+    messages : variant -> why it could not be solved.
+    warnings : what makes reactions doubtful, as in ``Solution.warnings``, with the greatest effort, pull or error in all variants.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        ways: Mapping[str, Any],
+        values: Array,
+        steps: Array,
+        names: Mapping[str, Output],
+        motions: Mapping[str, Motion],
+        near: Part,
+        parts: Sequence[Part],
+    ) -> None:
+        self._source, self._ways, self._values, self._steps, self._near = source, ways, values, steps, near
+        self.motions: Mapping[str, Motion] = dict(motions)
+        self.parameters: Mapping[str, Array] = dict(zip(ways, values, strict=True))
+        self._outcomes: NDArray[np.int8] = np.concatenate([part.status for part in parts])
+        shape = next((part.outputs for part in [near, *parts] if part.outputs is not None), None)
+        shapes = {name: self._outcomes.shape[1:] if shape is None else shape[name].shape[1:] for name in names}
+        self.outputs: Mapping[str, Array] = {
+            name: np.concatenate(
+                [
+                    np.full((len(part.status), *shapes[name]), np.nan)
+                    if part.outputs is None
+                    else part.outputs.pop(name)
+                    for part in parts
+                ]
+            )
+            for name in names
+        }
+        self.units: Mapping[str, str | tuple[str, ...]] = {
+            name: unit_of_output(source.mechanism, what) for name, what in names.items()
+        }
+        self.warnings = worst(warning for part in [near, *parts] for warning in part.warnings)
+        self.messages: dict[int, str] = {}
+        first = 0
+        for part in parts:
+            self.messages |= {first + i: text for i, text in part.messages.items()}
+            first += len(part.status)
+
+    def __repr__(self) -> str:
+        count, bad = len(self._outcomes), int(self.failed.sum())
+        return f"Study({self._source.mechanism.name!r}, {count} variants, {bad} not solved, outputs {', '.join(self.outputs)})"
+
+    def document(self) -> Document:
+        """Ranges of the parameters and outputs, and why variants were not solved."""
+        n, bad = len(self._outcomes), int(self.failed.sum())
+        names, values = list(self.parameters), list(self.parameters.values())
+        rows = [
+            (name, *map(number, (at, v.min(), v.max())))
+            for name, at, v in zip(names, self._source.start, values, strict=True)
+        ]
+        blocks: list[Block] = [
+            Paragraph(
+                f"{counted(n, 'variant')} at {counted(self._outcomes.shape[1], 'position')}, {bad} not solved at all positions."
+            ),
+            Heading("Parameters", 2),
+            Table(("parameter", "mechanism itself", "least", "greatest"), rows, "lrrr"),
+            Heading("Outputs, over variants and positions", 2),
+            Table(
+                ("output", "mechanism itself", "least", "mean", "greatest"), list(map(self._row, self.outputs)), "lrrrr"
+            ),
+        ]
+        if self.warnings:
+            blocks += [Heading("Doubtful reactions", 2), Bullets([*map(str, self.warnings)])]
+        if self.messages:
+            told = [f"variant {i}: {text}" for i, text in list(self.messages.items())[:VARIANTS_LISTED]]
+            more = (
+                [f"... and {len(self.messages) - VARIANTS_LISTED} more (messages)"]
+                if len(self.messages) > VARIANTS_LISTED
+                else []
+            )
+            blocks += [Heading("Not solved", 2), Bullets([*told, *more])]
+        return Document(f"Study of {self.mechanism.name}", blocks)
+
+    def _row(self, name: str) -> tuple[str, ...]:
+        """The range of an output; that of the mechanism itself where it has several values."""
+        values, own = (v[np.isfinite(v)] for v in (self.outputs[name], self.nominal[name]))
+        if not values.size:
+            return name, "", "no value", "", ""
+        ends = list(dict.fromkeys(map(number, (own.min(), own.max())))) if own.size else ["no value"]
+        return name, " to ".join(ends), *map(number, (values.min(), values.mean(), values.max()))
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The mechanism itself."""
+        return self._source.mechanism
+
+    @property
+    def status(self) -> NDArray[np.str_]:
+        """Named outcomes ``(n, positions)``."""
+        return np.asarray(STATUSES[self._outcomes])
+
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """Variants some position of which was not solved, ``(n,)``."""
+        return np.asarray(self._outcomes.any(axis=1))
+
+    def variant(self, i: int) -> Mechanism:
+        """The ``i``-th variant as a mechanism, to be solved and checked alone.
+
+        Raises
+        ------
+        DeclarationError
+            where no such mechanism can be.
+        """
+        n = self._values.shape[1]
+        if isinstance(i, bool) or not isinstance(i, int | np.integer) or not -n <= i < n:
+            raise DeclarationError("study", [f"variant {i!r}: expected a whole number from 0 to {n - 1}"])
+        return self._source.one(self._values[:, i])
+
+    # --- what varies with what ---------------------------------------------------------------------------------------------
+
+    def _output(self, name: str) -> Array:
+        if name not in self.outputs:
+            raise DeclarationError("study", [f"{name!r} is no output; outputs: {', '.join(self.outputs)}"])
+        return self.outputs[name]
+
+    @property
+    def nominal(self) -> Mapping[str, Array]:
+        """Outputs of the mechanism itself."""
+        return {name: self._near_output(name)[0] for name in self.outputs}
+
+    def _near_output(self, name: str) -> Array:
+        self._output(name)
+        if self._near.outputs is None:
+            return np.full((len(self._near.status), *self.outputs[name].shape[1:]), np.nan)
+        return self._near.outputs[name]
+
+    def quantiles(self, name: str, q: ArrayLike = (0.00135, 0.5, 0.99865)) -> Array:
+        """Quantiles of an output over the variants that were solved, ``(*shape of q, ...)``; NaN where none was."""
+        values = self._output(name)
+        if not ((np.asarray(q) >= 0) & (np.asarray(q) <= 1)).all():
+            raise DeclarationError("study", [f"quantiles q = {q!r}: expected numbers from 0 to 1"])
+        at = np.asarray(q, dtype=float)
+        out = np.full((at.size, int(np.prod(values.shape[1:]))), np.nan)
+        for column, own in zip(out.T, values.reshape(len(values), -1).T, strict=True):  # a copy of all might not fit
+            solved = own[~np.isnan(own)]
+            if np.isfinite(solved).any():
+                column[:] = np.quantile(solved, at.ravel())
+        return out.reshape(at.shape + values.shape[1:])
+
+    def mean(self, name: str) -> Array:
+        """Mean of an output over the variants that were solved."""
+        values = self._output(name)
+        count = np.isfinite(values).sum(axis=0)
+        return np.where(count > 0, np.nansum(values, axis=0) / np.maximum(count, 1), np.nan)
+
+    def std(self, name: str) -> Array:
+        """Standard deviation of an output over the variants that were solved (of the sample, ``n - 1``)."""
+        values = self._output(name)
+        count = np.isfinite(values).sum(axis=0)
+        squares = np.nansum((values - self.mean(name)) ** 2, axis=0)
+        return np.where(count > 1, np.sqrt(squares / np.maximum(count - 1, 1)), np.nan)
+
+    def sensitivities(self, name: str) -> dict[str, Array]:
+        """Derivative of an output after every parameter at the mechanism itself, ``(...)`` each, by central differences."""
+        near = self._near_output(name)
+        k = len(self._ways)
+        return {
+            parameter: (near[1 + j] - near[1 + k + j]) / (2 * self._steps[j]) for j, parameter in enumerate(self._ways)
+        }
+
+    @cached_property
+    def _ends(self) -> Array:
+        """Furthest departures of every parameter from the mechanism itself, ``(parameters, 2)``."""
+        return np.array([reach(way) for way in self._ways.values()]) - self._source.start[:, None]
+
+    def moves(self, name: str) -> dict[str, Array]:
+        """What every parameter alone changes of an output, to first order, at its two ends (see ``worst_case``), ``(2, ...)``."""
+        return {
+            parameter: np.stack([g * end for end in ends])
+            for (parameter, g), ends in zip(self.sensitivities(name).items(), self._ends, strict=True)
+        }
+
+    def worst_case(self, name: str) -> tuple[Array, Array]:
+        """Smallest and largest value of an output, to first order, with every parameter at its worse end.
+
+        ``f_0 + sum_j min(or max)(df/dp_j low_j, df/dp_j high_j)``; a distribution without end ends at three standard deviations (of a
+        normal one). Compare with the extremes of the sample: the mechanism may be far from linear.
+        """
+        middle, moves = self._near_output(name)[0], self.moves(name).values()
+        low, high = (
+            middle + sum((pick(move, axis=0) for move in moves), np.zeros_like(middle)) for pick in (np.min, np.max)
+        )
+        return low, high
+
+    def linear_std(self, name: str) -> Array:
+        """Standard deviation to first order, ``sqrt(sum_j (df/dp_j sigma_j)^2)``, of independent parameters."""
+        sigma = [deviation(way) for way in self._ways.values()]
+        return np.sqrt(
+            sum(
+                ((g * s) ** 2 for g, s in zip(self.sensitivities(name).values(), sigma, strict=True)),
+                start=np.array(0.0),
+            )
+        )
+
+    # --- tables --------------------------------------------------------------------------------------------------------------
+
+    def to_xarray(self) -> xarray.Dataset:
+        """A Dataset over variants and positions, parameters as coordinates of the variants (``xarray`` extra)."""
+        xr = optional("xarray", "xarray")
+        N = self._outcomes.shape[1]
+        data: dict[str, Any] = {}
+        for name, values in self.outputs.items():
+            placed = values.ndim > 1 and values.shape[1] == N
+            rest = [f"{name} {i}" for i in range(values.ndim - 1 - placed)]
+            data[name] = (["variant", *(["position"] if placed else []), *rest], values)
+        data["status"] = (["variant", "position"], self.status)
+        return xr.Dataset(
+            data,
+            coords={name: ("variant", values) for name, values in self.parameters.items()},
+            attrs={"mechanism": self.mechanism.name},
+        )
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A DataFrame, one row a variant: parameters, outputs that are one number a variant, positions not solved (``pandas`` extra)."""
+        pd = optional("pandas", "pandas")
+        single = {name: v.reshape(len(v)) for name, v in self.outputs.items() if v.size == len(v)}
+        missing = (self._outcomes != 0).sum(axis=1)
+        return pd.DataFrame({**self.parameters, **single, "positions not solved": missing})
+
 
 POSITIONS_TOGETHER = 60_000
 """Positions of all variants that are solved together: bounds the memory."""
@@ -68,7 +472,7 @@ def study(
     ----------
     m : a mechanism; or a function ``build(**parameters)`` that returns one, always of the same topology.
     parameters : declared number -> distribution of ``scipy.stats`` or numbers. Declared numbers are named as in
-        ``mechgraph.variants.fields``: ``crank.mass``, ``B.on_a.point.x``, ``loads[0].stiffness``, ``length[2]`` of a chain.
+        ``mechgraph.variants.numbers``: ``crank.mass``, ``B.on_a.point.x``, ``loads[0].stiffness``, ``length[2]`` of a chain.
     outputs : quantities by name (``"A.effort"``, ``"B.force"``, ``"B:Fx"``, ``"coupler.center"``), or a mapping name -> quantity or
         function of a Solution with the batch ``(variants, positions)``.
     n : number of variants; on a grid, of levels of every distribution (a list of numbers is taken as given).

@@ -1,7 +1,14 @@
-"""The work of a study in parts that can be sent to other processes: some variants solved together, the rest one by one."""
+"""Parts of a study: their batches, what is solved, and what is read from it.
+
+Kinetostatics of many variants of one mechanism as one batch ``(variants, positions)``.
+
+The start of every variant is followed from the mechanism itself: from its closed start, while its numbers change into those of the
+variant. This is a path like any other, with the part of the way in place of a driver.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -11,25 +18,356 @@ from numpy.typing import NDArray
 
 from mechgraph import by_kernel
 from mechgraph.algebra.se3 import Array
-from mechgraph.by_kernel import COMPILED
-from mechgraph.closure.driver_motion import Motions
-from mechgraph.closure.driver_path import Status
-from mechgraph.closure.indexing import Index
-from mechgraph.closure.solver import MotionEngineName
-from mechgraph.determinacy.snapping import SnappedMechanism, meant, started
-from mechgraph.errors import DeclarationError, MechgraphError
+from mechgraph.by_kernel import COMPILED, InKernel, in_kernel
+from mechgraph.closure.configuration import Configuration
+from mechgraph.closure.driver_motion import DriverMotion, Motions
+from mechgraph.closure.driver_path import DriverPath, Status
+from mechgraph.closure.indexing import Index, System
+from mechgraph.closure.poles import away_from_poles
+from mechgraph.closure.solver import FactoredClosure, MotionEngineName, closure_solver
+from mechgraph.determinacy.snapping import SnappedMechanism, declared_closure, meant, started
+from mechgraph.errors import DeclarationError, MechgraphError, did_you_mean, listed, near_names
 from mechgraph.force.reactions import MethodName
-from mechgraph.kinetostatics import RedundantName, solve_quietly
+from mechgraph.kinetostatics import Pipeline, RedundantName, solve_quietly
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
-from mechgraph.outcome import Options
+from mechgraph.model.parameters import Parameters
+from mechgraph.numerics.continuation import End, Follower, Tracks
+from mechgraph.numerics.tracks import Paths
+from mechgraph.outcome import Options, Starts
+from mechgraph.quantities import items_of, shown, unit_of, wrong
 from mechgraph.result.contacts import LiftOff, Overlap
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import LoadBearing, Unbalanced
-from mechgraph.variants.batch import solve_together
-from mechgraph.variants.fields import AnyField, Variants, stacked, topology_of, varied
-from mechgraph.variants.number_names import ItemField
-from mechgraph.variants.outputs import Output, quantity
+from mechgraph.result.views import LinkResult, PairResult, link_units, pair_units
+from mechgraph.variants.numbers import ALIKE, AnyField, ItemField, Variants, stacked, topology_of, varied
+
+Output = str | Callable[[Solution], Any]
+
+RESERVED = ("status", "variant", "position", "positions not solved")
+"""Names that tables of a study use themselves."""
+OF_SOLUTION = ("shaking",)
+OF_CHECKS = ("closure", "equilibrium", "power", "accuracy")
+
+
+def _properties(kind: type) -> tuple[str, ...]:
+    return tuple(n for n, v in vars(kind).items() if isinstance(v, property) and n not in ("units", "components"))
+
+
+RANKS = ("position", "velocity", "acceleration")
+OF_PAIR, OF_LINK = _properties(PairResult), _properties(LinkResult)
+
+
+def named_outputs(m: Mechanism, outputs: Any, parameters: Iterable[str]) -> dict[str, Output]:
+    """Outputs by name, from a quantity, several, or a mapping name -> quantity or function.
+
+    Raises
+    ------
+    DeclarationError
+        with all names that are no quantity.
+    """
+    if isinstance(outputs, str):
+        outputs = [outputs]
+    if not isinstance(outputs, Mapping):
+        unlisted: list[str] = []
+        names = items_of(outputs, "", unlisted)
+        if unlisted or not all(isinstance(name, str) for name in names):
+            raise DeclarationError(
+                "study: outputs",
+                [wrong(outputs, "outputs", "names, or a mapping name -> name or function of a Solution")],
+            )
+        outputs = {name: name for name in names}
+    faults = [
+        fault
+        for name, what in outputs.items()
+        if (fault := None if callable(what) else _fault(m, name, what)) is not None
+    ]
+    faults += [
+        f"{name!r}: this name is taken; give the output another one"
+        for name in outputs
+        if name in {*RESERVED, *parameters}
+    ]
+    if faults or not outputs:
+        raise DeclarationError("study: outputs", faults or ["no outputs; name at least one, e.g. 'A.effort'"])
+    return dict(outputs)
+
+
+def _fault(m: Mechanism, name: str, what: Any) -> str | None:
+    if isinstance(what, str) and _found(m, what):
+        return None
+    pair = m.pairs[0]
+    hint = did_you_mean(near_names(what, _known(m, what), ALIKE)) if isinstance(what, str) else ""
+    example = (
+        f"expected e.g. '{pair.name}.effort', '{pair.name}.position', "
+        f"'{pair.freedom_names[0] if pair.freedom_names else pair.name}', '{pair.name}:{(*pair.type.component_names, 'Fx')[0]}', "
+        f"'{m.links[-1].name}.center', 'shaking', or a function of a Solution"
+    )
+    said = shown(name) if isinstance(what, str) and name == what else f"{shown(name)}: {shown(what)}"
+    return f"{said}: {_missing(m, what)}; {hint or example}"
+
+
+def _missing(m: Mechanism, what: Any) -> str:
+    """What there is not: a pair or link of that name, or a quantity of it."""
+    owner = what.rpartition(".")[0] or what.rpartition(":")[0] if isinstance(what, str) else ""
+    if not owner or owner in (*m.pair_index, *m.link_index):
+        return "is no quantity"
+    return f"there is no pair or link {shown(owner)} (pairs: {listed(m.pair_index)}; links: {listed(m.link_index)})"
+
+
+def _known(m: Mechanism, what: str) -> list[str]:
+    """Names of the quantities of the pair or link that is named, or of all."""
+    owner = what.rpartition(".")[0]
+    of = [(pair.name, OF_PAIR) for pair in m.pairs] + [(link.name, OF_LINK) for link in m.links]
+    points = [f"{link.name}.{name}" for link in m.links for name in link.points if owner in (link.name, "")]
+    return [f"{name}.{part}" for name, parts in of if owner in (name, "") for part in parts] + [
+        *points,
+        *OF_SOLUTION,
+        *OF_CHECKS,
+    ]
+
+
+def _found(m: Mechanism, text: str) -> Callable[[Solution], Any] | None:
+    """The quantity of that name: of a pair, a freedom, a component, a link, or the whole."""
+    if text in OF_SOLUTION:
+        return lambda s: getattr(s, text)
+    if text in OF_CHECKS:
+        return lambda s: getattr(s.checks, text)
+    if text in m.freedom_names():
+        k, j = m.freedom(text)
+        return lambda s: s[m.pairs[k].name].position[..., j]
+    owner, colon, part = text.partition(":")
+    if colon and owner in m.pair_index and part in m.pair(owner).type.component_names:
+        return lambda s: s[owner].components[part]
+    owner, _, part = text.rpartition(".")
+    if owner in m.pair_index and part in OF_PAIR:
+        return lambda s: getattr(s[owner], part)
+    if owner in m.link_index and part in OF_LINK:
+        if part.startswith("center") and m.link(owner).center is None:
+            return None
+        return lambda s: getattr(s.link(owner), part)
+    if point := _point(m, text):
+        link, name, rank = point
+        return lambda s: getattr(s.link(link).at(name), RANKS[rank])
+    return None
+
+
+def _point(m: Mechanism, text: str) -> tuple[str, str, int] | None:
+    """Link, name and derivative of ``bucket.tip``, ``bucket.tip.velocity`` or ``bucket.tip.acceleration``."""
+    return next(
+        (
+            (link.name, name, rank)
+            for link in m.links
+            for name in link.points
+            for rank, of in enumerate(RANKS)
+            if text == f"{link.name}.{name}{f'.{of}' if rank else ''}"
+        ),
+        None,
+    )
+
+
+def unit_of_output(m: Mechanism, what: Output) -> str | tuple[str, ...]:
+    """The unit of a quantity in the declared units, or one for every entry of its last axis; empty where it is not known."""
+    if not isinstance(what, str):
+        return ""
+    if what in m.freedom_names():
+        return unit_of(m.units, (0 if m.turns(what) else 1, 0, 0))
+    owner, colon, part = what.partition(":")
+    if colon and owner in m.pair_index:
+        return str(pair_units(m.units, m.pair(owner).type)["components"][part])
+    owner, _, part = what.rpartition(".")
+    found: Any = ""
+    if owner in m.pair_index and part in OF_PAIR:
+        found = pair_units(m.units, m.pair(owner).type).get(part, "")
+    elif owner in m.link_index and part in OF_LINK:
+        found = link_units(m.units).get(part, "")
+    elif point := _point(m, what):
+        found = unit_of(m.units, (1, 0, -point[2]))
+    elif what == "shaking":
+        found = pair_units(m.units, m.pairs[0].type)["reaction"]
+    return found[0] if isinstance(found, tuple) and len(set(found)) == 1 else found
+
+
+def quantity(s: Solution, name: str, what: Output) -> Array:
+    """An output of a solution of variants ``(V, N)``, ``(V, ...)``; a last axis of length one (of a pair with one freedom) is dropped.
+
+    Raises
+    ------
+    DeclarationError
+        where a function fails or gives no array with one entry for every variant.
+    """
+    if isinstance(what, str):
+        found = _found(s.mechanism, what)
+        assert found is not None
+        value = np.asarray(found(s))
+        return value[..., 0] if value.ndim > len(s.batch) and value.shape[-1] == 1 else value
+    try:
+        value = np.asarray(what(s), dtype=float)
+    except Exception as error:
+        raise DeclarationError(
+            f"study: output {name!r}", [f"its function failed: {type(error).__name__}: {error}"]
+        ) from error
+    if not value.ndim or value.shape[0] != s.batch[0]:
+        raise DeclarationError(
+            f"study: output {name!r}",
+            [
+                f"its function gave shape {value.shape} for {s.batch[0]} variants; quantities of a study are (variants, positions, ...): "
+                "reduce over axis 1, not over the variants"
+            ],
+        )
+    return value
+
+
+Mask = NDArray[np.bool_]
+NumbersAt = Callable[[Array, Index], Variants]
+"""Gives variants ``(n,)``, each with its numbers at a part ``(n,)`` of the way from those of the mechanism itself (0) to its own (1)."""
+
+
+class NumbersPath(DriverPath):
+    """The closure equations while the numbers change, drivers at rest: the path value is the part of the way."""
+
+    def __init__(self, line: Pipeline, numbers_at: NumbersAt) -> None:
+        solver = closure_solver(line.engine, line.leading, line.freedoms.hold if line.passive else None)
+        super().__init__(line.system, solver, line.system.cases)
+        self.size, self.paced = (self.system.n_freedoms, 1), True
+        self._line, self._numbers_at = line, numbers_at
+        self._known: dict[bytes, System] = {}
+
+    def system_at(self, part: Array, variants: Index) -> System:
+        """The system with the numbers of variants ``(n,)``, each at its part of the way; those of the last calls are kept."""
+        key = part.tobytes() + variants.tobytes()
+        if key not in self._known:
+            self._known = dict([*self._known.items()][1 - SYSTEMS :])
+            self._known[key] = self.system_of(self._numbers_at(part, variants))
+        return self._known[key]
+
+    def system_of(self, variants: Variants) -> System:
+        """The system with the numbers of variants."""
+        par, m = self.system.par, self._line.m
+        made = variants.numbers.with_rest(m).parameters(m, par.offset, par.origin, par.L)
+        # one array with all variants says how many there are
+        mass = np.broadcast_to(made.mass, (len(m.links), variants.count))
+        return self.system.with_parameters(dataclasses.replace(made, mass=mass))
+
+    def built_at(self, part: Array, variants: Index) -> tuple[System, Mask]:
+        """The system with the numbers of variants at a part of the way, and which could be built."""
+        found, built = self._numbers_at(part, variants), np.ones(len(part), dtype=bool)
+        built[list(found.missing)] = False
+        return self.system_of(found), built
+
+    def at(self, x: Array, drive: Array, tracks: Index) -> Configuration:
+        """The equations with the numbers at a part of the way."""
+        self._last = drive, tracks
+        return Configuration(self.system_at(drive[0], tracks), x.copy())
+
+    def sensitivity(self, point: Configuration, factored: FactoredClosure) -> Array:
+        """Rates with the part of the way, by a forward difference: the numbers come from a function or a table of any kind."""
+        drive, tracks = self._last
+        step = self._step[tracks]
+        ahead = Configuration(self.system_at(drive[0] + step, tracks), point.x).residual - point.residual
+        return factored.solve(-ahead[:, None] / step)
+
+    def pace(self, x: Array, rates: Array) -> Array:
+        """The largest rate: where the numbers change by little, so do the equations, however far the way is."""
+        return np.minimum(np.abs(rates).max(axis=0, initial=0.0), 1.0)
+
+    def lead(self, x: Array, valid: Mask) -> Tracks:
+        """The ``valid`` variants from states ``x (nx, V)`` of the mechanism itself, in one step where the numbers change by little."""
+        V = x.shape[1]
+        here, there = (Configuration(self.system_at(np.full(V, part), np.arange(V)), x) for part in (0.0, 1.0))
+        way = np.nan_to_num(np.abs(there.residual - here.residual).max(axis=0, initial=0.0))
+        form = self.solver.chosen(here.part(np.arange(1)), np.full(1, -1))  # all begin in the mechanism itself
+        self._step = NUMBERS_STEP / np.where(way > 0, np.clip(way, NUMBERS_STEP / LONGEST_STEP, 1.0), 1.0)
+        paths = Paths([np.array([[0.0, float(ok)]]) for ok in valid])
+        return Follower(self, leads=False).follow(x, paths, first=1.0, which=np.repeat(form, V))
+
+
+SYSTEMS = 4
+"""Systems that are kept: a difference asks for two, and Newton's method for both of them again."""
+NUMBERS_STEP = 1e-7
+"""What the numbers change by in that difference (radians, lengths / L): half the digits are left, which a prediction does not miss."""
+LONGEST_STEP = 1e-3
+"""The longest step for that, in parts of the way, where the numbers change by less on the whole of it."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Together:
+    """The solution of all variants that could be followed from the mechanism itself, and which could not (``alone``).
+
+    ``starts (F, V)``: user coordinates where each variant begins, NaN where it is not known.
+    """
+
+    solution: Solution | None
+    alone: Mask
+    starts: Array
+
+
+def solve_together(
+    numbers_at: NumbersAt,
+    count: int,
+    motions: Mapping[str, Motion],
+    options: Options,
+    actuate: tuple[str, ...] | None = None,
+) -> Together:
+    """All variants as one batch; NaN for those to be solved alone: they cannot be built, or not followed from the mechanism itself."""
+    every = np.arange(count)
+    variants, V = numbers_at(np.ones(count), every), count
+    nothing = np.full((sum(p.type.f for p in variants.mechanism.pairs), V), np.nan)
+    line = Pipeline(DriverMotion(variants.mechanism, motions, actuate), options)
+    path = NumbersPath(line, numbers_at)
+    valid = variants.valid()
+    good = np.flatnonzero(valid)
+    if not good.size:
+        return Together(None, np.ones(V, dtype=bool), nothing)
+    systems = path.system_of(variants)
+    kernel = in_kernel(line, systems, variants.loads, V)
+    one_motion = int(np.prod(line.drive.batch[:-1])) == 1
+    if V > 1 and one_motion and valid.all() and _move_alike(line.system.par, systems.par):
+        begun, x, sharing = valid, line.x[:, None], V
+    else:
+        begun, x, sharing = *_led(line, path, kernel, valid), 1
+    if not begun.any():
+        return Together(None, np.ones(V, dtype=bool), nothing)
+    if kernel is not None:
+        kernel.begin(x)
+    starts = Starts(x, systems.cases, variants.loads, sharing, kernel)
+    q = systems.coordinates_of(starts.x[..., None], line.system.start_coordinates(line.m.start))[: len(nothing), :, 0]
+    q = np.broadcast_to(q, nothing.shape)
+    try:
+        outcome = line.run(starts, np.broadcast_shapes((V, 1), line.drive.batch))
+    except DeclarationError:
+        return Together(None, np.ones(V, dtype=bool), q)
+    if outcome.found is not None and away_from_poles(line.m, line.system, outcome.found) is not None:
+        return Together(None, np.ones(V, dtype=bool), q)
+    numbers, tol = variants.declared, line.m.tol
+    if numbers is not None and tol is not None:
+        variant = np.arange(int(np.prod(outcome.batch))) // outcome.batch[-1]
+        outcome.trajectory.as_declared(lambda x, at: declared_closure(line.system, numbers, x, variant[at]), tol)
+    alone = ~begun | outcome.contradicting.reshape(V, -1).any(axis=1)
+    return Together(Solution(outcome.trajectory), alone, q)
+
+
+def _move_alike(itself: Parameters, varied: Parameters) -> bool:
+    """Whether variants differ from the mechanism itself in masses alone."""
+    names = ("marker_a", "marker_b", "pitch", "couplings")
+    return all(bool((getattr(itself, name) == getattr(varied, name)).all()) for name in names)
+
+
+def _led(line: Pipeline, path: NumbersPath, kernel: InKernel | None, valid: Mask) -> tuple[Mask, Array]:
+    """Which variants could be led from the mechanism itself, and where they begin ``(nx, V)``, NaN for the others.
+
+    Those that the kernel does not lead, numpy does, and all that have passive freedoms.
+    """
+    V = len(valid)
+    x = np.full((len(line.x), V), np.nan) if kernel is None or line.passive else kernel.lead(valid, path.built_at)
+    left = valid & np.isnan(x).any(axis=0)
+    if left.any():
+        tracks = path.lead(np.repeat(line.x[:, None], V, axis=1), left)
+        last = np.zeros(V, dtype=np.intp)
+        last[tracks.nodes.track] = np.arange(len(tracks.nodes))
+        reached = left & np.array([end is End.REACHED for end in tracks.end])
+        x[:, reached] = tracks.nodes.x[:, last[reached]]
+    return valid & ~np.isnan(x).any(axis=0), x
+
 
 Doubt = LoadBearing | LiftOff | Overlap | Unbalanced
 """What makes a solution doubtful."""

@@ -16,12 +16,11 @@ import numpy as np
 import mechgraph as mg
 from mechgraph.model.chain import chain_symbols
 from mechgraph.model.toml import library_path
-from mechgraph.modes import store
-from mechgraph.modes.bounds import bound
-from mechgraph.modes.groups import groups_of
-from mechgraph.modes.labelling import Labelling
-from mechgraph.modes.monodromy import Irregular, start_set
-from mechgraph.modes.question import Question
+from mechgraph.modes import start_sets
+from mechgraph.modes.assemblies import Question
+from mechgraph.modes.family import Labelling
+from mechgraph.modes.start_sets import Irregular, bound, start_set
+from mechgraph.modes.targets import groups_of
 
 LOOPS = ("RSSR", "RCSR", "RRSC", "RSCR", "RCCC", "RCRCR", "RCRRC", "RRRRRRR", "RRRRRRP")
 """Loops of pairs that stand anywhere, driven at the first."""
@@ -85,7 +84,7 @@ def main() -> None:
     for name, labelling in families():
         family, begin = labelling.family, time.process_time()
         try:
-            start = store.packed(labelling) or start_set(family, np.random.default_rng(0))
+            start = start_sets.packed(labelling) or start_set(family, np.random.default_rng(0))
         except Irregular:
             print(f"{name}: irregular", flush=True)
             continue
@@ -93,8 +92,11 @@ def main() -> None:
         sure = start.trace.passed or (known is not None and known.count == N)
         print(f"{name}: {N}, {'sure' if sure else 'not sure'}, {time.process_time() - begin:.1f} s", flush=True)
         if sure and N <= MOST:
-            found |= {f"{store.key(labelling)}/{part}": value for part, value in store.arrays(labelling, start).items()}
-    np.savez_compressed(store.PACKED, **found)
+            found |= {
+                f"{start_sets.key(labelling)}/{part}": value
+                for part, value in start_sets.arrays(labelling, start).items()
+            }
+    np.savez_compressed(start_sets.PACKED, **found)
 
 
 if __name__ == "__main__":

@@ -20,9 +20,9 @@ import numpy as np
 
 import mechgraph as mg
 from mechgraph.closure.configuration import Configuration
-from mechgraph.modes.question import Question
-from mechgraph.modes.search import searched
-from mechgraph.modes.trace import NOT_PASSED
+from mechgraph.modes.assemblies import Question
+from mechgraph.modes.continua import searched
+from mechgraph.modes.start_sets import NOT_PASSED
 
 FREEDOMS = {"R": 1, "P": 1, "C": 2, "U": 2, "S": 3, "Sp": 5, "Sg": 4, "Sc": 3, "E": 3}
 """Pair types of random loops, and how many freedoms each has."""
@@ -130,7 +130,7 @@ def sets(first: int, last: int, runs: int, guesses: int, freedoms: Sequence[int]
             q = Question(m, at)
             found = mg.assemblies(m, at, cache=False, progress=patience())
             took = time.process_time() - begin
-            with patch("mechgraph.modes.monodromy.trace_test", lambda *_: NOT_PASSED):
+            with patch("mechgraph.modes.start_sets.trace_test", lambda *_: NOT_PASSED):
                 others = [mg.assemblies(m, at, seed=seed, cache=False, progress=patience()) for seed in range(1, runs)]
         except (mg.MechgraphError, GivenUp) as error:
             print(f"{name}: {type(error).__name__}", flush=True)

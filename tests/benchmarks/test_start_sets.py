@@ -9,8 +9,8 @@ import pytest
 from make_start_sets import families
 
 import mechgraph as mg
-from mechgraph.modes import store
-from mechgraph.modes.bounds import bound
+from mechgraph.modes import start_sets
+from mechgraph.modes.start_sets import bound
 
 
 @pytest.fixture(autouse=True)
@@ -19,20 +19,20 @@ def _no_folder_of_the_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_start_sets_of_the_library_and_of_common_topologies_come_with_the_package() -> None:
-    with np.load(store.PACKED) as packed:
+    with np.load(start_sets.PACKED) as packed:
         names = {name.split("/")[0] for name in packed.files}
     served = set()
     for name, labelling in families():
         family = labelling.family
-        if store.key(labelling) not in names:
+        if start_sets.key(labelling) not in names:
             continue
-        found, known = store.kept(family), bound(family)
+        found, known = start_sets.kept(family), bound(family)
         assert found is not None, name
         assert found.trace.passed or (known is not None and known.count == found.x.shape[1])
-        served.add(store.key(labelling))
+        served.add(start_sets.key(labelling))
     assert served == names
     assert len(names) >= 20
-    assert store.PACKED.stat().st_size < 400_000
+    assert start_sets.PACKED.stat().st_size < 400_000
 
 
 def test_other_mechanisms_of_the_same_topology_take_theirs_from_the_package() -> None:

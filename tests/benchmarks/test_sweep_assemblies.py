@@ -10,9 +10,8 @@ from sweep_assemblies import TOGETHER, outside, prints, topology
 
 import mechgraph as mg
 from mechgraph.closure.configuration import Configuration
-from mechgraph.modes import store
-from mechgraph.modes.question import Question
-from mechgraph.modes.search import searched
+from mechgraph.modes.assemblies import Question
+from mechgraph.modes.continua import searched
 
 
 @pytest.mark.parametrize(
@@ -26,7 +25,7 @@ from mechgraph.modes.search import searched
 def test_random_topologies_have_the_same_assemblies_for_any_seed(
     number: int, freedoms: tuple[int, ...] | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(store, "PACKED", tmp_path / "none")
+    monkeypatch.setattr("mechgraph.modes.start_sets.PACKED", tmp_path / "none")
     m, at = topology(number, freedoms=freedoms)
     q = Question(m, at)
     sets = [mg.assemblies(m, at, seed=seed, cache=False) for seed in (0, 1)]

@@ -6,8 +6,7 @@ from strategies import closed_mechanism, with_drives, with_loads
 
 import mechgraph as mg
 from mechgraph.closure.assembly import closed_start
-from mechgraph.response.chart import Chart
-from mechgraph.response.motion_equations import Columns, accelerations, in_unit_inertias
+from mechgraph.response.motion_equations import Chart, Columns, accelerations, in_unit_inertias
 
 T = np.linspace(0.0, 0.25, 6)
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}

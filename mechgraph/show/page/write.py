@@ -32,12 +32,20 @@ from mechgraph.result.solution import Solution
 from mechgraph.show.curves import effort_curve, reaction_ranges
 from mechgraph.show.diagrams import draw_graph, study_histogram, study_tornado
 from mechgraph.show.page.content import view_data
-from mechgraph.show.page.figures import json_for_script
 from mechgraph.show.skeleton import draw_skeleton
-from mechgraph.variants.result import Study
+from mechgraph.variants.study import Study
 
 WEB = "web"
 """Folder of the scripts, which build.js of it builds."""
+
+
+def json_for_script(data: Any) -> str:
+    """JSON that ends no script element and no line of one, whatever its texts hold.
+
+    ValueError where a number is not finite: what is not known is packed, or is no number.
+    """
+    text = json.dumps(data, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
 @cache

@@ -1,4 +1,11 @@
-"""Formulas of time, as FreeCAD's motions hold them: value, rate and acceleration, differentiated exactly.
+"""Texts of other programs: indented blocks, XML, formulas.
+
+XML from strangers: elements with their lines, read by the parser of the standard library without anything that a text could make it do.
+
+A document type declaration, by which entities multiply and other files are read, is refused; the size of a file is limited by
+``reading.text_of``.
+
+Formulas of time, as FreeCAD's motions hold them: value, rate and acceleration, differentiated exactly.
 
 A formula is a sum of products of numbers, ``time``, ``pi``, variables that the file defines by formulas, the four operations, powers
 (``^``) and the functions of ``FUNCTIONS``. It is read into a syntax tree of which only these parts are known; nothing of it is ever
@@ -9,14 +16,158 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
+from xml.parsers import expat
 
 import numpy as np
 
 from mechgraph.algebra.se3 import Array
-from mechgraph.quantities import shown
+from mechgraph.errors import FileError
+from mechgraph.files import text_of
+from mechgraph.quantities import LARGEST, shown
+
+
+@dataclass
+class Node:
+    """A line, its number in the file, and the lines below it that stand deeper."""
+
+    text: str
+    line: int
+    children: list[Node] = field(default_factory=list)
+
+    def child(self, label: str) -> Node | None:
+        """The first child of that text."""
+        return next((node for node in self.children if node.text == label), None)
+
+    def under(self, label: str) -> list[Node]:
+        """The children of the first child of that text; none where there is none."""
+        found = self.child(label)
+        return found.children if found else []
+
+    def word(self, label: str) -> str:
+        """What stands below the first child of that text; empty where nothing does."""
+        return next((node.text for node in self.under(label)), "")
+
+    def numbers(self, label: str, shape: tuple[int, ...], where: str, faults: list[str]) -> Array:
+        """Finite numbers below a label, row by row; zeros, and a fault, where they are not of that shape."""
+        found = self.child(label)
+        if found is None:
+            faults.append(f"line {self.line}: {where}: {label} is missing")
+            return np.zeros(shape)
+        rows = [numbers_of(node.text) for node in found.children]
+        flat = [value for row in rows for value in row or ()]
+        size = int(np.prod(shape))
+        if None in rows or len(flat) != size:
+            given = " ".join(word for node in found.children for word in node.text.split())
+            faults.append(f"line {found.line}: {where}: {label} = {shown(given)}: expected {size} finite numbers")
+            return np.zeros(shape)
+        return np.array(flat).reshape(shape)
+
+
+def numbers_of(text: str) -> list[float] | None:
+    """The numbers of a line, separated by tabs or spaces; None where something else stands there or one is not finite."""
+    try:
+        found = [float(word) for word in text.split()]
+    except ValueError:
+        return None
+    return found if all(abs(value) < LARGEST for value in found) else None
+
+
+def tree_of(lines: Sequence[str], first: int = 1) -> Node:
+    """The tree of some lines of a file, the first of which has the number ``first``; blank lines count for nothing."""
+    root = Node("", first)
+    path: list[tuple[int, Node]] = [(-1, root)]
+    for depth, node in _nodes(lines, first):
+        while path[-1][0] >= depth:
+            path.pop()
+        path[-1][1].children.append(node)
+        path.append((depth, node))
+    return root
+
+
+def _nodes(lines: Sequence[str], first: int) -> Iterator[tuple[int, Node]]:
+    for number, line in enumerate(lines, first):
+        text = line.strip()
+        if text:
+            yield len(line) - len(line.lstrip("\t")), Node(text, number)
+
+
+@dataclass
+class Element:
+    """An element: its tag, attributes, line and children."""
+
+    tag: str
+    attributes: dict[str, str]
+    line: int
+    children: list[Element] = field(default_factory=list)
+
+    def all(self, tag: str) -> list[Element]:
+        """The children of a tag."""
+        return [child for child in self.children if child.tag == tag]
+
+    def first(self, tag: str) -> Element | None:
+        """The first child of a tag."""
+        return next((child for child in self.children if child.tag == tag), None)
+
+    @property
+    def title(self) -> str:
+        """Line, tag and name, for messages."""
+        name = self.attributes.get("name")
+        return f"line {self.line}: {self.tag}" + (f" {shown(name)}" if name is not None else "")
+
+    def numbers(self, key: str, shape: tuple[int, ...], default: Array | None, faults: list[str]) -> Array:
+        """Finite numbers of an attribute; the default where it is left out (a fault where there is none)."""
+        if key not in self.attributes and default is not None:
+            return default
+        found = numbers_of(self.attributes.get(key, ""))
+        size = int(np.prod(shape))
+        if found is None or len(found) != size:
+            given = f" = {shown(self.attributes[key])}" if key in self.attributes else " is missing"
+            faults.append(f"{self.title}: {key}{given}: expected {size} finite number{'s' * (size > 1)}")
+            return np.zeros(shape) if default is None else default
+        return np.array(found).reshape(shape)
+
+    def number(self, key: str, default: float | None, faults: list[str]) -> float:
+        """A finite number of an attribute."""
+        return float(self.numbers(key, (1,), None if default is None else np.array([default]), faults)[0])
+
+
+def read_xml(path: Path, kind: str, root: str) -> Element:
+    """The root element of a file.
+
+    Raises
+    ------
+    FileError
+        where it cannot be read, is no XML, has a document type declaration or another root.
+    """
+    text = text_of(path, kind)
+    parser = expat.ParserCreate()
+    top = Element("", {}, 0)
+    open_ = [top]
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        made = Element(tag, attributes, parser.CurrentLineNumber)
+        open_[-1].children.append(made)
+        open_.append(made)
+
+    def declared(*_: object) -> None:
+        raise FileError(path, f"line {parser.CurrentLineNumber}: a document type declaration is not read; remove it")
+
+    parser.StartElementHandler = start
+    parser.EndElementHandler = lambda _: open_.pop()
+    parser.StartDoctypeDeclHandler = declared
+    try:
+        parser.Parse(text, True)
+    except expat.ExpatError as error:
+        raise FileError(path, f"is no {kind}: line {error.lineno}: {expat.ErrorString(error.code)}") from None
+    found = top.children[0]
+    if found.tag != root:
+        raise FileError(path, f"is no {kind}: its root is <{shown(found.tag)[1:-1]}>, expected <{root}>")
+    return found
+
 
 LONGEST_FORMULA = 2000
 """Characters of a formula."""

@@ -1,0 +1,659 @@
+"""Start sets: bounds, monodromy, the trace test, and the folder that keeps them.
+
+Bounds of the number of assemblies: products over loops that can be solved one after the other, each with a published bound.
+
+With the drivers at rest every loop in turn must have as many unknown freedoms as its group has dimensions; then the assemblies are at
+most the product of those of the loops. A loop counts by the letters of its freedoms that are still unknown, in order round the loop.
+A slide is a turn about a line far away, and regular assemblies stay where dimensions change a little: what bounds turns bounds slides.
+
+The trace test: a sum over all assemblies of a class is a rational function of its parameters, a sum over some of them is not.
+
+In every loop one marker turns by ``phi`` about a line that the algebra of the loop allows, and the squares of the lengths of all rods
+are linear in ``z``. Over this pencil of members all equations are
+rational in ``z = exp(i phi)``, and the assemblies are an irreducible curve over the plane of ``z`` (see ``family``), whose points are
+permuted as ``z`` goes round the places where they meet. With ``g`` a number that tells assemblies apart and ``c`` a random one, the sum
+of ``1 / (g - c)`` over all assemblies is the same whichever way ``z`` came: a rational function, its degree the number of ``z`` with
+``g = c``. A sum over some of them only is not.
+
+Where all loops move in one plane, markers slide along an isotropic direction ``v`` of it instead (``v . v = 0``). With ``w`` the complex
+numbers by which links have turned, the loops are linear in ``w`` along ``v``, which stands still, and in ``1 / w`` along its conjugate,
+which moves: parallel planes cut the assemblies out of the inverses of a linear space, an irreducible curve. The sum is that of ``g``
+itself, of points along ``v``, linear in ``w``: its degree is the number of ``z`` where an assembly goes to infinity, less than a tenth.
+(Of groups that do not depend on each other a linear sum does not tell every part from the whole; they are solved one after the other.)
+
+Whether a function is rational its Loewner matrix ``(f(a_i) - f(b_j)) / (a_i - b_j)`` tells: the rank is the degree (Antoulas and
+Anderson, On the scalar rational interpolation problem, IMA J. Math. Control Inform. 3, 1986). The singular values of a rational function
+end at once, in rounding; those of another one fade, each a few times less than the one before. Samples beside the poles that the matrix
+and its shifted one tell so far (Mayo and Antoulas, A framework for the solution of the generalized realization problem, Linear Algebra
+Appl. 425, 2007) make every pole of a rational function count; of another one there are ever more.
+
+Sources of trace tests: Sommese, Verschelde and Wampler, Symmetric functions applied to decomposing solution sets of polynomial systems,
+SIAM J. Numer. Anal. 40, 2002 (sums linear in a slice moved in parallel); Leykin, Rodriguez and Sottile, Trace
+test, Arnold Math. J. 4, 2018.
+
+All assemblies of a random member of a class, by monodromy: paths of members that come back permute the assemblies.
+
+Sources: Duff, Hill, Jensen, Lee, Leykin and Sommars, Solving polynomial systems via homotopy continuation and monodromy, IMA J. Numer.
+Anal. 39, 2019; Sommese and Wampler, The Numerical Solution of Systems of Polynomials, 2005, section 15.4.
+
+Start sets kept in a folder of the user, one file for each class of mechanisms; a file is written whole or not at all.
+
+The folder is ``writing.cache_folder``. Where it cannot be read or written, start sets are worked out anew. Those of the library's
+mechanisms and of common topologies come with the package (``PACKED``, made by ``tests/benchmarks/make_start_sets.py``).
+"""
+
+from __future__ import annotations
+
+import zipfile
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mechgraph.algebra.se3 import compose, pose_exp
+from mechgraph.closure.configuration import Configuration
+from mechgraph.errors import MechgraphError
+from mechgraph.files import cache_folder, whole_file
+from mechgraph.graph.linkgraph import components_of_edges
+from mechgraph.modes.family import GENERIC, MEMBER_CLOSED, SPAN, Array, Family, Labelling, Member, common, span
+from mechgraph.modes.form import RodFamily
+from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, Equations, Leg, Linear, follow
+from mechgraph.numerics.linear import rank_of, singular_values
+
+SIX_TURNS = (
+    "Lee, Woernle and Hiller, A complete solution for the inverse kinematic problem of the general 6R robot manipulator, "
+    "J. Mech. Des. 113, 1991, page 481"
+)
+FORTY = (
+    "Mourrain, The 40 generic positions of a parallel robot, ISSAC 1993; Ronga and Vust, Stewart platforms without computer?, "
+    "Real Analytic and Algebraic Geometry, 1995"
+)
+SIXTEEN = (
+    "three joints on circles at given distances from each other: three equations of degree 2 in the half-angle tangents of two of "
+    "them each have 16 solutions or fewer (Bezout in a product of lines)"
+)
+LOOPS: tuple[tuple[int, str, int, str], ...] = (
+    (3, "RRR", 2, "two circles in a plane or on a sphere meet in two points"),
+    (3, "RRT", 2, "a circle and a line meet in two points"),
+    (3, "RTT", 1, "the sides of a triangle follow from their directions"),
+    (6, "RRRRRR", 16, SIX_TURNS),
+    (6, "RRRRRT", 16, f"{SIX_TURNS}; a slide is a turn about a far line"),
+)
+"""Dimension of the group, freedoms still unknown (R turns, T slides), the bound, and its source."""
+
+
+PLATFORMS: tuple[tuple[str, int, tuple[int, ...], int, str], ...] = (
+    ("R", 1, (), 2, "a circle and a sphere meet in two points"),
+    ("T", 1, (), 2, "a line and a sphere meet in two points"),
+    ("S", 3, (), 8, "three quadrics in the quaternion of a rotation meet in 8 points or fewer (Bezout)"),
+    ("TTTS", 6, (2, 2, 2), 16, SIXTEEN),
+    ("TTTS", 6, (), 40, FORTY),
+    ("TTS", 5, (), 40, f"{FORTY}; a point on a plane is on a rod from far away"),
+)
+"""What lets one body move against another (R turns, T slides, S is a ball), and rods between them: their number, how many have each joint
+of the one body in common, whatever their joints on the other (nothing where it does not matter), the bound, and its source."""
+TRIADS = (6, "a coupler curve, of degree six and threefold in the circular points, meets a circle in 12 - 6 others")
+"""The bound of two bodies in a plane joined by three links, and its source."""
+PLANE_MOTIONS = (3, 2)
+"""Dimensions of the group of plane motions and of its translations."""
+
+
+@dataclass(frozen=True)
+class Bound:
+    """At most so many assemblies, and who says so."""
+
+    count: int
+    source: str
+
+
+def bound(family: Family) -> Bound | None:
+    """The bound for a class, where the tables have one."""
+    return _of_platform(family) if isinstance(family, RodFamily) else _of_triad(family) or _of_loops(family)
+
+
+def _of_platform(family: RodFamily) -> Bound | None:
+    """The bound of two bodies joined by rods and one pair, those one between which all is driven."""
+    s = family.system
+    free = set(family.free.tolist())
+    columns = [set(range(s.first_column[k], s.first_column[k + 1])) for k in range(len(s.m.pairs))]
+    moving = [k for k, own in enumerate(columns) if not free.isdisjoint(own)]
+    body = components_of_edges(len(s.m.links), [ends for k, ends in enumerate(s.graph.ends) if k not in moving])
+    joined = {tuple(sorted(body[[a, b]].tolist())) for a, b in zip(s.points.a, s.points.b, strict=True)}
+    if len(moving) != 1 or not free.issuperset(columns[moving[0]]) or joined != {(0, 1)}:
+        return None
+    word = "".join(
+        "S" if step.holds_rotation else "R" if step.freedoms[0].turns else "T"
+        for step in s.m.pairs[moving[0]].type.steps
+    )
+    shared = [(), *(tuple(sorted(Counter(side.tolist()).values())) for side in np.split(family.joints, 2))]
+    for letters, rods, joints, count, source in PLATFORMS:
+        if letters in (word, word[::-1]) and rods == family.rods and joints in shared:
+            return Bound(count, source)
+    return None
+
+
+def _of_loops(family: Family) -> Bound | None:
+    """The product over loops solved one after the other, where the table has one for each of them."""
+    s = family.system
+    known = np.ones(s.n_freedoms, dtype=bool)
+    known[family.free] = False
+    if family.passive.shape[1]:
+        return None
+    left, count, sources = list(range(s.graph.n_loops)), 1, []
+    while left:
+        for loop in left:
+            columns = s.loop_columns[loop][0]
+            unknown = columns[~known[columns]]
+            entry = _entry(
+                family.loop_algebras[loop].shape[1], "".join("T" if s.is_length[c] else "R" for c in unknown)
+            )
+            if entry is not None:
+                break
+        else:
+            return None
+        count *= entry.count
+        if entry.source not in sources:
+            sources.append(entry.source)
+        known[unknown] = True
+        left.remove(loop)
+    return Bound(count, "; ".join(sources) or "no loop has to be closed")
+
+
+def _entry(dimension: int, letters: str) -> Bound | None:
+    """The bound of one loop, its freedoms in any order round it."""
+    turned = {letters[i:] + letters[:i] for i in range(len(letters))}
+    for group, known, count, source in LOOPS:
+        if group == dimension and (known in turned or known[::-1] in turned):
+            return Bound(count, source)
+    return None
+
+
+def _of_triad(family: Family) -> Bound | None:
+    """The bound of two bodies in a plane joined by three links; links between which all is driven are one."""
+    s, P = family.system, range(len(family.system.m.pairs))
+    free = set(family.free.tolist())
+    columns = [range(s.first_column[k], s.first_column[k + 1]) for k in P]
+    locked = [k for k in P if free.isdisjoint(columns[k])]
+    body = components_of_edges(len(s.m.links), [s.graph.ends[k] for k in locked])
+    joints: dict[int, list[int]] = {}
+    for k in P:
+        one, other = (int(body[link]) for link in s.graph.ends[k])
+        if k in locked:
+            continue
+        if s.is_length[columns[k]].any() or one == other:
+            return None
+        joints.setdefault(one, []).append(other)
+        joints.setdefault(other, []).append(one)
+    ends = {number for number, others in joints.items() if len(others) > 2}
+    legs = [others for number, others in joints.items() if number not in ends]
+    if len(ends) != 2 or len(legs) != 3 or any(set(others) != ends for others in legs):
+        return None
+    groups = {(h.shape[1], h.shape[1] - span(h[:3]).shape[1]) for h in family.loop_algebras}
+    return Bound(*TRIADS) if groups == {PLANE_MOTIONS} else None
+
+
+SAMPLES, SAMPLES_ALONG = 48, 16
+"""Members of a pencil that are sampled first, of one with turns and of one along an isotropic direction; then as many again, until they
+tell."""
+ENOUGH, PENCILS = 5, 4
+"""Members for every pole at which a pencil that does not tell is left for another one; pencils of which one has to tell."""
+MOST_TRACKS = 24_000
+"""Tracks over all of them, at most."""
+BY_POLE = 0.3
+"""Distance of samples from a pole, as part of that to the next one."""
+NEAREST = 1e-3
+"""The least that counts of the distance of two poles, as part of their size."""
+POLE_RANGE = 200.0
+"""Size of ``z`` or ``1 / z`` up to which poles are sampled."""
+PENCIL_SPREAD = 1.2
+"""Standard deviation of the imaginary part of ``phi``."""
+RATIONAL = 1e-11
+"""Singular value, as part of the largest, below which the Loewner matrix of a rational function ends."""
+ENDS = 1e4
+"""Ratio of two singular values, one after the other, at which they end; where they fade it is below 300."""
+POLES_TOLD = 1e-11
+"""Singular value, as part of the largest, down to which poles are told."""
+SPARE_VALUES = 4
+"""Singular values beyond the degree, at least."""
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A trace test over ``samples`` members: the sum is rational of ``degree``, or not known to be (-1).
+
+    ``last`` and ``beyond`` are the singular values of the Loewner matrix at the degree and after it, as parts of the largest.
+    """
+
+    degree: int
+    samples: int
+    last: float
+    beyond: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether no assembly is missing."""
+        return self.degree >= 0
+
+
+NOT_PASSED = Trace(-1, 0, 1.0, 1.0)
+"""No trace test was passed."""
+
+
+def trace_test(
+    equations: Equations,
+    base: Member,
+    x: Array,
+    rng: np.random.Generator,
+    progress: Callable[[str], None] | None = None,
+) -> Trace:
+    """The trace test of the assemblies ``x (nx, N)`` of a member."""
+    N, tracks = x.shape[1], 0
+    for _ in range(PENCILS):
+        pencil = _Pencil(equations, base, rng)
+        phi = pencil.anywhere(pencil.first, rng)
+        z, f, weights = np.zeros(0, dtype=complex), np.zeros(0, dtype=complex), np.zeros(0)
+        while (tracks := tracks + len(phi) * N) <= MOST_TRACKS:
+            if progress is not None:
+                progress(f"trace test: {N} tracks to each of {len(phi)} random mechanisms of the class")
+            new = pencil.sums(x, phi)
+            z, f, weights = (np.concatenate(pair) for pair in zip((z, f, weights), new, strict=True))
+            found = rational(z, f, weights)
+            if found.passed:
+                return found
+            poles = _poles(z, f, weights)
+            if len(z) > ENOUGH * len(poles):
+                break
+            phi = _beside(poles, rng)
+            phi = np.concatenate([phi, pencil.anywhere(max(pencil.first, len(z)) - len(phi), rng)])
+    return NOT_PASSED
+
+
+def rational(z: Array, f: Array, weights: Array) -> Trace:
+    """Whether a function with values ``f (n,)`` at ``z (n,)`` is rational, and of which degree; ``weights (n,)`` fall with rounding."""
+    if len(z) // 2 <= SPARE_VALUES:
+        return NOT_PASSED
+    loewner, _ = _loewner(z, f, weights)
+    sigma = np.linalg.svd(loewner, compute_uv=False)
+    sigma = np.concatenate([sigma[:1], sigma]) / sigma[0] if sigma[0] > 0 else np.ones(1)
+    ends = 1 + np.flatnonzero(
+        (sigma[1:-SPARE_VALUES] < RATIONAL) & (sigma[1:-SPARE_VALUES] * ENDS < sigma[: -SPARE_VALUES - 1])
+    )
+    if not ends.size:
+        return NOT_PASSED
+    at = int(ends[0])
+    return Trace(at - 1, len(z), float(sigma[at - 1]), float(sigma[at]))
+
+
+def _loewner(z: Array, f: Array, weights: Array) -> tuple[Array, Array]:
+    """The Loewner matrix of every other value against those between, and the shifted one, scaled alike."""
+    scale = weights / (1.0 + np.abs(f))
+    a, fa, wa = (v[::2, None] for v in (z, f, scale))
+    b, fb, wb = (v[1::2] for v in (z, f, scale))
+    over = wa * wb / (a - b)
+    return over * (fa - fb), over * (a * fa - b * fb)
+
+
+def _poles(z: Array, f: Array, weights: Array) -> Array:
+    """The poles that values tell."""
+    loewner, shifted = _loewner(z, f, weights)
+    U, sigma, Vt = np.linalg.svd(loewner)
+    rank = int((sigma > POLES_TOLD * sigma[0]).sum())
+    left, right = U[:, :rank].conj().T, Vt[:rank].conj().T
+    return np.linalg.eigvals((left @ shifted @ right) / sigma[:rank, None])
+
+
+def _beside(poles: Array, rng: np.random.Generator) -> Array:
+    """Two ``phi`` beside every pole that is not far away."""
+    poles = poles[(np.abs(poles) < POLE_RANGE) & (np.abs(poles) > 1.0 / POLE_RANGE)]
+    gaps = np.abs(poles[:, None] - poles)
+    np.fill_diagonal(gaps, np.abs(poles))
+    gap = np.clip(gaps.min(axis=1, initial=np.inf), NEAREST * np.abs(poles), np.abs(poles))
+    near = np.repeat(poles, 2) + BY_POLE * np.repeat(gap, 2) * np.exp(2j * np.pi * rng.random(2 * len(poles)))
+    return np.asarray(-1j * np.log(near))
+
+
+class _Pencil:
+    """Members of a class in which one marker of every loop has turned by ``phi`` about a line, and all rods have other lengths."""
+
+    def __init__(self, equations: Equations, base: Member, rng: np.random.Generator) -> None:
+        self.equations, self.family, self.base = equations, equations.family, base
+        s = self.family.system
+        P = len(s.m.pairs)
+        self.lines = np.zeros((6, len(self.family.bearers), 1), dtype=complex)
+        self.along = _isotropic(self.family)
+        self.first = SAMPLES if self.along is None else SAMPLES_ALONG
+        for chord, algebra in zip(s.chords.tolist(), self.family.loop_algebras, strict=True):
+            self.lines[:, P + chord, 0] = _line(
+                algebra if self.along is None else np.append(np.zeros(3), self.along)[:, None], rng
+            )
+        self.drive = self.family.lengths_of(_random(rng, len(base.drive)))[:, None]
+        self.c = _random(rng, 1)[0]
+        self.weights = _random(rng, len(self._told(self.family.here)))
+
+    def members(self, phi: Array) -> Member:
+        """Members at ``phi (n,)``; a line without a turn is a direction, along which it goes by ``z - 1``, as squares of rods do."""
+        slides = np.abs(self.lines[:3]).max(axis=0) < SPAN
+        turned = self.lines * np.where(slides, np.exp(1j * phi) - 1.0, phi)
+        markers = compose(pose_exp(self.family.in_links(turned)), self.base.markers)
+        return Member(markers, self.base.drive + self.drive * (np.exp(1j * phi) - 1.0))
+
+    @staticmethod
+    def anywhere(n: int, rng: np.random.Generator) -> Array:
+        """Random ``phi (n,)``."""
+        return np.asarray(rng.uniform(-np.pi, np.pi, n) + 1j * PENCIL_SPREAD * rng.normal(size=n))
+
+    def sums(self, x: Array, phi: Array) -> tuple[Array, Array, Array]:
+        """``z``, the sum and weights at pairs of members ``phi (n,)`` to both of which all tracks from ``x`` come."""
+        (n, N), members = (len(phi), x.shape[1]), self.members(phi)
+        leg = Leg(self.equations, self.base, members, np.repeat(np.arange(n), N))
+        tracked = follow(leg, np.tile(x, n), Care())
+        good = tracked.arrived.reshape(n, N).all(axis=1)
+        with np.errstate(all="ignore"):
+            here = leg.at(tracked.x, np.ones(n * N), np.arange(n * N)).here
+            g = (self.weights @ self._told(here)).reshape(n, N)
+            f = (1.0 / (g - self.c) if self.along is None else g).sum(axis=1)
+            size = np.abs(here.poses).max(axis=(0, 1, 2)).reshape(n, N).max(axis=1)
+        good &= np.isfinite(f)
+        good = np.repeat(good.reshape(-1, 2).all(axis=1), 2)
+        z = np.exp(1j * phi)
+        return z[good], f[good], (np.maximum(1.0, np.abs(z)) / size)[good]
+
+    def _told(self, here: Configuration) -> Array:
+        """Numbers ``(n, T)`` of which ``g`` is made."""
+        if self.along is None:
+            return _told(self.family, here)
+        poses = here.poses[:, :, self.family.settled_links]
+        return np.tensordot(self.along, poses, 1).reshape(-1, here.T)
+
+
+def _random(rng: np.random.Generator, n: int) -> Array:
+    return np.asarray(rng.normal(size=(n, 2)) @ [1.0, 1.0j])
+
+
+def _isotropic(family: Family) -> Array | None:
+    """An isotropic direction ``(3,)`` of the plane in which all loops move, and nothing else; None where they have none in common."""
+    algebras = family.loop_algebras
+    shared, plane = common(algebras), {h.shape[1] for h in algebras} == {3}
+    if family.points or family.idle.shape[1] or not plane or shared.shape[1] != 3:
+        return None
+    _, turns, Vt = np.linalg.svd(shared[:3])
+    return (shared @ Vt[1:].T)[3:] @ [1.0, 1.0j] if (turns > SPAN).sum() == 1 else None
+
+
+def _line(algebra: Array, rng: np.random.Generator) -> Array:
+    """A random turn ``(6,)`` about a line in an algebra ``(6, k)``; a direction where it has no turns."""
+    w, v = (algebra @ (rng.normal(size=(algebra.shape[1], 2)) @ [1.0, 0.5j])).reshape(2, 3)
+    if np.abs(w).max() < SPAN:
+        return np.concatenate([w, v])
+    return np.asarray(np.concatenate([w, v - w * (w @ v) / (w @ w)]) / np.sqrt(w @ w))
+
+
+def _told(family: Family, here: Configuration) -> Array:
+    """What tells assemblies apart ``(n, T)``: coordinates that no passive motion changes, and poses of links that these do not settle."""
+    s = family.system
+    angles, lengths = (np.setdiff1d(rows, family.rows) for rows in family.settled_rows)
+    settled = np.isin(s.single_rows, np.concatenate([*family.settled_rows]))
+    first = s.first_column
+    rigid = [s.graph.ends[k] for k in range(len(s.m.pairs)) if settled[first[k] : first[k + 1]].all()]
+    component = components_of_edges(len(s.m.links), rigid)
+    reached = np.flatnonzero(component == component[s.graph.frame])
+    poses = here.poses[:, :, np.setdiff1d(family.settled_links, reached)]
+    return np.concatenate([np.exp(1j * here.x[angles]), here.x[lengths], poses.reshape(-1, here.T)])
+
+
+MISSED, MISSED_AGAIN = 1e-4, 1e-6
+"""Chance of an assembly having been missed at which loops of members end, where every permutation is as likely as any other: at the
+first member, and at the one that is kept."""
+MOST_FOUND = 1200
+"""Assemblies of one member from which on they are not looked for any further."""
+LOOP_ROUNDS, MOST_TRACKED = 60, 60_000
+"""Rounds of loops at a member, and tracks in all, after which they are not either."""
+BATCH = 48
+"""Tracks followed together at least, of as many loops as it takes."""
+CANDIDATES = 6
+"""Members of which the best one is kept."""
+ATTEMPTS = 8
+"""Random members tried until one is regular."""
+ONE_ASSEMBLY = 1e-6
+"""Difference of link poses, against their size, up to which two assemblies are one."""
+
+
+class Irregular(Exception):
+    """Random members of a class are not closed by regular equations: its relations are not those of the mechanism."""
+
+
+@dataclass(frozen=True)
+class StartSet:
+    """All assemblies ``x (nx, N)`` known of a member, and the mixing of its rows.
+
+    ``loops`` is the number of loops of members that brought no further assembly, ``chance`` that of one having been missed by them, were
+    every permutation as likely; ``lost`` of the tracks ``followed`` did not come to the end of their leg. ``trace`` is the trace test,
+    which is left out where a bound is met.
+    """
+
+    member: Member
+    x: Array
+    mixing: Array | None
+    loops: int
+    chance: float
+    lost: int
+    followed: int
+    whole: bool
+    trace: Trace
+
+    def fits(self, family: Family) -> bool:
+        """Whether it is closed for a class."""
+        s = family.system
+        if self.member.markers.shape != family.target.shape or self.x.ndim != 2 or len(self.x) != s.n_state:
+            return False
+        if (self.mixing is None) != family.whole or not np.isfinite(self.x).all():
+            return False
+        here = Configuration(family.system_of(self.member), self.x)
+        size = np.maximum(1.0, np.abs(here.poses).max(axis=(0, 1, 2)))
+        return bool((here.closure < MEMBER_CLOSED * size).all())
+
+
+def fingerprints(family: Family, member: Member, x: Array) -> Array:
+    """What tells assemblies of a member apart ``(n, V)``, see ``Family.prints``."""
+    return family.prints(Configuration(family.system_of(member), x))
+
+
+def distinct(poses: Array, known: Array | None = None, least: Array | None = None) -> Array:
+    """Places of assemblies that are new, each once: poses ``(n, V)`` that differ from those ``known (n, N)`` and before.
+
+    ``least (V,)`` are differences, against their size, up to which they are one.
+    """
+    have = [] if known is None else list(known.T)
+    out = []
+    for i, p in enumerate(poses.T):
+        if not np.isfinite(p).all():
+            continue
+        size = max(1.0, float(np.abs(p).max()))
+        one = ONE_ASSEMBLY if least is None else least[i]
+        if all(np.abs(p - q).max() > one * size for q in have):
+            have.append(p)
+            out.append(i)
+    return np.array(out, dtype=np.intp)
+
+
+def start_set(family: Family, rng: np.random.Generator, progress: Callable[[str], None] | None = None) -> StartSet:
+    """All assemblies of a random member of a class.
+
+    Raises
+    ------
+    Irregular
+        where random members are not closed by regular equations.
+    """
+    for _ in range(ATTEMPTS):
+        closed = family.random_closed(rng)
+        if closed is None:
+            continue
+        member, x = closed
+        equations = Equations(family, family.mixing(rng))
+        leg = Leg(equations, member, member)
+        here = leg.at(x[:, None], np.zeros(1), np.zeros(1, dtype=np.intp))
+        if rank_of(singular_values(here.J[:, :, 0]), GENERIC) == family.rank and not _told_by_idle(family, here):
+            return _permuted(equations, member, x, rng, progress)
+    raise Irregular
+
+
+def _told_by_idle(family: Family, here: Linear) -> bool:
+    """Whether motions that the equations leave free move what tells assemblies apart: such members have not the passive motions."""
+    s, idle = family.system, here.idle()[0].conj()
+    rates = np.zeros((s.n_freedoms, len(idle)), dtype=complex)
+    rates[family.free] = idle.T
+    moved = [here.here.link_twists(rate[:, None])[:, family.settled_links] for rate in rates.T]
+    single = np.flatnonzero(np.isin(s.single_rows, np.concatenate(family.settled_rows)))
+    return bool(np.abs(np.array(moved)).max(initial=0.0) > SPAN or np.abs(rates[single]).max(initial=0.0) > SPAN)
+
+
+def _permuted(
+    equations: Equations, base: Member, x: Array, rng: np.random.Generator, progress: Callable[[str], None] | None
+) -> StartSet:
+    """The assemblies to which loops of members lead from one, until more loops than chance can explain bring none.
+
+    They begin at one member and then at another: what is hard to reach at the first, large numbers in its poses, is not at the second.
+    Where a bound is met, no loop could bring a further one.
+    """
+    known = bound(equations.family)
+    group = _Group(equations, base, x[:, None], MOST_FOUND if known is None else known.count)
+    group.grow(MISSED, rng, progress)
+    group.move(*_tame(equations, group.base, group.x, rng))
+    group.grow(MISSED_AGAIN, rng, progress)
+    N = group.x.shape[1]
+    met = known is not None and known.count == N
+    whole = met or (N < MOST_FOUND and group.chance <= MISSED_AGAIN)
+    test = whole and not met
+    trace = trace_test(equations, group.base, group.x, rng, progress) if test else NOT_PASSED
+    return StartSet(
+        group.base, group.x, equations.mixing, group.quiet, group.chance, group.lost, group.followed, whole, trace
+    )
+
+
+class _Group:
+    """Assemblies ``x (nx, N)`` known of a member ``base``, and the loops that brought no further one."""
+
+    def __init__(self, equations: Equations, base: Member, x: Array, most: int) -> None:
+        self.equations, self.most, self.lost, self.followed = equations, most, 0, 0
+        self.move(base, x)
+
+    def move(self, base: Member, x: Array) -> None:
+        """Go on at another member."""
+        self.base, self.x, self.known = base, x, fingerprints(self.equations.family, base, x)
+        self.quiet, self.chance = 0, 1.0
+
+    def grow(self, missed: float, rng: np.random.Generator, progress: Callable[[str], None] | None) -> None:
+        """Loops until the chance of one having been missed is small."""
+        family = self.equations.family
+        for _ in range(LOOP_ROUNDS):
+            if (N := self.x.shape[1]) >= self.most or self.chance <= missed or self.followed >= MOST_TRACKED:
+                break
+            if progress is not None:
+                progress(f"{N} assemblies of a random member, {self.quiet} loops without a further one")
+            # so many that where none brings a further one they are enough, and no fewer than are followed at the cost of one
+            enough = int(np.ceil(np.log(missed / self.chance) / -np.log(N + 1.0)))
+            loops = max(min(enough, TRACKS_TOGETHER // N), BATCH // N, 1)
+            there = self._round(family, loops, rng)
+            poses = fingerprints(family, self.base, there)
+            new = distinct(poses, self.known)
+            # a further one stays outside where the loop leaves it where it is, or where its track is lost
+            outside = min(1.0 / (N + 1.0) + (1.0 - there.shape[1] / (N * loops)), 1.0)
+            self.quiet, self.chance = (0, 1.0) if new.size else (self.quiet + loops, self.chance * outside**loops)
+            self.x = np.concatenate([self.x, there[:, new]], axis=1)
+            self.known = np.concatenate([self.known, poses[:, new]], axis=1)
+
+    def _round(self, family: Family, loops: int, rng: np.random.Generator) -> Array:
+        """Where all assemblies come to on several loops through two random members each."""
+        corners = [Member.joined([family.random_member(rng) for _ in range(loops)]) for _ in range(2)]
+        there, which = np.tile(self.x, loops), np.repeat(np.arange(loops), self.x.shape[1])
+        for begin, end in pairwise([self.base, *corners, self.base]):
+            tracked = follow(Leg(self.equations, begin, end, which), there, Care())
+            self.lost += int((~tracked.arrived).sum())
+            self.followed += there.shape[1]
+            there, which = tracked.x[:, tracked.arrived], which[tracked.arrived]
+        return there
+
+
+def _tame(equations: Equations, base: Member, x: Array, rng: np.random.Generator) -> tuple[Member, Array]:
+    """Of some random members that with the smallest numbers in its assemblies, from which tracks are the least likely to be lost.
+
+    Assemblies ``x (nx, N)`` that come to one there are one, which large numbers had told apart by their rounding.
+    """
+    family, N = equations.family, x.shape[1]
+    members = [family.random_member(rng) for _ in range(CANDIDATES)]
+    which = np.repeat(np.arange(CANDIDATES), N)
+    tracked = follow(Leg(equations, base, Member.joined(members), which), np.tile(x, CANDIDATES), Care())
+    keep, found = np.arange(N), []
+    for number, member in enumerate(members):
+        mine = which == number
+        there, poses = tracked.x[:, mine], fingerprints(family, member, tracked.x[:, mine])
+        arrived = np.flatnonzero(tracked.arrived[mine])
+        keep = np.setdiff1d(keep, np.delete(arrived, distinct(poses[:, arrived])))
+        found.append((member, there, poses, tracked.arrived[mine]))
+    best, least = (base, x[:, keep]), np.abs(fingerprints(family, base, x[:, keep])).max()
+    for member, there, poses, came in found:
+        size = np.abs(poses[:, keep]).max() if came[keep].all() else np.inf
+        if size < least:
+            best, least = (member, there[:, keep]), size
+    return best
+
+
+PACKED = Path(__file__).with_name("start-sets.npz")
+"""Start sets that come with the package, one after the other: names are ``key/array``."""
+START_SET_VERSION = 6
+"""Of the files and of what start sets mean."""
+
+
+def key(labelling: Labelling) -> str:
+    """What a start set serves for: the topology; where relations are kept, the geometry too."""
+    return f"{START_SET_VERSION}-{labelling.key}"
+
+
+def kept(family: Family) -> StartSet | None:
+    """The start set of a class, where one is kept and closed: the user's, or else that of the package."""
+    labelling = Labelling(family)
+    return _read(cache_folder() / f"start-{key(labelling)}.npz", "", labelling) or packed(labelling)
+
+
+def packed(labelling: Labelling) -> StartSet | None:
+    """The start set of a class that came with the package."""
+    return _read(PACKED, f"{key(labelling)}/", labelling)
+
+
+def _read(file: Path, prefix: str, labelling: Labelling) -> StartSet | None:
+    try:
+        with file.open("rb") as handle, np.load(handle, allow_pickle=False) as f:
+            loops, lost, followed, degree, samples = f[prefix + "counts"].tolist()
+            chance, last, beyond = f[prefix + "sizes"].tolist()
+            member, x = labelling.taken(*(f[prefix + name] for name in ("markers", "squares", "x")))
+        trace = Trace(degree, samples, last, beyond)
+        # any combinations of the rows will do that are not special
+        mixing = labelling.family.mixing(np.random.default_rng(0))
+        found = StartSet(member, x, mixing, loops, chance, lost, followed, True, trace)
+        return found if found.fits(labelling.family) else None
+    except (OSError, ValueError, KeyError, IndexError, EOFError, RuntimeError, zipfile.BadZipFile, TypeError):
+        return None
+
+
+def arrays(labelling: Labelling, start: StartSet) -> dict[str, Any]:
+    """A start set as arrays by name."""
+    return {
+        **labelling.ordered(start.member, start.x),
+        "sizes": np.array([start.chance, start.trace.last, start.trace.beyond]),
+        "counts": np.array([start.loops, start.lost, start.followed, start.trace.degree, start.trace.samples]),
+    }
+
+
+def keep(family: Family, start: StartSet) -> None:
+    """Keep a start set, as far as the folder allows."""
+    labelling = Labelling(family)
+    try:
+        cache_folder().mkdir(parents=True, exist_ok=True)
+        with whole_file(cache_folder() / f"start-{key(labelling)}.npz") as temporary, temporary.open("xb") as handle:
+            np.savez_compressed(handle, **arrays(labelling, start))
+    except (OSError, RuntimeError, MechgraphError):
+        return
