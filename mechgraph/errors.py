@@ -66,7 +66,19 @@ def shortened(text: str) -> str:
 
 
 class MechgraphError(Exception):
-    """The base of every error that mechgraph raises on purpose; it pickles and copies with the data that it carries."""
+    """Base of all errors that mechgraph raises on purpose; it pickles and copies with its data.
+
+    Parameters
+    ----------
+    message : str
+        What happened, where, and what to do.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> issubclass(mg.ReachError, mg.MechgraphError)
+    True
+    """
 
     def __init__(self, message: str) -> None:
         super().__init__(visible(message))
@@ -77,12 +89,23 @@ class MechgraphError(Exception):
 
 
 class DeclarationError(MechgraphError):
-    """All faults of a declaration (or of a call's arguments), collected and raised once.
+    """Every fault of a declaration, or of the arguments of a call, in one error.
 
-    Attributes
+    Parameters
     ----------
-    subject : what was declared, e.g. ``mechanism 'four-bar'``.
-    faults : one line each: what, where, the value, what was expected, what to do. The message lists the first of them.
+    subject : str
+        What was declared, e.g. ``mechanism 'four-bar'``.
+    faults : sequence of str
+        One line each: where, value, expected, what to do. The message lists the first of them.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> try:
+    ...     mg.Mechanism("bad", pairs=[mg.Pair("A", "X", "frame", "crank")])
+    ... except mg.DeclarationError as error:
+    ...     print(len(error.faults), error.subject)
+    1 mechanism 'bad'
     """
 
     def __init__(self, subject: str, faults: Sequence[str]) -> None:
@@ -95,11 +118,20 @@ class DeclarationError(MechgraphError):
 
 
 class ShapeError(DeclarationError):
-    """A function given for a curve or a surface raised (that is the cause of the error), or returned what is none.
+    """A function given for a curve or surface raised (its cause), or returned unusable values.
 
-    Attributes
+    Parameters
     ----------
-    text : what it did, and at which parameters.
+    text : str
+        What it did, and at which parameters.
+    pair : str, optional
+        Name of the pair.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> issubclass(mg.ShapeError, mg.MechgraphError)
+    True
     """
 
     def __init__(self, text: str, pair: str | None = None) -> None:
@@ -112,11 +144,37 @@ class ShapeError(DeclarationError):
 
 
 class MechgraphWarning(UserWarning):
-    """A result that holds only under an assumption, e.g. that something holds a passive freedom that carries load."""
+    """A result holds only under an assumption, e.g. that something holds a load-bearing passive freedom.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> import warnings
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("ignore", mg.MechgraphWarning)
+    ...     s = mg.solve(mg.load("four-bar"), {"A": 0.5})
+    """
 
 
 class FileError(MechgraphError):
-    """A file cannot be read or written; ``path`` says which."""
+    """A file cannot be read or written.
+
+    Parameters
+    ----------
+    path : str or path
+        The file.
+    reason : str
+        Why.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> try:
+    ...     mg.load("no-such-file.toml")
+    ... except mg.FileError as error:
+    ...     print(error.path)
+    no-such-file.toml
+    """
 
     def __init__(self, path: str | PathLike[str], reason: str) -> None:
         self.path = str(path)
@@ -125,7 +183,21 @@ class FileError(MechgraphError):
 
 
 class ContentError(DeclarationError, FileError):
-    """Faults in the content of a file that can be read: those of a declaration, and where they stand."""
+    """Faults in the content of a readable file; a FileError and a DeclarationError.
+
+    Parameters
+    ----------
+    path : str or path
+        The file.
+    found : DeclarationError
+        The faults, with their places.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> issubclass(mg.ContentError, (mg.FileError)), issubclass(mg.ContentError, mg.DeclarationError)
+    (True, True)
+    """
 
     def __init__(self, path: str | PathLike[str], found: DeclarationError) -> None:
         self.path, self.reason = str(path), "its content is at fault"
@@ -136,10 +208,23 @@ class ContentError(DeclarationError, FileError):
 class AssemblyError(MechgraphError):
     """The loops cannot be closed.
 
-    Attributes
+    Parameters
     ----------
-    residual : the smallest closure error found (largest of angle and length / L over the loops).
-    best : the pair coordinates at which it was found, as a mapping freedom -> value.
+    message : str
+        What happened.
+    residual : float
+        Smallest closure error found: largest of angle [rad] and length / L over the loops.
+    best : dict
+        Pair coordinates at which it was found, freedom -> value.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> try:
+    ...     mg.assemble(mg.chain("RRRR", length=[1, 1, 1, 5]))
+    ... except mg.AssemblyError as error:
+    ...     print(round(error.residual, 3))
+    0.769
     """
 
     def __init__(self, message: str, residual: float, best: dict[str, float]) -> None:
@@ -164,22 +249,77 @@ class PathError(MechgraphError):
 
 
 class ReachError(PathError):
-    """A position of the drivers that the mechanism cannot take on the branch that it is on."""
+    """A position is not reachable on the present branch.
+
+    Parameters
+    ----------
+    message : str
+        What happened.
+    value : dict
+        Driver values reached.
+    solution : Solution, optional
+        The positions before.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> try:
+    ...     mg.kinematics(mg.load("rcsr"), {"O1": [2.6, 3.8]})
+    ... except mg.ReachError as error:
+    ...     print(round(error.value["O1.Rz"], 4))
+    3.5804
+    """
 
 
 class DeadPointError(PathError):
-    """At this position the drivers do not determine the motion (dead point or change point).
+    """The drivers do not determine the motion at this position (dead point or change point).
 
-    ``branches``: of a change point the branches that meet there, each as a mapping freedom -> rate for a unit rate of the first driver.
+    Parameters
+    ----------
+    message : str
+        What happened.
+    value : dict
+        Driver values reached.
+    solution : Solution, optional
+        The positions before.
+
+    Attributes
+    ----------
+    branches : tuple of dict
+        Of a change point, the branches that meet there: freedom -> rate for a unit rate of the first driver.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> m = mg.load("slider-crank").replace(drives=["D"])
+    >>> try:
+    ...     mg.solve(m, {"D": [0.0, 0.5]})
+    ... except (mg.DeadPointError, mg.ReachError) as error:
+    ...     print(sorted(error.value))
+    ['D.Tz']
     """
 
     branches: tuple[dict[str, float], ...] = ()
 
 
 class IndeterminateError(MechgraphError):
-    """A freedom is neither driven nor passive, or drivers contradict each other.
+    """A freedom is neither driven nor passive, or the motions of the drivers conflict.
 
-    ``report`` is the determinacy report of the position at which this was seen.
+    Parameters
+    ----------
+    message : str
+        What happened.
+    report : DeterminacyReport, optional
+        The report at that position.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> try:
+    ...     mg.solve(mg.load("four-bar").replace(drives=[]), {})
+    ... except mg.IndeterminateError as error:
+    ...     print(error.report.mobility)
+    1
     """
 
     def __init__(self, message: str, report: Any = None) -> None:
@@ -188,7 +328,27 @@ class IndeterminateError(MechgraphError):
 
 
 class ResponseError(MechgraphError):
-    """A motion in time cannot be followed to its end; ``solution`` is the Response so far, or None."""
+    """A motion in time cannot be integrated to its end.
+
+    Parameters
+    ----------
+    message : str
+        What happened, and when.
+    solution : Response, optional
+        The response so far.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> pin = mg.Pair("A", "R", "frame", "bob", point=(0, 0, 0), axis=(0, 0, 1))
+    >>> push = mg.ForceLaw("A", law=lambda x, v, t: v**3)
+    >>> bob = mg.Mechanism("bob", [mg.Link("frame"), mg.Link("bob", 1.0, (1, 0, 0))], [pin], loads=[push])
+    >>> try:
+    ...     mg.respond(bob, (0, 10), rates={"A": 1.0})  # v = 1 / sqrt(1 - 2 t)
+    ... except mg.ResponseError as error:
+    ...     print(round(float(error.solution.t[-1]), 6))
+    0.5
+    """
 
     def __init__(self, message: str, solution: Any = None) -> None:
         self.solution = solution
@@ -196,7 +356,33 @@ class ResponseError(MechgraphError):
 
 
 class StudyError(MechgraphError):
-    """A study could not be finished; ``study`` is the Study, in which the variants that were not come to are not solved."""
+    """A study could not be finished.
+
+    Parameters
+    ----------
+    message : str
+        What happened.
+    study : Study, optional
+        The variants that were solved.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> def stop(done, of):
+    ...     raise ValueError("enough")
+    >>> try:
+    ...     mg.study(
+    ...         mg.load("four-bar"),
+    ...         {"crank.mass": [0.03]},
+    ...         "A.effort",
+    ...         sampling="grid",
+    ...         motions={"A": 0.5},
+    ...         progress=stop,
+    ...     )
+    ... except mg.StudyError as error:
+    ...     print(error)
+    study of 'four-bar': progress raised ValueError: enough
+    """
 
     def __init__(self, message: str, study: Any = None) -> None:
         self.study = study
@@ -204,7 +390,19 @@ class StudyError(MechgraphError):
 
 
 class MissingExtraError(MechgraphError, ImportError):
-    """An optional package is needed; the message names the extra to install."""
+    """An optional package is not installed; the message names the extra to install.
+
+    Parameters
+    ----------
+    package, extra : str
+        Names of the package and of the extra.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> print(mg.MissingExtraError("matplotlib", "plot"))
+    this needs matplotlib: pip install 'mechgraph[plot]'
+    """
 
     def __init__(self, package: str, extra: str) -> None:
         self.package = package

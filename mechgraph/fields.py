@@ -228,12 +228,14 @@ class FieldFormat:
             return " or ".join(both).replace("1/", "rad/")
         return both[0] if self.degrees or self.slide != PURE else ""
 
-    @property
-    def told(self) -> str:
-        """The field in a line of a docstring."""
-        kind = " or ".join(map(repr, self.choices)) or self.kind.words
-        default = f" (left out: {self.default})" if self.default else ""
-        return f"{kind}{self.unit and f' [{self.unit}]'}; {self.meaning}{default}."
+    def told(self, name: str, usual: Any) -> list[str]:
+        """The field as a parameter in a docstring, with the default that stands in the class, ``NEEDED`` for none."""
+        kind = f"{{{', '.join(map(repr, self.choices))}}}" if self.choices else self.kind.words or "value"
+        plain = f"{usual:.6g}" if isinstance(usual, float) else repr(usual)
+        default = self.default or ("" if usual is NEEDED or usual is None else plain)
+        meaning = f"{self.meaning[:1].upper()}{self.meaning[1:]}{self.unit and f' [{self.unit}]'}."
+        fallback = default and f" Default: {default.rstrip('.')}."
+        return [f"    {name} : {kind}", f"        {meaning}{fallback}"]
 
     def fault(self, value: Any, what: str) -> str | None:
         """What is wrong with a value, or None."""
@@ -271,8 +273,15 @@ class Formatted:
         cls._numeric = tuple(name for name, about in cls.formats.items() if about.kind.numeric)
         cls._defaults = tuple(getattr(cls, name, NEEDED) for name in cls.formats)
         if cls.__doc__ and cls.formats and "Parameters\n" not in cls.__doc__:
-            told = [f"    {name} : {about.told}" for name, about in cls.formats.items()]
-            cls.__doc__ = "\n".join([cls.__doc__.rstrip(), "", "    Parameters", "    ----------", *told, "    "])
+            told = [
+                line
+                for (name, about), usual in zip(cls.formats.items(), cls._defaults, strict=True)
+                for line in about.told(name, usual)
+            ]
+            words, heading, examples = cls.__doc__.rstrip().partition("\n\n    Examples\n")
+            cls.__doc__ = (
+                "\n".join([words, "", "    Parameters", "    ----------", *told]) + heading + examples + "\n    "
+            )
 
     def __repr__(self) -> str:
         """The fields that differ from what they are where they are left out."""

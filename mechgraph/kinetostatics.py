@@ -459,7 +459,30 @@ def kinematics(
     engine: MotionEngineName = "auto",
     tol: float | None = None,
 ) -> Solution:
-    """Positions, velocities and accelerations of all pairs and links, without forces; see ``solve``."""
+    """Compute positions, velocities and accelerations of all pairs and links, without forces.
+
+    Parameters
+    ----------
+    m, motions, on_reach, engine, tol
+        As in ``solve``.
+
+    Returns
+    -------
+    Solution
+        Without forces.
+
+    Raises
+    ------
+    DeclarationError, AssemblyError, ReachError, DeadPointError, IndeterminateError
+        As in ``solve``.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> s = mg.kinematics(mg.load("four-bar"), {"A": mg.Motion(0.0, velocity=10.0)})
+    >>> s["D"].velocity.round(4)
+    array([-3.0435])
+    """
     return _solve(m, motions, on_reach, Options(None, "nan", engine), tol=tol)
 
 
@@ -477,35 +500,63 @@ def solve(
     tol: float | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Solution:
-    """Driver efforts and all reactions for given driver motion (kinetostatics; statics where the rates are zero).
+    """Compute driver efforts and reactions for prescribed driver motion (inverse dynamics; statics at zero rates).
+
+    Closes the loops along the path from ``start`` (``T_b = T_a A D(q) B^-1`` around every loop), solves the rates ``J q' = 0``, and then
+    d'Alembert's equations of every link, ``sum w - (I V' + V x* I V) + w_applied = 0``.
 
     Parameters
     ----------
-    motions : driver -> ``Motion``, or positions at zero rates; shapes broadcast, the last axis is followed as a path from
-        ``start``, other axes are independent cases. Left out where the drives carry their motion. Beside freedoms it may name a point
-        of a link (``"bucket.tip"``: positions ``(..., 3)``), a link (poses ``(..., 4, 4)``; rates: its twist and that one's rate
-        ``(..., 6)``) or one coordinate of these: ``"bucket.tip.Tz"``, ``"bucket.tip.T(1,0,1)"`` along a direction, ``"platform.Rz"``
-        of the turns about x, the new y and the new z.
-    actuate : freedoms in which the unknown efforts stand, as many as independent motions are prescribed; left out, they stand where
-        motion is prescribed. Where these freedoms rest while the mechanism moves, forces are NaN (status "actuators at dead point").
-    method : ``"loop_wrench"`` (one unknown wrench a loop), ``"newton_euler"`` (all reaction components and efforts at once) or
-        ``"printed"`` (exactly the system that ``formulate(m)`` prints, by sparse LU position by position; the slowest).
-    loads : replace the declared ones.
-    redundant : ``"nan"`` for components that are not unique, or ``"minimum_norm"``: the least ``sum |F|^2 + |M / L|^2`` of all reactions,
-        moments about the pair points, L the mean radius of the mechanism. That is one assumption of many: every pair as stiff as every
-        other, links rigid, nothing strained at assembly. It is the same in any unit and frame.
-    on_reach : ``"raise"`` or ``"flag"`` (NaN rows, see ``Solution.status``).
-    engine : ``"dense"`` or ``"sparse"`` linear algebra of numpy, ``"compiled"``: the kernel in C, built at first use, a state at a time; or
-        ``"auto"``: the kernel where it was installed or built before and serves, else the faster one for the size. The values are the
-        same. What the kernel refuses on a path (a change point, a dead point, an end of the reach near by) numpy follows.
-    tol : accuracy to which directions (radians) and distances (over L, the mean radius) are meant; left out, that of the mechanism, or
-        exact. What is solved is ``m.snapped(tol)``; ``checks.closure`` is that of the geometry as declared, and a position at which it
-        exceeds ``tol`` is not solved (status "beyond tolerance").
-    progress : called with the numbers of positions done and of all, block by block, once the motion was followed.
+    m : Mechanism
+        The mechanism.
+    motions : mapping of str to Motion or array_like, optional
+        Driver -> ``Motion``, or positions ``(...)`` [rad, length] at zero rates. Shapes broadcast; the last axis is a path from
+        ``start``, other axes are independent cases. Default: the motions stored with the drives. Keys may also name a point
+        (``"bucket.tip"``: positions ``(..., 3)``), a link (poses ``(..., 4, 4)``, rates: twist and its rate ``(..., 6)``) or a
+        coordinate of these: ``"bucket.tip.Tz"``, ``"bucket.tip.T(1,0,1)"`` along a direction, ``"platform.Rz"`` of the rotations
+        about x, the new y and the new z.
+    actuate : str or iterable of str, optional
+        Freedoms in which actuators act, one per independent prescribed motion. Default: those with prescribed motion. If they are
+        stationary while the mechanism moves, forces are NaN (status "actuators at dead point").
+    method : {"loop_wrench", "newton_euler", "printed"}
+        One unknown wrench per loop; all reaction components and efforts at once; or the system that ``formulate(m)`` prints (slowest).
+    loads : iterable of load, optional
+        Replace the declared loads.
+    redundant : {"nan", "minimum_norm"}
+        Value of components that are not unique: NaN, or the least ``sum |F|^2 + |M / L|^2``, moments about the pair points. The latter
+        assumes equal stiffness of all pairs, rigid links and no preload.
+    on_reach : {"raise", "flag"}
+        Unreachable positions: raise, or return NaN rows and ``Solution.status``.
+    engine : {"auto", "dense", "sparse", "compiled"}
+        Linear algebra of numpy, or the kernel in C (built at first use). ``"auto"`` takes the kernel if it is installed or built and
+        serves, else the faster one for the size. The values are the same.
+    tol : float, optional
+        Accuracy of directions [rad] and distances (relative to L). mechgraph solves ``m.snapped(tol)``; ``checks.closure`` is that of
+        the declared geometry, and positions at which it exceeds ``tol`` are not solved. Default: that of the mechanism, or exact.
+    progress : callable, optional
+        Called with the numbers of positions done and of all.
+
+    Returns
+    -------
+    Solution
 
     Raises
     ------
-    DeclarationError, AssemblyError, ReachError, DeadPointError, IndeterminateError
+    DeclarationError
+        Invalid arguments; all of them.
+    AssemblyError
+        The loops cannot be closed near ``start``.
+    ReachError, DeadPointError
+        A position is not reachable, or the drivers do not determine the motion there; ``error.solution`` has the positions before.
+    IndeterminateError
+        A freedom is neither driven nor passive, or prescribed motions conflict.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> s = mg.solve(mg.load("four-bar"), {"A": 0.5})
+    >>> round(float(s["B"].components["Fx"]), 4)
+    -2.7116
     """
     if loads is not None:
         m = m.replace(loads=loads)
@@ -516,14 +567,38 @@ def solve(
 def assemble(
     m: Mechanism, values: Mapping[str, float] | None = None, guess: Mapping[str, Any] | None = None
 ) -> Mechanism:
-    """The same mechanism with ``start`` set to closed coordinates at the given values of some freedoms.
+    """Return the mechanism assembled at the given joint values.
 
-    From ``start`` the named freedoms move to their values in small steps with the loops closed, so that the branch is kept; from a
-    ``guess`` the loops are closed directly.
+    From ``start`` the named freedoms move to their values in small steps with closed loops, so the branch is kept. From a ``guess``
+    the loops are closed directly.
+
+    Parameters
+    ----------
+    m : Mechanism
+        The mechanism.
+    values : mapping of str to float, optional
+        Freedom -> value [rad, length].
+    guess : mapping of str to float, optional
+        Pair coordinates from which Newton's method starts.
+
+    Returns
+    -------
+    Mechanism
+        With ``start`` set to the closed coordinates.
 
     Raises
     ------
-    AssemblyError, ReachError
+    AssemblyError
+        The loops cannot be closed.
+    ReachError
+        A value is not reachable on this branch.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> m = mg.assemble(mg.load("four-bar"), {"A": 0.5})
+    >>> {name: round(value, 4) for name, value in m.start.items()}
+    {'A.Rz': 0.5, 'B.Rz': -0.4996, 'C.Rz': 0.1626, 'D.Rz': -0.163}
     """
     system, x = assembled_at(m, {} if values is None else values, guess)
     wanted = {m.full_name(name): float(m.in_own_units(name, value)) for name, value in (values or {}).items()}

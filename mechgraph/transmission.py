@@ -38,9 +38,21 @@ UNMOVED = 1e-12
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Transmission(Shown):
-    """How well ``drivers`` move the freedom ``output`` at the positions of a solution; NaN where they cannot hold it.
+    """How well ``drivers`` move the freedom ``output`` at the positions of a solution. Returned by ``transmission``.
 
-    ``index (...)``: 1 where all that is transmitted moves the output, 0 where nothing of it does.
+    Attributes
+    ----------
+    drivers, output : tuple of str, str
+        Full names of the freedoms.
+    index : (...) array
+        1 if all that is transmitted moves the output, 0 if nothing does; NaN if the drivers cannot hold it.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> s = mg.solve(mg.load("four-bar"), {"A": [0.0, 1.0]})
+    >>> mg.transmission(s, "D").index.round(3)
+    array([0.938, 0.997])
     """
 
     solution: Solution
@@ -87,17 +99,34 @@ class TransmissionData:
 
 @door
 def transmission(s: Solution, output: str, driver: str | None = None) -> Transmission:
-    """How well the drivers move an output at all positions of a solution.
+    """Compute transmission index and angle of an output over a solution.
+
+    The index is the power that the transmitted wrench does on the output, over the most that it could do; for one force ``sin mu``.
 
     Parameters
     ----------
-    output : a single freedom, ``"D"`` or ``"C.Tz"``, of a pair of the output link and the link on which it is guided.
-    driver : the freedom that moves it, where it is another than those that take the efforts of the solution.
+    s : Solution
+        A solution.
+    output : str
+        A single freedom, ``"D"`` or ``"C.Tz"``, of the pair of the output link and the link that guides it.
+    driver : str, optional
+        The input freedom. Default: those that take the efforts of the solution.
+
+    Returns
+    -------
+    Transmission
 
     Raises
     ------
     DeclarationError
-        for an output that is no freedom, or is the driver itself.
+        ``output`` is not a freedom, or is the driver.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> s = mg.solve(mg.load("four-bar"), {"A": [0.0, 1.0]})
+    >>> mg.transmission(s, "D").transmission_angle.round(4)
+    array([1.2168, 1.4986])
     """
     m = s.mechanism
     named = {"output": output} if driver is None else {"output": output, "driver": driver}

@@ -231,5 +231,6 @@ def test_help_of_what_has_fields_tells_them_once() -> None:
         "Line(*, frame='minimizing', guide=None, point=(0.0, 0.0, 0.0), direction=(0.0, 0.0, 1.0), ends_at=None)"
         in shown
     )
-    assert "point : 3 numbers [L]; where the arc length is zero (left out: 0)." in shown
+    told = " ".join(shown.replace("|", "").split())
+    assert "point : 3 numbers Where the arc length is zero [L]. Default: 0. direction :" in told
     assert pydoc.plain(pydoc.render_doc(mg.Pair)).count("Parameters\n") == 1

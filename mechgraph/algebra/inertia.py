@@ -81,6 +81,12 @@ def rod(mass: float, start: ArrayLike, end: ArrayLike) -> Array:
     ------
     DeclarationError
         Negative mass, points that coincide or are no points.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> mg.inertia.rod(12.0, (0, 0, 0), (1, 0, 0)).tolist()
+    [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     """
     mass = _mass(mass)
     along = _numbers(end, "rod: end", (3,)) - _numbers(start, "rod: start", (3,))
@@ -112,6 +118,12 @@ def box(mass: float, size: ArrayLike, axes: ArrayLike | None = None) -> Array:
     ------
     DeclarationError
         Negative mass, an edge that is not positive, axes that are not orthonormal within `AXES_TOLERANCE`.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> mg.inertia.box(12.0, (1, 2, 3)).diagonal()
+    array([13., 10.,  5.])
     """
     mass = _mass(mass)
     edges = _numbers(size, "box: size", (3,), "positive")
@@ -149,6 +161,12 @@ def cylinder(mass: float, radius: float, length: float, axis: ArrayLike = (0.0, 
     ------
     DeclarationError
         Negative mass, a radius or length that is not positive, a zero axis.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> mg.inertia.cylinder(12.0, radius=1.0, length=3.0).diagonal()
+    array([12., 12.,  6.])
     """
     mass, radius, length = (
         _mass(mass),
@@ -182,6 +200,12 @@ def sphere(mass: float, radius: float) -> Array:
     ------
     DeclarationError
         Negative mass, a radius that is not positive.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> mg.inertia.sphere(5.0, radius=1.0).diagonal()
+    array([2., 2., 2.])
     """
     return np.asarray(0.4 * _mass(mass) * _length(radius, "sphere: radius") ** 2 * np.eye(3))
 
@@ -209,6 +233,12 @@ def from_components(xx: float, yy: float, zz: float, xy: float = 0.0, xz: float 
     ------
     DeclarationError
         A component that is not a finite number.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> float(mg.inertia.from_components(2.0, 3.0, 4.0, xy=0.5)[0, 1])
+    -0.5
     """
     given = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "xz": xz, "yz": yz}
     xx, yy, zz, xy, xz, yz = (float(_numbers(value, f"component {name}")) for name, value in given.items())

@@ -29,19 +29,31 @@ PARTINGS = 12
 
 @door
 def compile(m: Mechanism) -> Compiled:
-    """Keep a mechanism ready in the compiled kernel, for one position after the other: control loops, optimisers, real time.
+    """Keep a mechanism ready in the compiled kernel, for one position after another: control loops, optimizers, real time.
 
-    ::
+    Parameters
+    ----------
+    m : Mechanism
+        The mechanism, with declared drives.
 
-        c = mg.compile(m)
-        effort = c(0.3, velocity=10.0)  # every call goes on from the last one
-        c.reaction("B"), c.position("B"), c.link("rod"), c.status
+    Returns
+    -------
+    Compiled
 
     Raises
     ------
     DeclarationError
-        which names what the kernel cannot carry; errors of the start as in ``solve``; MissingExtraError where the kernel was not installed
-        and there is no C compiler (``mechgraph.compiled.write`` writes C without one).
+        Names what the kernel cannot carry: curves, surfaces, loads that are functions, links with several passive freedoms.
+    MissingExtraError
+        The kernel was not installed, and there is no C compiler.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> c = mg.compile(mg.load("7r"))
+    >>> effort = c(c.position("O1") + 0.3, velocity=10.0)
+    >>> print(effort.round(4), c.status)
+    [0.2823] ok
     """
     return Compiled(tabled(m))
 
@@ -140,13 +152,26 @@ class _Room:
 
 
 class Compiled:
-    """A mechanism that stays hot, see ``mechgraph.compile``. Calls release Python's lock; every thread takes a ``copy`` of its own.
+    """A mechanism kept ready in the compiled kernel. Returned by ``compile``.
+
+    ``c(q, velocity=0.0, acceleration=0.0)`` returns the efforts of the drives, ``(d,)`` or ``(n, d)``; each call continues from the
+    last position. Calls release Python's lock; give every thread its own ``copy``.
 
     Attributes
     ----------
-    drives : the freedoms that are driven, in the order of their numbers in a call.
-    parameters : declared numbers by name, to be set in place.
-    status : ``"ok"``, or why the last call was refused; of ``(n, d)`` positions an array of words.
+    drives : tuple of str
+        Driven freedoms, in the order of their numbers in a call.
+    parameters : mapping
+        Declared numbers by name; set them in place.
+    status : str or array
+        ``"ok"``, or why the last call was refused.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> c = mg.compile(mg.load("7r"))
+    >>> c.drives, c.reaction("O3").shape
+    (('O1.Rz',), (6,))
     """
 
     def __init__(self, tables: Tabled, like: Compiled | None = None) -> None:
@@ -169,7 +194,12 @@ class Compiled:
             self._one = self._last
 
     def copy(self) -> Compiled:
-        """The same with a state, parameters and results of its own."""
+        """Return an independent copy with its own state, parameters and results.
+
+        Returns
+        -------
+        Compiled
+        """
         return Compiled(self.tables.copy(), self)
 
     @property
@@ -183,20 +213,32 @@ class Compiled:
     # --- calls -------------------------------------------------------------------------------------------------------------
 
     def __call__(self, q: Any, velocity: Any = 0.0, acceleration: Any = 0.0) -> Array:
-        """The efforts ``(d,)`` of the drives at a position with these rates, led there from the last good one along a straight line.
+        """Return the efforts of the drives at a position, reached from the last good one along a straight line in certified steps.
 
-        Steps are certified as in ``solve``. Where one is refused all results are NaN, ``status`` says why, and the next call goes on from
-        the last good position. Components that are not unique are NaN.
+        If a step is refused, all results are NaN, ``status`` says why, and the next call continues from the last good position.
 
         Parameters
         ----------
-        q : ``(d,)``, a number for one drive; or ``(n, d)``, one after the other: then all results have a leading axis.
-        velocity, acceleration : of the drives, broadcast against ``q``.
+        q : float, (d,) or (n, d) array_like
+            Driver positions [rad, length]; ``(n, d)`` are solved one after another, and all results get a leading axis.
+        velocity, acceleration : array_like
+            Of the drives, broadcast against ``q``.
+
+        Returns
+        -------
+        (d,) or (n, d) array
 
         Raises
         ------
         DeclarationError
-            where shapes do not fit or numbers are not finite, and where ``parameters`` are those of no mechanism.
+            Shapes do not fit, numbers are not finite, or ``parameters`` declare no mechanism.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> c = mg.compile(mg.load("7r"))
+        >>> c(c.position("O1") + [[0.1], [0.2]]).shape, c.status.shape
+        ((2, 1), (2,))
         """
         room = self._one
         if type(q) is type(velocity) is type(acceleration) is float and len(self.tables.drives) == 1:
@@ -213,7 +255,17 @@ class Compiled:
         return room.effort[0].copy() if single else room.effort.copy()
 
     def start(self) -> None:
-        """Back to the declared position, at rest."""
+        """Return to the declared position, at rest.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> c = mg.compile(mg.load("7r"))
+        >>> home, effort = c.position("O1"), c(c.position("O1") + 0.3)
+        >>> c.start()
+        >>> bool(c.position("O1") == home)
+        True
+        """
         self.state[:] = self.home
         self(self.tables.home)
 
@@ -257,38 +309,77 @@ class Compiled:
         return self._shown(WORDS[self._last.status])
 
     def reaction(self, pair: str) -> Array:
-        """Wrench ``(6,)``, (M, F) about the global origin, that link a exerts on link b, at the last position."""
+        """Return the wrench of link a on link b at the last position, (M, F) about the global origin.
+
+        Parameters
+        ----------
+        pair : str
+            Name of the pair.
+
+        Returns
+        -------
+        (6,) array
+        """
         return np.array(self._shown(self._last.reaction[:, self.tables.m.place_of_pair(pair)]))
 
     def position(self, pair: str) -> Array:
-        """Coordinates ``(f,)`` of a pair at the last position."""
+        """Return the coordinates of a pair at the last position.
+
+        Parameters
+        ----------
+        pair : str
+            Name of the pair.
+
+        Returns
+        -------
+        (f,) array
+        """
         return np.array(self._shown(self._last.position[:, self.tables.columns(pair)]))
 
     def link(self, name: str) -> Array:
-        """Pose ``(4, 4)`` of a link's frame at the last position."""
+        """Return the pose of a link frame at the last position.
+
+        Parameters
+        ----------
+        name : str
+            Name of the link.
+
+        Returns
+        -------
+        (4, 4) array
+        """
         return np.array(self._shown(self._last.links()[:, self.tables.m.place_of_link(name)]))
 
     def _shown(self, values: Any) -> Any:
         return values[0] if self._single else values
 
     def gradient(self, output: str, names: Sequence[str]) -> Array:
-        """Derivatives of an output at the last position by declared numbers, the drives moving as they do: exact, by complex numbers.
+        """Compute the exact derivatives of an output at the last position by declared numbers, with unchanged drive motion.
 
         Parameters
         ----------
-        output : ``"A.effort"`` of a drive, ``"B.position"`` or ``"B.reaction"``.
-        names : of ``parameters``.
+        output : str
+            ``"A.effort"`` of a drive, ``"B.position"`` or ``"B.reaction"``.
+        names : sequence of str
+            Names in ``parameters``.
 
         Returns
         -------
-        array
-            ``(names,)``; of a pair with ``f`` freedoms ``(f, names)``, of a reaction ``(6, names)``. NaN where the last call was
-            refused, and by a number that opens redundant loops, as an axis turned out of those that are parallel.
+        (names,), (f, names) or (6, names) array
+            NaN if the last call was refused, and for a number that opens redundant loops (an axis rotated out of parallel).
 
         Raises
         ------
         DeclarationError
-            for names that are none, and where there are passive freedoms: where their links stand hangs on the whole way there.
+            Unknown names, or passive freedoms: the places of their links depend on the whole path.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> c = mg.compile(mg.load("7r"))
+        >>> effort = c(c.position("O1") + 0.3, velocity=10.0)
+        >>> c.gradient("O1.effort", ["length[2]", "link3.mass"]).round(4)
+        array([-1.1103,  0.543 ])
         """
         of, place = self._output(output)
         if self.tables.layout.shapes["holds"][0]:
@@ -344,18 +435,28 @@ class Compiled:
         return bool(other.status == "ok")
 
     def write(self, path: str | os.PathLike[str], name: str | None = None, inputs: InputsName = "motion") -> None:
-        """Write the mechanism with its parameters as they are: C99 (``press.c``, ``press.h``), or a unit for co-simulation (``.fmu``).
+        """Write the mechanism as C99 (``press.c``, ``press.h``) or as a unit for co-simulation (``.fmu``, FMI 2.0), with its present
+        parameters.
 
-        The C has no heap and needs the mathematics of the C library alone; its functions are ``press_start``, ``press_state_size`` and
-        ``press_solve``, as the header says. ``name`` is what symbols begin with: left out, the name of the file. With
-        ``inputs="efforts"`` it also follows the motion that efforts of the drives produce, as ``respond`` does (``press_begin``,
-        ``press_step``: adaptive steps, each within 1e-9 of a coordinate or rate), and a unit has these efforts as its inputs.
+        The C code uses no heap and only the mathematics of the C library: ``press_start``, ``press_state_size``, ``press_solve``.
+
+        Parameters
+        ----------
+        path : str or path
+            The file.
+        name : str, optional
+            Prefix of the symbols. Default: the name of the file.
+        inputs : {"motion", "efforts"}
+            With ``"efforts"`` it also integrates the motion under driver efforts (``press_begin``, ``press_step``: adaptive steps).
 
         Raises
         ------
         DeclarationError
-            where ``name`` is no identifier of C, ``inputs`` no such word, or the loops cannot be led to the parameters; FileError where it
-            cannot be written, MissingExtraError for a unit where there is no C compiler.
+            ``name`` is not an identifier of C, or the loops do not close with the parameters.
+        FileError
+            The file cannot be written.
+        MissingExtraError
+            An ``.fmu`` without a C compiler.
         """
         if self._values != self.parameters.wanted and (status := self._led()):
             self._refuse(f"the declared position cannot be led to the parameters: {WORDS[status]}")

@@ -289,20 +289,34 @@ BASES = ("RRR", "RRT", "RTR", "TRT", "RTT")
 
 @dataclass(frozen=True)
 class Group:
-    """A driver link, or a structural group.
+    """A driver link, or a structural group: a smallest set of links that is fixed once the links before it are. Part of ``Decomposition``.
 
     Attributes
     ----------
-    name : R or T for a driver link, a dyad's version (``D42``), the letters of another group of one contour, else class and order
-        (``III.3``).
-    letters : its pairs by what they do (R turns, T slides, other symbols as declared; in parentheses where one
-        between moving links is driven), of one contour in their order round it.
-    driver : whether it is a driver link.
-    links, pairs, couplings : names of what it adds; ``outer`` the pairs among these that lead to links ``on`` before.
-    contours : independent contours, pairs (and couplings, as rows of one) beyond the links.
-    freedoms : freedoms of its pairs that are neither driven nor held.
-    redundancy : closure equations of its contours that depend on the others, 6 contours + couplings - freedoms.
-    class_, order : as above.
+    name : str
+        R or T of a driver link, the version of a dyad (``D42``, Marghitu), the letters of another single-contour group, else class
+        and order (``III.3``).
+    letters : str
+        Its pairs: R rotates, T translates, others as declared; in parentheses if driven between moving links.
+    driver : bool
+        Whether it is a driver link.
+    links, pairs, couplings : tuple of str
+        What it adds; ``outer`` are the pairs that lead to links ``on`` before it.
+    contours : int
+        Independent loops: pairs (and couplings) beyond the links.
+    freedoms : int
+        Freedoms of its pairs that are neither driven nor held fixed.
+    redundancy : int
+        Dependent closure equations of its loops, 6 contours + couplings - freedoms.
+    class_, order : int
+        Class (largest closed contour or number of pairs on a link) and number of outer pairs.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> dyad = mg.groups(mg.load("four-bar")).groups[1]
+    >>> dyad.links, dyad.on, dyad.redundancy
+    (('coupler', 'rocker'), ('crank', 'frame'), 3)
     """
 
     name: str
@@ -327,15 +341,26 @@ class Group:
 
 @dataclass(frozen=True, repr=False)
 class Decomposition(Shown):
-    """The driver links and groups of a mechanism in the order in which they can be solved.
+    """Driver links and structural groups of a mechanism, in the order in which they can be solved. Returned by ``groups``.
 
     Attributes
     ----------
-    drivers : the freedoms at rest.
-    groups : driver links and groups.
-    free : links that these drivers do not determine.
-    numbers : number of every link, the frame 0, in that order.
-    ends : names of the two links of every pair.
+    drivers : tuple of str
+        Driven freedoms.
+    groups : tuple of Group
+        Driver links and groups.
+    free : tuple of str
+        Links that these drivers do not determine.
+    numbers : mapping of str to int
+        Number of every link, the frame 0.
+    ends : mapping
+        Names of the two links of every pair.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> [group.name for group in mg.groups(mg.load("windows-2")).groups]
+    ['R', 'D10', 'D10']
     """
 
     drivers: tuple[str, ...]

@@ -223,25 +223,62 @@ def _in_place_of_gears(parts: _Parts) -> list[str]:
 
 @door
 def multiple_joints(m: Mechanism, at: Mapping[str, float] | None = None) -> tuple[MultipleJoint, ...]:
-    """The turning joints of three or more links on one axis (see ``structure.multiple_joints``), at a closed position."""
+    """Find the revolute joints of three or more links on one axis, at a closed position.
+
+    Parameters
+    ----------
+    m : Mechanism
+        The mechanism, with geometry.
+    at : mapping of str to float, optional
+        Coordinates [rad, length] at which to assemble first.
+
+    Returns
+    -------
+    tuple of MultipleJoint
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> mg.multiple_joints(mg.load("four-bar"))
+    ()
+    """
     system, x = assembled_at(m, at) if at else assembled(m)
     return joints_at(Position.at(Configuration(system, x[:, None])))
 
 
 @door
 def split_joint(m: Mechanism, pair: str, on: str, at: Mapping[str, float] | None = None) -> Mechanism:
-    """The same mechanism with a multiple joint declared as pairs of the link ``on`` with each of the others.
+    """Redeclare a multiple joint as pairs of the link ``on`` with each of the others.
 
-    Pairs keep their names; one that changes its links counts from zero at the position ``at`` (left out, the declared start).
+    Pairs keep their names. A pair that changes its links counts from zero at the position ``at``.
 
     Parameters
     ----------
-    pair : any pair of the joint.
+    m : Mechanism
+        The mechanism, with geometry.
+    pair : str
+        Any pair of the joint.
+    on : str
+        Name of the link.
+    at : mapping of str to float, optional
+        Coordinates [rad, length] at which to assemble first. Default: the declared start.
+
+    Returns
+    -------
+    Mechanism
 
     Raises
     ------
     DeclarationError
-        where the pair is of no multiple joint or the link not in it, and where a pair that would change is driven or loaded.
+        The pair is in no multiple joint, the link is not in it, or a pair that would change is driven or loaded.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> z, pins = (0, 0, 1), [("A", "frame", "a", 0), ("B", "a", "b", 1), ("C", "a", "c", 1), ("D", "b", "c", 2)]
+    >>> m = mg.Mechanism("m", pairs=[mg.Pair(k, "R", a, b, point=(x, 0, 0), axis=z) for k, a, b, x in pins])
+    >>> [(p.a, p.b) for p in mg.split_joint(m, "B", on="b").pairs[1:3]]
+    [('a', 'b'), ('b', 'c')]
     """
     import networkx as nx
 

@@ -130,7 +130,25 @@ class GraphFacts:
         return self.freedom_count - self.equation_count
 
     def ledger(self, bookkeeping: BookkeepingName = "lee") -> Ledger:
-        """Unknowns against equations in a bookkeeping, ``"lee"`` or ``"minimal"``."""
+        """Count unknowns against equations of the force equations.
+
+        Parameters
+        ----------
+        bookkeeping : {"lee", "minimal"}
+            Choice of unknowns.
+
+        Returns
+        -------
+        Ledger
+            ``unknowns``, ``equations``, ``balance`` = equations - unknowns, ``by_kind``.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> ledger = mg.check(mg.load("7r")).ledger("lee")
+        >>> ledger.unknowns, ledger.equations
+        (50, 50)
+        """
         countable = isinstance(bookkeeping, str) and bookkeeping in BOOKKEEPINGS and not self.mechanism.couplings
         if countable:
             return counted_ledger(self.mechanism, bookkeeping)
@@ -284,7 +302,24 @@ class Facts(GraphFacts):
         return self.groups_with(names if names and not self.suggested_drives else (*names, *self.suggested_drives))
 
     def groups_with(self, drives: Sequence[str]) -> Decomposition | None:
-        """The same for other drivers, by the names of their freedoms; of more than can move the independent ones, in their order."""
+        """Return driver links and structural groups for other drivers.
+
+        Parameters
+        ----------
+        drives : sequence of str
+            Names of freedoms; of dependent ones the first count.
+
+        Returns
+        -------
+        Decomposition or None
+            None without a closed position.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> mg.check(mg.load("windows-2")).groups_with(["A1"]).symbol
+        'R - D10 - D10 - 1 + 0'
+        """
         if not (g := self.geometry):
             return None
         place = {name: i for i, name in enumerate(self.mechanism.freedom_names())}
@@ -520,18 +555,24 @@ class Facts(GraphFacts):
         )
 
     def self_aligning(self, most: int | None = None) -> Iterator[Advice]:
-        """All sets of wider pairs that leave no redundancy and the mobility as it is, the easiest to build first, one by one.
+        """Generate all sets of wider pairs that leave no redundancy and keep the mobility, the easiest to build first.
 
-        Each can be applied. Sets that add passive freedoms (a rod between two balls) are not among them; see ``advice`` for these.
+        Each can be applied. Sets that add passive freedoms are left out; see ``advice`` for these.
 
         Parameters
         ----------
-        most : changes of a set at most; left out, as many as there are self-stresses. The next one is sought when it is asked for.
+        most : int, optional
+            Largest number of changes in a set. Default: the number of self-stresses.
 
-        Raises
+        Yields
         ------
-        DeclarationError
-            where ``most`` is no whole number from 1.
+        Advice
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> print(next(mg.check(mg.load("four-bar")).self_aligning(2)).text)
+        R at A -> C, R at B -> S: redundancy 3 -> 0, mobility 1 -> 1, passive 0 -> 0
         """
         if most is not None and not (type(most) is int and most >= 1):
             raise DeclarationError("self_aligning", [wrong(most, "most", "a whole number from 1, or None for any")])

@@ -185,17 +185,33 @@ class LoopFamily:
 
 @dataclass(frozen=True, repr=False)
 class Families:
-    """The families of a mechanism, the counts made of them, and the mobility by rank.
+    """Families of a mechanism, the counts made of them, and the mobility by rank. Attribute ``families`` of a report.
+
+    The family is the number of freedoms that no pair has along the motion; Dobrovolski's count is ``M = sum f - (6 - family) loops``.
 
     Attributes
     ----------
-    table : the mobility table.
-    family : of the mechanism, 6 where nothing moves.
-    loops : of every loop of the cycle basis.
-    classes : numbers of pairs of the classes 1 to 5.
-    links : number of moving links.
-    welded : how many pairs stand still, so that links move as one.
-    mobility : finite mobility by rank, ``passive`` freedoms among it.
+    table : tuple
+        The mobility table.
+    family : int
+        Family of the mechanism; 6 if nothing moves.
+    loops : tuple
+        Family of every loop of the cycle basis.
+    classes : 5 int
+        Numbers of pairs of the classes 1 to 5.
+    links : int
+        Number of moving links.
+    welded : 5 int
+        Pairs that are stationary, so that their links move as one.
+    mobility, passive : int
+        Finite mobility by rank, and the passive freedoms among it.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> f = mg.check(mg.load("four-bar")).families
+    >>> f.family, f.dobrovolski, f.mobility
+    (3, 1, 1)
     """
 
     table: tuple[MobilityRow, ...]

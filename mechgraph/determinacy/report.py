@@ -428,7 +428,17 @@ CHANGES_ENDED = (
 
 
 class DeterminacyReport(Facts, Shown):
-    """The facts about a mechanism; prints as a report."""
+    """The facts about a mechanism, computed when first requested; prints as a report. Returned by ``check``.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> report = mg.check(mg.load("four-bar"))
+    >>> report.unique["B"]
+    {'Fx': True, 'Fy': True, 'Fz': False, 'Mx': False, 'My': False}
+    >>> report.ledger("lee").unknowns, report.ledger("lee").equations
+    (29, 26)
+    """
 
     @cached_property
     def verdict(self) -> str:
@@ -460,7 +470,17 @@ class DeterminacyReport(Facts, Shown):
         return tuple(filter(None, (self._rounding[1], changes)))
 
     def document(self, full: bool = False) -> Document:
-        """The report as a document: verdict, what to do and what may be trusted, or all of it; first what rounding does to it."""
+        """Return the report as a document: verdict, recommended changes, determinacy; or all of it.
+
+        Parameters
+        ----------
+        full : bool
+            The full report.
+
+        Returns
+        -------
+        Document
+        """
         found = (self.rounding.text,) if self.rounding else ()
         first = tuple(map(Paragraph, (*found, *self.not_sought)))
         if not full:
@@ -469,21 +489,64 @@ class DeterminacyReport(Facts, Shown):
         return replace(made, blocks=(*first, *made.blocks))
 
     def text(self, full: bool = False) -> str:
-        """The report as text, at most 25 lines of 80 columns, or all of it."""
+        """Return the report as text: at most 25 lines of 80 columns, or all of it.
+
+        Parameters
+        ----------
+        full : bool
+            The full report.
+
+        Returns
+        -------
+        str
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> report = mg.check(mg.load("four-bar"))
+        >>> len(report.text().splitlines()) <= 25 < len(report.text(full=True).splitlines())
+        True
+        """
         return to_text(self.document(full))
 
     def to_markdown(self, full: bool = False) -> str:
-        """The report as Markdown."""
+        """Return the report as Markdown.
+
+        Parameters
+        ----------
+        full : bool
+            The full report.
+
+        Returns
+        -------
+        str
+        """
         return to_markdown(self.document(full))
 
     def to_dict(self) -> dict[str, Any]:
-        """All facts as plain data."""
+        """Return all facts as plain data.
+
+        Returns
+        -------
+        dict
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> mg.check(mg.load("four-bar")).to_dict()["redundancy"]
+        3
+        """
         facts = to_dict(self, KEYS)
         found = {} if self.rounding is None else {"rounding": plain(self.rounding)}
         return found | ({"not_sought": list(self.not_sought)} if self.not_sought else {}) | facts
 
     def to_json(self) -> str:
-        """All facts as JSON."""
+        """Return all facts as JSON.
+
+        Returns
+        -------
+        str
+        """
         return json_text(self.to_dict())
 
     def __repr__(self) -> str:
@@ -520,26 +583,44 @@ def check(
     tol: float | None = None,
     limit: Limit = LIMIT,
 ) -> DeterminacyReport:
-    """The determinacy report of a mechanism: of its graph, and where it has geometry of its closed position at ``start``.
+    """Report mobility, redundancy and the determinacy of every reaction of a mechanism, at its closed position near ``start``.
+
+    ``M = sum f - rank J``, ``redundancy = rows - rank J``; a reaction component is unique if every self-stress (null vector of
+    ``[J^T, -E]``) vanishes in it. Without geometry the report holds the facts of the graph.
 
     Parameters
     ----------
-    at : values of freedoms at which to assemble first, e.g. ``{"A": 0.3}``.
-    engine : which engine decides ranks, ``"dense"`` or ``"sparse"``; ``"auto"`` takes the faster one. The report is the same.
-        The compiled kernel follows motions; it decides no rank, and ``"compiled"`` is refused.
-    tol : accuracy to which directions (radians) and distances (over L) are meant; the report is that of ``m.snapped(tol)``. Left out:
-        that of the mechanism, or exact.
-    limit : seconds that each search may take (for special geometry hidden by rounded numbers, for changes that help, for what ``tol``
-        makes exact); what was not looked for to the end is said.
+    m : Mechanism
+        The mechanism.
+    at : mapping of str to float, optional
+        Values of freedoms [rad, length] at which to assemble first, e.g. ``{"A": 0.3}``.
+    engine : {"auto", "dense", "sparse"}
+        Linear algebra that decides ranks; the report is the same. ``"compiled"`` is refused: the kernel decides no rank.
+    tol : float, optional
+        Accuracy of directions [rad] and distances (relative to L); the report is that of ``m.snapped(tol)``. Default: that of the
+        mechanism, or exact.
+    limit : float
+        Seconds for each search (special geometry behind rounded numbers, changes that help); the report lists unfinished searches.
+
+    Returns
+    -------
+    DeterminacyReport
 
     Raises
     ------
     DeclarationError
-        where ``engine`` is ``"compiled"``.
+        ``engine`` is ``"compiled"``, or an argument is invalid.
     AssemblyError
-        where ``at`` is given and cannot be reached. Without it, loops that cannot be closed are reported in ``note``.
+        ``at`` cannot be reached. Without it, loops that cannot be closed are reported in ``note``.
     MechgraphError
-        where the geometry is not made exact to ``tol`` within ``limit``.
+        The geometry was not made exact to ``tol`` within ``limit``.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> report = mg.check(mg.load("four-bar"))
+    >>> report.mobility_by_count, report.mobility, report.redundancy
+    (-2, 1, 3)
     """
     if engine == "compiled":
         raise build.not_served(f"check {m.name!r}", "the kernel follows motions and decides no rank")

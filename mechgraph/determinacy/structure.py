@@ -16,10 +16,24 @@ from mechgraph.quantities import door, wrong
 
 
 class Structure(Shown):
-    """The structure of a mechanism at a closed position; prints as a text.
+    """Chain, families and structural groups of a mechanism at a closed position; prints as text. Returned by ``structure``.
 
-    ``report`` the determinacy report that it is taken from, ``groups`` and ``families`` those of the report, ``identity`` its chain (None
-    for a mechanism with couplings), ``multiple_joints`` turning joints of three or more links.
+    Attributes
+    ----------
+    report : DeterminacyReport
+        The report that it is taken from.
+    groups, families : Decomposition, Families
+        Those of the report.
+    identity : Identity or None
+        Its kinematic chain; None for a mechanism with couplings.
+    multiple_joints : tuple of MultipleJoint
+        Revolute joints of three or more links.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> mg.structure(mg.load("windows-2")).identity.name
+    'Watt II'
     """
 
     def __init__(self, report: DeterminacyReport, groups: Decomposition, families: Families) -> None:
@@ -92,17 +106,31 @@ class Structure(Shown):
 
 @door
 def structure(m: Mechanism, drives: str | Iterable[str] | None = None, **options: Any) -> Structure:
-    """Chain, families and structural groups of a mechanism at its closed start.
+    """Report kinematic chain, families and structural groups of a mechanism at its closed start.
 
     Parameters
     ----------
-    drives : names of freedoms; left out, the declared drivers, and what the report suggests beside them.
-    options : those of ``check``.
+    m : Mechanism
+        The mechanism, with geometry.
+    drives : str or iterable of str, optional
+        Names of freedoms. Default: the declared drivers, completed by those that the report suggests.
+    **options
+        Those of ``check``.
+
+    Returns
+    -------
+    Structure
 
     Raises
     ------
     DeclarationError
-        for a mechanism without geometry, or one whose loops do not close.
+        No geometry, or loops that do not close.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> mg.structure(mg.load("four-bar")).groups.symbol
+    'R - D10'
     """
     report = check(m, **options)
     families = report.families
@@ -113,7 +141,33 @@ def structure(m: Mechanism, drives: str | Iterable[str] | None = None, **options
 
 @door
 def groups(m: Mechanism, drives: str | Iterable[str] | None = None, **options: Any) -> Decomposition:
-    """Driver links and structural groups in the order in which they can be solved: the groups of ``structure`` alone."""
+    """Decompose a mechanism into driver links and structural (Assur) groups, in the order in which they can be solved.
+
+    Parameters
+    ----------
+    m : Mechanism
+        The mechanism, with geometry.
+    drives : str or iterable of str, optional
+        As in ``structure``.
+    **options
+        Those of ``check``.
+
+    Returns
+    -------
+    Decomposition
+
+    Raises
+    ------
+    DeclarationError
+        No geometry, or loops that do not close.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> g = mg.groups(mg.load("windows-2"))
+    >>> g.symbol, g.words
+    ('R - D10 - D10 - 3 + 0', 'R-RRR-RRR')
+    """
     return _groups(check(m, **options), drives)
 
 

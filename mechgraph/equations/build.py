@@ -343,26 +343,40 @@ def formulate(
     *,
     unknowns: SoughtName = "kinetostatics",
 ) -> Formulation:
-    """The equations of a mechanism as named unknowns and equations: closure, d'Alembert, conditions of the pairs, couplings.
+    """Generate the equations of a mechanism as named unknowns and equations; needs no geometry.
 
-    For every moving link ``sum of reactions + inertia + applied + efforts of drivers and couplings = 0`` (six scalar equations about the
-    global origin) and, in Lee's bookkeeping, the conditions of the pairs; beside them the closure equations of position, velocity
-    and acceleration, ``Formulation.closure``. Needs no geometry. The multiplier of a coupling ``g`` is the unknown ``M_C(g)``, or
-    ``F_C(g)`` where all its freedoms are slides.
+    For every moving link ``sum of reactions + inertia + applied + efforts of drivers and couplings = 0`` (six scalar equations about
+    the global origin), in Lee's bookkeeping with the conditions of the pairs, and the closure equations of position, velocity and
+    acceleration (``Formulation.closure``). The multiplier of a coupling ``g`` is ``M_C(g)``, or ``F_C(g)`` if all its freedoms are
+    translations.
 
     Parameters
     ----------
-    bookkeeping : ``"lee"`` (Lee 1977, equations 3.33 to 3.53) or ``"minimal"`` (reaction components of the pair table).
-    efforts : freedoms whose effort is unknown; left out, the driven ones, and none in a response.
-    unknowns : ``"kinetostatics"`` (the motion is given) or ``"response"`` (the efforts are given): the accelerations of all freedoms are
-        unknowns beside the reactions, those of the drives first, and their closure (2.60) is among the equations. Lee (section 3.5)
-        eliminates all but that of the input, his unknown number 24, beforehand. A freedom named in ``efforts`` has a prescribed
-        acceleration.
+    m : Mechanism
+        The mechanism.
+    bookkeeping : {"lee", "minimal"}
+        Choice of unknowns: Lee 1977, equations 3.33 to 3.53, or the reaction components of the pair table.
+    efforts : iterable of str, optional
+        Freedoms with unknown effort. Default: the driven ones; none in a response.
+    unknowns : {"kinetostatics", "response"}
+        With ``"response"`` the efforts are given, and the accelerations of all freedoms are unknowns beside the reactions (those of the
+        drives first), with their closure (2.60) among the equations; a freedom in ``efforts`` has a prescribed acceleration.
+
+    Returns
+    -------
+    Formulation
 
     Raises
     ------
     DeclarationError
-        for an unknown bookkeeping or freedom.
+        Unknown bookkeeping or freedom.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> f = mg.formulate(mg.load("rcsr"))
+    >>> len(f.unknowns), len(f.equations)
+    (24, 24)
     """
     draft = _Draft(m, names_of(m))
     for k in range(len(m.pairs)):

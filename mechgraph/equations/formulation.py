@@ -400,12 +400,31 @@ SECTIONS = (
 
 @dataclass(frozen=True, repr=False)
 class Formulation(LinearSystem, Shown):
-    """The equations of a mechanism: what is printed is what is assembled.
+    """The equations of a mechanism; what it prints is what it assembles. Returned by ``formulate``.
 
-    ``unknowns`` and ``equations`` are the scalar force equations (in a response with the accelerations and their closure), ``blocks``
-    the same as vectors; ``closure`` holds the closure equations of position, velocity and acceleration. Every term names the
-    screw component that is its coefficient; ``assemble`` reads that component from a State, ``text`` prints its symbol. ``acts`` are the
-    terms with which every pair acts on its link b.
+    Every term names the screw component that is its coefficient: ``text`` prints its symbol, ``assemble`` reads its number from a State.
+
+    Attributes
+    ----------
+    unknowns, equations : tuple
+        The scalar force equations and their unknowns (of a response with accelerations and their closure).
+    blocks : tuple
+        The same as vector equations.
+    closure : object
+        Closure equations of position, velocity and acceleration.
+    acts : tuple
+        Terms with which every pair acts on its link b.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> m = mg.load("rcsr")
+    >>> f = mg.formulate(m)
+    >>> print(f.blocks[0].text)
+    R_41 = F_41 + FA_1 A_1
+    >>> A, b = f.assemble(mg.solve(m, {"O1": 2.6}).state())
+    >>> A.shape, b.shape
+    ((24, 24), (24,))
     """
 
     bookkeeping: str
@@ -435,7 +454,19 @@ class Formulation(LinearSystem, Shown):
         return LinearSystem(self.mechanism, self.unknowns, tuple(rows), (), self.screws)
 
     def ledger(self) -> Ledger:
-        """The ledger: unknowns and equations by kind."""
+        """Count unknowns and equations by kind.
+
+        Returns
+        -------
+        Ledger
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> ledger = mg.formulate(mg.load("rcsr"), "minimal").ledger()
+        >>> ledger.unknowns, ledger.equations
+        (18, 18)
+        """
         groups: dict[str, int] = {}
         for pair in self.mechanism.pairs:
             groups[pair.type.symbol] = groups.get(pair.type.symbol, 0) + 1
@@ -457,33 +488,87 @@ class Formulation(LinearSystem, Shown):
         return Ledger(self.bookkeeping, rows)
 
     def document(self, components: bool = True) -> Document:
-        """The printed formulation as a document."""
+        """Return the printed formulation as a document.
+
+        Parameters
+        ----------
+        components : bool
+            Include the scalar equations.
+
+        Returns
+        -------
+        Document
+        """
         return formulation_document(self, components)
 
     def text(self, components: bool = True) -> str:
-        """Block-wise and component-wise equations as plain text."""
+        """Return the equations as plain text, as vectors and as components.
+
+        Parameters
+        ----------
+        components : bool
+            Include the scalar equations.
+
+        Returns
+        -------
+        str
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> print(mg.formulate(mg.load("rcsr")).text().splitlines()[0])
+        Equations of rcsr
+        """
         return to_text(self.document(components))
 
     def latex(self, components: bool = True) -> str:
-        """Block-wise and component-wise equations as LaTeX."""
+        """Return the equations as LaTeX, as vectors and as components.
+
+        Parameters
+        ----------
+        components : bool
+            Include the scalar equations.
+
+        Returns
+        -------
+        str
+        """
         return to_latex(self.document(components))
 
     def write(self, path: str | os.PathLike[str], components: bool = True) -> None:
-        """Write it, whole or not at all, as the suffix says: ``.tex`` a LaTeX file that compiles, ``.txt`` text, ``.md`` Markdown, ``.csv``
-        the coefficients.
+        """Write the equations to a file, atomically; the extension selects the format.
+
+        Parameters
+        ----------
+        path : str or path
+            ``.tex``, a LaTeX file that compiles; ``.txt``; ``.md``; ``.csv``, the coefficients.
+        components : bool
+            Include the scalar equations.
 
         Raises
         ------
         FileError
-            for another suffix, or where the file cannot be written.
+            Another extension, or the file cannot be written.
         """
         format_of(path, FORMATS).write(self, path, components)
 
     def coefficients(self, state: State | None = None) -> CoefficientTable:
-        """The nonzero coefficients ``Q(row, column)`` and right sides ``C(row)``, as Lee's Table XIV lists them.
+        """Return the nonzero coefficients ``Q(row, column)`` and right sides ``C(row)``, as in Lee's Table XIV.
 
-        With a State (``s.state(i)`` of a Solution) their numbers at its position, and those of the unknowns ``u(column)``, NaN where
-        they are not unique.
+        Parameters
+        ----------
+        state : State, optional
+            ``s.state(i)``: add their numbers at that position, and those of the unknowns ``u(column)`` (NaN if not unique).
+
+        Returns
+        -------
+        CoefficientTable
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> print(str(mg.formulate(mg.load("rcsr")).coefficients()).splitlines()[-1])
+        Q(24, 22) = A_4z
         """
         if state is None:
             return CoefficientTable(tuple(self.coefficient_rows()))
@@ -491,7 +576,13 @@ class Formulation(LinearSystem, Shown):
         return CoefficientTable((*self.number_rows(state), *u))
 
     def closure_coefficients(self) -> CoefficientTable:
-        """The same of the closure: ``N(row, column)`` of the rates and accelerations (2.47, 2.60), right sides ``B(row)`` of the latter."""
+        """Return the coefficients of the closure: ``N(row, column)`` of rates and accelerations (2.47, 2.60), right sides ``B(row)`` of
+        the latter.
+
+        Returns
+        -------
+        CoefficientTable
+        """
         return CoefficientTable(tuple(self.closure.acceleration.coefficient_rows("N", "B")))
 
     def __repr__(self) -> str:

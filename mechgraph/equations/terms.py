@@ -571,9 +571,29 @@ class LinearSystem:
         return scipy.sparse.csr_array((self.entries(state)[:, at], (rows, cols)), shape=shape)
 
     def assemble(self, state: State, position: int = 0) -> tuple[scipy.sparse.csr_array, Array]:
-        """Matrix and right side at one position: ``A u = b``.
+        """Assemble matrix and right side at one position, ``A u = b``.
 
-        Returns ``A (len(equations), len(unknowns))`` as a scipy sparse array and ``b (len(equations),)``.
+        Parameters
+        ----------
+        state : State
+            ``s.state(i)`` of a Solution.
+        position : int
+            Position within the state.
+
+        Returns
+        -------
+        A : sparse array (equations, unknowns)
+            Of scipy.
+        b : (equations,) array
+            Right side.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> m = mg.load("rcsr")
+        >>> A, b = mg.formulate(m).assemble(mg.solve(m, {"O1": 2.6}).state())
+        >>> A.shape, b.shape
+        ((24, 24), (24,))
         """
         return self.matrix(state, position), self.right_side(state)[:, position]
 
@@ -601,9 +621,29 @@ class LinearSystem:
         return (*summed([*terms, *(("+" if k.sign > 0 else "-", (k.symbol,)) for k in equation.known)]), "=", "0")
 
     def solve(self, state: State, position: int = 0) -> Array:
-        """The unknowns ``(len(unknowns),)`` at one position; NaN where the equations leave one open, all where they contradict.
+        """Solve for the unknowns at one position.
 
-        Redundant equations are no fault. A large square system (above 400 unknowns) goes through sparse LU.
+        Redundant equations are allowed. Above 400 unknowns a square system goes through sparse LU.
+
+        Parameters
+        ----------
+        state : State
+            ``s.state(i)`` of a Solution.
+        position : int
+            Position within the state.
+
+        Returns
+        -------
+        (unknowns,) array
+            NaN for what the equations leave open; all NaN if they conflict.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> m = mg.load("7r")
+        >>> s, f = mg.solve(m, {"O1": 0.3}), mg.formulate(m, "minimal")
+        >>> bool(abs(f.solve(s.state())[-1] - s["O1"].effort[0]) < 1e-12)
+        True
         """
         A, b = self.assemble(state, position)
         return unique_solution(A.tocsc(), b)

@@ -106,15 +106,36 @@ READERS: dict[str, Callable[[Path], tuple[Mechanism, Notes]]] = {
 
 @door
 def load(name: str | os.PathLike[str]) -> Mechanism:
-    """A mechanism from the library (by name), from a TOML file, or from a file of another program, by its suffix.
+    """Read a mechanism from the library (by name), a TOML file, or a file of another program.
 
-    ``.asmt`` is an assembly of FreeCAD, ``.xml`` and ``.mjcf`` are MJCF (MuJoCo), ``.urdf`` is URDF. What is taken otherwise than it
-    stands in such a file is a ``MechgraphWarning`` and stands in the mechanism's ``description``.
+    The extension selects the format: ``.asmt`` (FreeCAD assembly), ``.xml`` and ``.mjcf`` (MuJoCo), ``.urdf``; other files are TOML.
+
+    Parameters
+    ----------
+    name : str or path
+        Name in the library, or path of a file.
+
+    Returns
+    -------
+    Mechanism
 
     Raises
     ------
     FileError
-        where the file cannot be read or is none of its kind; ContentError, which is a DeclarationError too, where its content is at fault.
+        The file cannot be read or has the wrong format.
+    ContentError
+        Its content has faults; a DeclarationError too.
+
+    Warns
+    -----
+    MechgraphWarning
+        Something in a file of another program was changed or left out; ``description`` lists it.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> mg.load("rcsr")
+    Mechanism('rcsr', 4 links, 4 pairs)
     """
     reader = READERS.get(Path(os.fsdecode(name)).suffix.lower()) if isinstance(name, str | os.PathLike) else None
     if reader is None:
@@ -139,15 +160,32 @@ WRITERS = (
 
 @door
 def save(m: Mechanism, path: str | os.PathLike[str]) -> None:
-    """Write a mechanism as TOML, or as the suffix says; the file is written whole or not at all.
+    """Write a mechanism to a file, atomically; the extension selects the format.
 
-    TOML holds all of a mechanism: ``load`` gives back an equal one. ``.xml`` and ``.mjcf`` hold it at its start, see ``save_mjcf``.
-    ``.graphml`` and ``.json`` (node-link JSON) are its graph: links as nodes, pairs as edges, for programs that know graphs.
+    TOML holds the whole mechanism: ``load`` returns an equal one. ``.xml`` and ``.mjcf`` hold it at its start. ``.graphml`` and
+    ``.json`` (node-link) hold the graph: links as nodes, pairs as edges.
+
+    Parameters
+    ----------
+    m : Mechanism
+        The mechanism.
+    path : str or path
+        The file.
 
     Raises
     ------
     FileError
-        where the format cannot say something, or the file cannot be written.
+        The format cannot hold the mechanism (functions as loads), or the file cannot be written.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> import tempfile, pathlib
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder) / "press.toml"
+    ...     mg.save(mg.load("rcsr"), path)
+    ...     print(mg.load(path) == mg.load("rcsr"))
+    True
     """
     suffix = Path(os.fsdecode(path)).suffix.lower() if isinstance(path, str | os.PathLike) else ""
     writers = {known: one.write for one in WRITERS for known in one.suffixes}

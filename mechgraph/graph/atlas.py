@@ -29,7 +29,21 @@ from mechgraph.quantities import Count, Index, at_least, door, items_of, wrong
 
 @dataclass(frozen=True)
 class MultipleJoint:
-    """A turning joint of three or more ``links``, declared as the ``pairs``."""
+    """A revolute joint of three or more links, declared as several pairs. Returned by ``multiple_joints``.
+
+    Attributes
+    ----------
+    links, pairs : tuple of str
+        Names.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> z, pins = (0, 0, 1), [("A", "frame", "a", 0), ("B", "a", "b", 1), ("C", "a", "c", 1), ("D", "b", "c", 2)]
+    >>> m = mg.Mechanism("m", pairs=[mg.Pair(k, "R", a, b, point=(x, 0, 0), axis=z) for k, a, b, x in pins])
+    >>> [(joint.links, joint.order) for joint in mg.multiple_joints(m)]
+    [(('a', 'b', 'c'), 2)]
+    """
 
     links: tuple[str, ...]
     pairs: tuple[str, ...]
@@ -74,13 +88,23 @@ Source: Norton, Design of Machinery, section 2.13.
 
 @dataclass(frozen=True)
 class Identity:
-    """Which chain a mechanism is.
+    """The kinematic chain of a mechanism. Returned by ``identify``.
 
     Attributes
     ----------
-    chain : the chain with the pair types of the mechanism; links and joints in the order of declaration.
-    frame : number of the frame link.
-    links, pairs : names, in that order (those of the pairs of a multiple joint in one).
+    chain : Chain
+        The chain with the pair types of the mechanism, in the order of declaration.
+    frame : int
+        Number of the frame link.
+    links, pairs : tuple of str
+        Names in that order; the pairs of a multiple joint share one.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> who = mg.identify(mg.load("four-bar"))
+    >>> who.name, who.links
+    ('four-bar', ('frame', 'crank', 'coupler', 'rocker'))
     """
 
     chain: Chain
@@ -146,7 +170,19 @@ class Identity:
         return tuple(tuple(self.pairs[k] for k in group) for group in self.chain.drivers(self.frame))
 
     def split(self, joint: MultipleJoint, on: str) -> Identity:
-        """The same with pairs of the link ``on`` with each of the others in place of a multiple joint."""
+        """Return the identity with pairs of the link ``on`` with each of the others in place of a multiple joint.
+
+        Parameters
+        ----------
+        joint : MultipleJoint
+            The joint.
+        on : str
+            Name of the link.
+
+        Returns
+        -------
+        Identity
+        """
         k = self.pairs.index(", ".join(joint.pairs))
         mine = [(self.links.index(on), self.links.index(link)) for link in joint.links if link != on]
         joints, types, names = (
@@ -173,14 +209,31 @@ class Identity:
 
 @door
 def identify(m: Mechanism, family: int = 3, joints: Iterable[MultipleJoint] = ()) -> Identity:
-    """Which chain a mechanism is: by its links and pairs alone, whatever the dimensions.
+    """Identify the kinematic chain of a mechanism by its links and pairs alone.
 
-    Multiple ``joints`` (``mg.multiple_joints(m)``) count as what they are; left out, each pair is a joint of two links.
+    Parameters
+    ----------
+    m : Mechanism
+        The mechanism.
+    family : int
+        As in ``atlas``.
+    joints : iterable of MultipleJoint
+        Multiple joints to count as one (``mg.multiple_joints(m)``). Default: each pair is a joint of two links.
+
+    Returns
+    -------
+    Identity
 
     Raises
     ------
     DeclarationError
-        for a mechanism with couplings (gears), since a chain has pairs alone, and for a family that is none.
+        The mechanism has couplings, or the family is not 0 to 5.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> mg.identify(mg.load("windows-2")).name
+    'Watt II'
     """
     faults = family_faults(family)
     if m.couplings:
@@ -211,7 +264,24 @@ def identify(m: Mechanism, family: int = 3, joints: Iterable[MultipleJoint] = ()
 
 @dataclass(frozen=True)
 class SystemGroup:
-    """A configuration: ``pairs`` of the classes 1 to 5 and moving ``links`` of a group of ``contours`` of a ``family``."""
+    """A configuration of a structural group of spatial mechanisms. Yielded by ``system_groups``.
+
+    Attributes
+    ----------
+    family, contours : int
+        Freedoms that no link has; independent loops.
+    pairs : 5 int
+        Numbers of pairs of the classes 1 to 5.
+    links : int
+        Number of moving links.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> group = next(mg.system_groups(1))
+    >>> group.contours, sum(group.pairs), group.links
+    (1, 6, 5)
+    """
 
     family: int
     contours: int
@@ -221,12 +291,29 @@ class SystemGroup:
 
 @door
 def system_groups(contours: int, most: int | None = None) -> Iterator[SystemGroup]:
-    """All configurations with so many independent contours, family by family; with no more than ``most`` pairs of any class 1 to 4.
+    """Generate all configurations of structural groups with a number of independent contours, family by family.
+
+    Parameters
+    ----------
+    contours : int
+        Independent loops, from 1.
+    most : int, optional
+        Largest number of pairs of any class 1 to 4.
+
+    Yields
+    ------
+    SystemGroup
 
     Raises
     ------
     DeclarationError
-        where ``contours`` is not a whole number from 1, or ``most`` not one from 0.
+        ``contours`` or ``most`` is not a whole number in range.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> sum(1 for _ in mg.system_groups(2))
+    85
     """
     faults = [wrong(contours, "contours", "a whole number from 1")] * (type(contours) is not int or contours < 1)
     faults += [wrong(most, "most", "a whole number from 0, or None")] * (
@@ -267,22 +354,39 @@ def atlas(
     multiple: bool = False,
     fractionated: bool = False,
 ) -> Iterator[Chain]:
-    """All kinematic chains of a kind up to isomorphism, none with a rigid part (but for the whole where mobility is 0), one by one.
+    """Generate all kinematic chains of a kind up to isomorphism, without rigid parts, one by one.
 
     Parameters
     ----------
-    links : number of links, the frame among them.
-    mobility : Dobrovolski's count, with one link as frame: M = sum of freedoms - (6 - family) (joints - links + 1).
-    joints : number of pairs (a multiple joint of k links counts k - 1); left out, every number that fits.
-    family : freedoms that no link has, 0 to 5: 3 for planar (and spherical) chains, 0 for spatial ones.
-    types : symbols of the pair types that are allowed. A planar loop needs two turns (with fewer it is of family 4).
-    multiple : whether several links may share a turning joint.
-    fractionated : the chains that one link (or joint) parts when it is taken out, instead of those that none does.
+    links : int
+        Number of links, frame included.
+    mobility : int
+        Dobrovolski's count, ``M = sum f - (6 - family) (joints - links + 1)``.
+    joints : int, optional
+        Number of pairs; a multiple joint of k links counts k - 1. Default: every number that fits.
+    family : int
+        Freedoms that no link has, 0 to 5: 3 for planar and spherical chains, 0 for spatial ones.
+    types : str or sequence of str
+        Symbols of the allowed pair types.
+    multiple : bool
+        Whether several links may share a revolute joint.
+    fractionated : bool
+        Instead, the chains that one link (or joint) separates.
+
+    Yields
+    ------
+    Chain
 
     Raises
     ------
     DeclarationError
-        with all faults at once.
+        With every fault.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> [sum(1 for _ in mg.atlas(links)) for links in (4, 6, 8)]
+    [1, 2, 16]
     """
     faults = family_faults(family)
     symbols = (types,) if isinstance(types, str) else tuple(types)
@@ -313,7 +417,33 @@ def _fits(kind: ChainKind) -> bool:
 
 @door
 def save_chains(chains: Iterable[Chain], path: str | PathLike[str]) -> int:
-    """Write chains to a file, one a line (JSON); how many."""
+    """Write chains to a file, one JSON line each.
+
+    Parameters
+    ----------
+    chains : iterable of Chain
+        E.g. ``mg.atlas(8)``.
+    path : str or path
+        The file.
+
+    Returns
+    -------
+    int
+        Number of chains.
+
+    Raises
+    ------
+    FileError
+        The file cannot be written.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> import tempfile, pathlib
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     mg.save_chains(mg.atlas(6), pathlib.Path(folder) / "six.jsonl")
+    2
+    """
     lines = []
     for c in chains:
         if not isinstance(c, Chain):
@@ -325,7 +455,32 @@ def save_chains(chains: Iterable[Chain], path: str | PathLike[str]) -> int:
 
 @door
 def load_chains(path: str | PathLike[str]) -> Iterator[Chain]:
-    """The chains of a saved file, one by one."""
+    """Read the chains of a saved file, one by one.
+
+    Parameters
+    ----------
+    path : str or path
+        A file of ``save_chains``.
+
+    Yields
+    ------
+    Chain
+
+    Raises
+    ------
+    FileError
+        The file cannot be read.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> import tempfile, pathlib
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder) / "six.jsonl"
+    ...     n = mg.save_chains(mg.atlas(6), path)
+    ...     print([chain.assortment for chain in mg.load_chains(path)])
+    ['4 binary, 2 ternary', '4 binary, 2 ternary']
+    """
     for number, line in enumerate(text_of(Path(path), "file of chains").splitlines(), start=1):
         try:
             data = json.loads(line)

@@ -180,10 +180,25 @@ def data_faults(data: Any) -> list[str]:
 
 @dataclass(frozen=True)
 class Chain:
-    """A kinematic chain of ``links`` numbered from 0.
+    """A kinematic chain: links numbered from 0, and the joints between them.
 
-    ``joints`` are the links that meet at each joint, two, or more at a multiple joint (which counts as one less than there are links);
-    ``types`` the symbols of their pair types; ``family`` the freedoms that no link has (3 for planar chains).
+    Parameters
+    ----------
+    links : int
+        Number of links.
+    joints : tuple of tuple of int
+        Links that meet at each joint: two, or more at a multiple joint.
+    types : tuple of str
+        Symbol of the pair type of each joint.
+    family : int
+        Freedoms that no link has (3 for planar chains).
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> c = mg.Chain(4, ((0, 1), (1, 2), (2, 3), (3, 0)), ("R",) * 4)
+    >>> c.mobility, c.loops, c.assortment
+    (1, 1, '4 binary')
     """
 
     links: int
@@ -254,7 +269,17 @@ class Chain:
         return self._code({}, {})
 
     def code_with_frame(self, frame: int) -> Code:
-        """The same of an inversion: what chains with a frame link have in common that are alike."""
+        """Return a code of an inversion: equal for isomorphic chains with corresponding frame links, and only for these.
+
+        Parameters
+        ----------
+        frame : int
+            Number of the frame link.
+
+        Returns
+        -------
+        Code
+        """
         return self._code({frame: 1}, {})
 
     def _code(self, links: Mapping[int, int], joints: Mapping[int, int]) -> Code:
@@ -276,11 +301,40 @@ class Chain:
         return _alike(range(self.links), self.code_with_frame)
 
     def drivers(self, frame: int) -> tuple[tuple[int, ...], ...]:
-        """Joints that are alike as driver of the inversion with ``frame``, one tuple for each choice."""
+        """Return the joints that are equivalent as driver of the inversion with ``frame``, one tuple per choice.
+
+        Parameters
+        ----------
+        frame : int
+            Number of the frame link.
+
+        Returns
+        -------
+        tuple of tuple of int
+        """
         return _alike(range(len(self.joints)), lambda k: self._code({frame: 1}, {k: 1}))
 
     def mechanism(self, frame: int = 0, name: str = "") -> Mechanism:
-        """The chain as a mechanism without geometry: links L0, L1, ..., pairs J0, J1, ...; a multiple joint as pairs J0a, J0b, ..."""
+        """Return the chain as a mechanism without geometry: links L0, L1, ..., pairs J0, J1, ...
+
+        Parameters
+        ----------
+        frame : int
+            Number of the frame link.
+        name : str
+            Its name.
+
+        Returns
+        -------
+        Mechanism
+            A multiple joint becomes pairs J0a, J0b, ...
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> next(mg.atlas(4)).mechanism().freedom_names()
+        ('J0.Rz', 'J1.Rz', 'J2.Rz', 'J3.Rz')
+        """
         pairs = []
         for k, (joint, kind) in enumerate(zip(self.joints, self.types, strict=True)):
             for i, link in enumerate(joint[1:]):

@@ -59,25 +59,43 @@ def chain(
     links: Iterable[Link] | None = None,
     **more: Any,
 ) -> Mechanism:
-    """A single closed loop from pair letters: links ``frame, link1, ...``, pairs ``O1, O2, ...`` (Lee 1977).
+    """Declare a single closed loop by its pair letters: links ``frame, link1, ...``, pairs ``O1, O2, ...`` (Lee 1977).
 
-    Going round from the frame, ``prod_k D_k(q_k) Tz(offset_k) Tx(length_k) Rx(twist_k) = 1``; the numbers ``k`` belong to the
-    link after pair ``k`` (the last to the frame). The global frame is marker A of ``O1``, every other link frame is marker B
-    of the pair before it. Without numbers the chain is a topology.
+    Around the loop from the frame ``prod_k D_k(q_k) Tz(offset_k) Tx(length_k) Rx(twist_k) = 1``; the numbers ``k`` belong to the link
+    after pair ``k`` (the last to the frame). The global frame is marker A of ``O1``; every other link frame is marker B of the pair
+    before it. Without numbers the chain is a topology.
 
     Parameters
     ----------
-    letters : e.g. ``"RPRHRRR"``; Sp, Sg, Sc, Cp are recognised, hyphens skipped.
-    twist, length, offset : one number a pair; left out (with another given) they are zero.
-    pitch : advance per radian of the helical pairs: one number each in order, or a mapping pair -> pitch.
-    drive : the driven pair or freedom; None for none.
-    links : links with mass, each in the link frame described above; those left out are massless.
-    more : further fields of ``Mechanism`` (loads, start, units, ...).
+    letters : str
+        E.g. ``"RPRHRRR"``; Sp, Sg, Sc, Cp are recognized, hyphens skipped.
+    twist, length, offset : (pairs,) array_like, optional
+        [rad, length, length] per pair. Default: 0 if another of them is given.
+    pitch : array_like or mapping, optional
+        Advance per radian of the helical pairs, in order, or pair -> pitch.
+    name : str, optional
+        Default: the letters.
+    drive : str or None
+        Driven pair or freedom.
+    links : iterable of Link, optional
+        Links with mass, each in the link frame described above; the others are massless.
+    **more
+        Further fields of ``Mechanism``: loads, start, units, ...
+
+    Returns
+    -------
+    Mechanism
 
     Raises
     ------
     DeclarationError
-        with all faults at once.
+        With every fault.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> print(mg.check(mg.chain("RPRHRRR")).verdict)
+    1 driver, 50 unknowns, 50 equations: determinate for general geometry (mobility 1).
     """
     title = letters if name is None else name
     symbols, faults = chain_symbols(letters)

@@ -83,18 +83,37 @@ class BaseCoupling(Described, ABC):
 
 @dataclass(frozen=True, init=False)
 class Coupling(BaseCoupling):
-    """A linear relation between single freedoms, ``sum_i c_i q_i = constant``; its multiplier is an unknown effort.
+    """Declare a linear relation between single freedoms, ``sum_i c_i q_i = constant``; its multiplier m is an unknown effort.
 
-    The multiplier m acts with the effort ``c_i m`` in freedom i, so that its power is ``m sum_i c_i q'_i = 0``. The sum is a length
-    where all freedoms are slides (then m is a force, the coefficients are pure numbers) and an angle in all other cases (then m is
-    a moment, the coefficient of a turn is a pure number and that of a slide one over a length). ``to_units`` follows that rule: a
-    constant that is a length is multiplied by the factor of lengths, the coefficient of a slide beside turns is divided by it.
+    The effort ``c_i m`` acts in freedom i, so the power ``m sum_i c_i q'_i`` is zero. The sum is a length if all freedoms are
+    translations (m is a force), else an angle (m is a moment; the coefficient of a translation is one over a length). ``to_units``
+    follows that rule.
 
     Parameters
     ----------
-    terms : freedom -> coefficient, ``{"A": 2.0, "B.Tz": -3.0}``; coefficients finite and not zero.
-    name : differs from the names of all pairs and other couplings; left out, the mechanism names it ``g1``, ``g2``, ...
-    constant : the value of the sum; left out, the sum keeps the value that it has at ``start``.
+    terms : mapping of str to float
+        Freedom -> coefficient, ``{"A": 2.0, "B.Tz": -3.0}``; finite, not zero.
+    name : str, optional
+        Differs from all pairs and couplings. Default: ``g1``, ``g2``, ...
+    constant : float, optional
+        Value of the sum. Default: its value at ``start``.
+
+    Raises
+    ------
+    DeclarationError
+        From ``Mechanism``, which checks all couplings.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> pairs = [
+    ...     mg.Pair(k, "R", "frame", link, point=(x, 0, 0), axis=(0, 0, 1))
+    ...     for k, link, x in [("A", "p", 0), ("B", "w", 6)]
+    ... ]
+    >>> m = mg.Mechanism("gears", pairs=pairs, couplings=[mg.Coupling({"A": 20, "B": 40}, name="teeth")], drives=["A"])
+    >>> s = mg.solve(m, {"A": 1.0}, loads=[mg.Effort("B", -3)])
+    >>> s["B"].position, s["A"].effort, float(s.coupling("teeth").effort)
+    (array([-0.5]), array([-1.5]), 0.075)
     """
 
     kind: ClassVar[str] = "linear"

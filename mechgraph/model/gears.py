@@ -25,10 +25,24 @@ ONE_HELIX = 0.02
 
 @dataclass(frozen=True)
 class SpurGears(Contact):
-    """Two spur or helical gears on parallel axes, external or internal; the mesh lies in the plane through the point of pair b.
+    """Declare two spur or helical gears on parallel axes, external or internal.
 
-    The pitch radii are those that the distance of the axes and the numbers of teeth ask for. ``module`` is the normal one; where it is
-    given, the distance of the axes must fit it.
+    The mesh lies in the plane through the point of pair b. Center distance and tooth numbers set the pitch radii; a normal ``module``
+    must fit the center distance. The sign of the load selects the loaded flank. Power: ``z_a q'_a = -+ z_b q'_b``.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> pairs = [
+    ...     mg.Pair(k, "R", "frame", link, point=(x, 0, 0), axis=(0, 0, 1))
+    ...     for k, link, x in [("A", "p", 0), ("B", "w", 0.06)]
+    ... ]
+    >>> m = mg.Mechanism(
+    ...     "gears", pairs=pairs, couplings=[mg.SpurGears("g", "A", "B", teeth=(20, 40), module=0.002)], drives=["A"]
+    ... )
+    >>> s = mg.solve(m, {"A": 0.0}, loads=[mg.Effort("B", -3)])
+    >>> s.coupling("g").force.round(3)
+    array([ 27.298, -75.   ,   0.   ])
     """
 
     kind: ClassVar[str] = "spur"
@@ -139,9 +153,21 @@ def rim_faults(couplings: Iterable[BaseCoupling], m: Any) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class BevelGears(Contact):
-    """Two bevel gears, straight or spiral, on axes that intersect; each stands on the side of the apex where the point of its pair is.
+    """Declare two bevel gears, straight or spiral, on intersecting axes.
 
-    ``module`` is the one at the middle of the face, where the force acts.
+    Each gear is on the side of the apex on which the point of its pair lies. ``module`` is that at the middle of the face, where the
+    force acts.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> axes = [("A", "p", (0.1, 0, 0), (1, 0, 0)), ("B", "w", (0, 0.1, 0), (0, 1, 0))]
+    >>> pairs = [mg.Pair(k, "R", "frame", link, point=p, axis=z) for k, link, p, z in axes]
+    >>> m = mg.Mechanism(
+    ...     "bevel", pairs=pairs, couplings=[mg.BevelGears("g", "A", "B", teeth=(20, 40), module=0.002)], drives=["A"]
+    ... )
+    >>> abs(mg.kinematics(m, {"A": 1.0})["B"].position)
+    array([0.5])
     """
 
     kind: ClassVar[str] = "bevel"
@@ -197,7 +223,21 @@ class BevelGears(Contact):
 
 @dataclass(frozen=True)
 class WormGear(Contact):
-    """A worm a and its wheel b on axes that cross at right angles; ``radius`` is that of the worm's pitch cylinder."""
+    """Declare a worm a and its wheel b on perpendicular crossed axes.
+
+    ``radius`` is that of the pitch cylinder of the worm.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> axes = [("A", "worm", (0, 0, 0), (1, 0, 0)), ("B", "wheel", (0, 0.05, 0), (0, 0, 1))]
+    >>> pairs = [mg.Pair(k, "R", "frame", link, point=p, axis=z) for k, link, p, z in axes]
+    >>> m = mg.Mechanism(
+    ...     "worm", pairs=pairs, couplings=[mg.WormGear("g", "A", "B", teeth=(2, 40), radius=0.01)], drives=["A"]
+    ... )
+    >>> abs(mg.kinematics(m, {"A": 1.0})["B"].position)
+    array([0.05])
+    """
 
     kind: ClassVar[str] = "worm"
     teeth: Annotated[Any, TWO_WHOLE("starts of the worm and teeth of the wheel")]
@@ -240,7 +280,19 @@ class WormGear(Contact):
 
 @dataclass(frozen=True)
 class Rack(Contact):
-    """A pinion a on a pair R and a rack b on a pair P; the rack lies on the side of the pinion where the point of its pair is."""
+    """Declare a pinion a on a revolute pair and a rack b on a prismatic pair.
+
+    The rack is on the side of the pinion on which the point of its pair lies.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> pairs = [mg.Pair("A", "R", "frame", "pinion", point=(0, 0, 0), axis=(0, 0, 1))]
+    >>> pairs += [mg.Pair("B", "P", "frame", "rack", point=(0, -0.02, 0), axis=(1, 0, 0))]
+    >>> m = mg.Mechanism("rack", pairs=pairs, couplings=[mg.Rack("g", "A", "B", radius=0.02)], drives=["A"])
+    >>> mg.kinematics(m, {"A": 1.0})["B"].position
+    array([0.02])
+    """
 
     kind: ClassVar[str] = "rack"
     slides: ClassVar[bool] = True
@@ -273,7 +325,21 @@ class Rack(Contact):
 
 @dataclass(frozen=True)
 class Belt(Contact):
-    """A belt or chain around two pulleys on parallel axes, open or crossed; the strand that pulls carries all, the other nothing."""
+    """Declare a belt or chain around two pulleys on parallel axes, open or crossed.
+
+    The tight side carries the whole load, the slack side nothing.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> pairs = [
+    ...     mg.Pair(k, "R", "frame", link, point=(x, 0, 0), axis=(0, 0, 1))
+    ...     for k, link, x in [("A", "p", 0), ("B", "w", 0.5)]
+    ... ]
+    >>> m = mg.Mechanism("belt", pairs=pairs, couplings=[mg.Belt("g", "A", "B", radii=(0.1, 0.2))], drives=["A"])
+    >>> mg.kinematics(m, {"A": 1.0})["B"].position
+    array([0.5])
+    """
 
     kind: ClassVar[str] = "belt"
     radii: Annotated[Any, TWO_POSITIVE("of both pulleys", LENGTH)]

@@ -224,14 +224,22 @@ CUBICS = {"monotone": "PchipInterpolator", "cubic": "CubicSpline"}
 
 @dataclass(frozen=True)
 class ForceTable(Described):
-    """A force over the coordinate ``x``, over the rate ``v``, or over a grid of both (then ``force[i][j]`` at ``x[i]``, ``v[j]``).
+    """Tabulate a force over the coordinate ``x``, the rate ``v``, or a grid of both (``force[i][j]`` at ``x[i]``, ``v[j]``).
 
-    ``interpolation``: ``"monotone"`` (once differentiable, never beyond the neighbouring values: Fritsch and Butland, 1984) or ``"cubic"``
-    (twice differentiable spline). ``outside`` of the table: ``"error"``, or ``"hold"``, the value at its end.
+    ``"monotone"`` interpolation is once differentiable and never exceeds the neighboring values (Fritsch and Butland, 1984);
+    ``"cubic"`` is a twice differentiable spline. ``outside`` the table raises, or holds the value at its end.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> gas = mg.ForceTable(x=[0.3, 0.5], force=[480, 400], outside="hold")
+    >>> s = mg.solve(mg.load("four-bar"), {"A": 0.4}, loads=[mg.ForceLaw("A", law=gas)])
+    >>> s["A"].applied_effort.round(6)
+    array([440.])
     """
 
-    x: Annotated[Any, SAMPLES("coordinates or distances, rising", **POSITION, default="this,")] = None
-    v: Annotated[Any, SAMPLES("rates, rising", **RATE, default="this, or both")] = None
+    x: Annotated[Any, SAMPLES("coordinates or distances, rising", **POSITION, default="over v alone")] = None
+    v: Annotated[Any, SAMPLES("rates, rising", **RATE, default="over x alone")] = None
     force: Annotated[Any, SAMPLES("one for each `x` or `v`, or for both a row of `v` for each `x`", FORCE, MOMENT)] = ()
     interpolation: Annotated[
         Literal["monotone", "cubic"],
@@ -426,26 +434,37 @@ class Elastic(Law):
 
 @dataclass(frozen=True, eq=False)
 class Spring(_ByPlace, Elastic):
-    """A spring (and damper) between point ``p`` of link ``a`` and point ``q`` of link ``b``, or in a freedom, ``Spring("D", ...)``.
+    """Declare a spring (and damper) between points of two links, or in a freedom, ``Spring(freedom="D")``.
 
-    Tension ``stiffness (l - free_length) + damping dl/dt`` along the line of the points, points as in ``Wrench``; in a freedom
-    ``-stiffness (q - free_length) - damping dq/dt``, as ``TorsionSpring``.
+    The tension along the line from point ``p`` of link ``a`` to point ``q`` of link ``b`` is
+    ``stiffness (l - free_length) + damping dl/dt``; in a freedom the effort is ``-stiffness (q - free_length) - damping dq/dt``.
+    Points as in ``Wrench``.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> spring = mg.Spring("frame", "rocker", (0.4, 0.2, 0), (0.4, 0.3, 0), stiffness=200.0, free_length=0.05)
+    >>> s = mg.solve(mg.load("four-bar"), {"A": 0.0}, loads=[spring])
+    >>> float(s.load(0).coordinate.round(6)), float(s.load(0).force.round(6))
+    (0.1, -10.0)
     """
 
     kind: ClassVar[str] = "spring"
     subject: ClassVar[str] = "spring"
     rest: ClassVar[str] = "free_length"
-    a: Annotated[Any, LINK_NAME("first link", default="these four,")] = None
-    b: Annotated[str | None, LINK_NAME("second link", default="likewise")] = None
-    p: Annotated[Any, NAMED_POINT("point of link a, or its name", LENGTH, of="a", default="likewise")] = None
-    q: Annotated[Any, NAMED_POINT("point of link b, or its name", LENGTH, of="b", default="likewise")] = None
+    a: Annotated[Any, LINK_NAME("first link", default="in a freedom")] = None
+    b: Annotated[str | None, LINK_NAME("second link", default="in a freedom")] = None
+    p: Annotated[Any, NAMED_POINT("point of link a, or its name", LENGTH, of="a", default="in a freedom")] = None
+    q: Annotated[Any, NAMED_POINT("point of link b, or its name", LENGTH, of="b", default="in a freedom")] = None
     stiffness: Annotated[
         float | None,
-        NUMBER("force per length, or effort per coordinate", FORCE_PER_LENGTH, MOMENT, default="must be given"),
+        NUMBER("force per length, or effort per coordinate", FORCE_PER_LENGTH, MOMENT, default="needed"),
     ] = None
     free_length: Annotated[float, NUMBER("length, or coordinate, without tension", **POSITION)] = 0.0
     damping: Annotated[float, NUMBER("force or effort per rate", FORCE_PER_VELOCITY, MOMENT_PER_RATE)] = 0.0
-    freedom: Annotated[str | None, FREEDOM_NAME("a single turn or slide", default="or this alone")] = None
+    freedom: Annotated[
+        str | None, FREEDOM_NAME("a single freedom: rotation or translation", default="between points")
+    ] = None
 
     def __post_init__(self) -> None:
         if self.freedom is None:
@@ -464,12 +483,20 @@ class Spring(_ByPlace, Elastic):
 
 @dataclass(frozen=True, eq=False)
 class TorsionSpring(Elastic):
-    """A spring (and damper) in a single freedom: effort ``-stiffness (q - free) - damping dq/dt``; for turns and slides."""
+    """Declare a spring (and damper) in a single freedom: effort ``-stiffness (q - free) - damping dq/dt``.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> s = mg.solve(mg.load("four-bar"), {"A": 0.5}, loads=[mg.TorsionSpring("A", stiffness=2.0)])
+    >>> s["A"].applied_effort, s["A"].effort.round(9)
+    (array([-1.]), array([1.]))
+    """
 
     kind: ClassVar[str] = "torsion_spring"
     subject: ClassVar[str] = "torsion spring in {freedom}"
     rest: ClassVar[str] = "free"
-    freedom: Annotated[str, FREEDOM_NAME("a single turn or slide")]
+    freedom: Annotated[str, FREEDOM_NAME("a single freedom: rotation or translation")]
     stiffness: Annotated[float, NUMBER("effort per coordinate", FORCE_PER_LENGTH, MOMENT)]
     free: Annotated[float, NUMBER("coordinate without effort", **POSITION)] = 0.0
     damping: Annotated[float, NUMBER("effort per rate", FORCE_PER_VELOCITY, MOMENT_PER_RATE)] = 0.0
@@ -483,11 +510,13 @@ Place = str | tuple[str, str, Any, Any]
 class _Placed(_ByPlace):
     """A law placed by its first arguments: the name of a freedom, ``(link a, link b, p, q)``, or these four."""
 
-    freedom: Annotated[Place | None, FREEDOM_NAME("a single turn or slide", default="a, b, p and q")] = None
-    a: Annotated[str | None, LINK_NAME("first link", default="freedom")] = None
-    b: Annotated[str | None, LINK_NAME("second link", default="freedom")] = None
-    p: Annotated[Any, NAMED_POINT("point of link a, or its name", LENGTH, of="a", default="freedom")] = None
-    q: Annotated[Any, NAMED_POINT("point of link b, or its name", LENGTH, of="b", default="freedom")] = None
+    freedom: Annotated[
+        Place | None, FREEDOM_NAME("a single freedom: rotation or translation", default="between points")
+    ] = None
+    a: Annotated[str | None, LINK_NAME("first link", default="in a freedom")] = None
+    b: Annotated[str | None, LINK_NAME("second link", default="in a freedom")] = None
+    p: Annotated[Any, NAMED_POINT("point of link a, or its name", LENGTH, of="a", default="in a freedom")] = None
+    q: Annotated[Any, NAMED_POINT("point of link b, or its name", LENGTH, of="b", default="in a freedom")] = None
 
     def __post_init__(self) -> None:
         if self.freedom is not None and self.q is None:
@@ -497,7 +526,15 @@ class _Placed(_ByPlace):
 
 @dataclass(frozen=True, eq=False)
 class Damper(_Placed):
-    """A linear damper: ``F = -coefficient x'``, in a freedom ``"D"`` or between points ``(link a, link b, p, q)``."""
+    """Declare a linear damper, ``F = -coefficient x'``, in a freedom or between points ``(link a, link b, p, q)``.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> motion = {"A": mg.Motion(0.5, velocity=3.0)}
+    >>> mg.solve(mg.load("four-bar"), motion, loads=[mg.Damper("A", coefficient=4.0)])["A"].applied_effort
+    array([-12.])
+    """
 
     kind: ClassVar[str] = "damper"
     subject: ClassVar[str] = "damper"
@@ -512,11 +549,17 @@ class Damper(_Placed):
 
 @dataclass(frozen=True, eq=False)
 class ForceLaw(_Placed):
-    """A force ``F = scale law(x - free, x', t)``, in a freedom ``"D"`` or between points ``(link a, link b, p, q)``.
+    """Declare a force ``F = scale law(x - free, x', t)`` in a freedom or between points ``(link a, link b, p, q)``.
 
-    ``law`` is a ``ForceTable`` or a function of arrays ``(T,)``: coordinate, rate and time (None where the motion has no times). ``F``
-    acts along the coordinate, its power is ``F x'``: + on link b and - on link a in a freedom; + pushes the points apart. ``breaks`` are
-    times at which a function jumps or bends: in ``respond`` steps end there.
+    ``law`` is a ``ForceTable`` or a function of arrays ``(T,)``: coordinate, rate and time (None if the motion has no times). ``F``
+    acts along the coordinate and its power is ``F x'``: + on link b and - on link a in a freedom; + pushes the points apart.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> stop = mg.ForceLaw("A", law=lambda x, v, t: -300.0 * x**3)
+    >>> mg.solve(mg.load("four-bar"), {"A": 0.5}, loads=[stop])["A"].applied_effort
+    array([-37.5])
     """
 
     kind: ClassVar[str] = "force_law"
@@ -583,7 +626,17 @@ class ForceLaw(_Placed):
 
 @dataclass(frozen=True, eq=False)
 class Gravity(Load):
-    """Uniform gravity: force ``m g`` at the mass centre of every link; ``acceleration`` is the vector g."""
+    """Declare uniform gravity: the force ``m g`` at the mass center of every link.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> bar = mg.Mechanism("bar", [mg.Link("frame"), mg.Link("bar", 2.0, (0.3, 0, 0))], [
+    ...     mg.Pair("A", "R", "frame", "bar", point=(0, 0, 0), axis=(0, 0, 1)),
+    ... ], drives=["A"], loads=[mg.Gravity((0, -9.81, 0))])  # fmt: skip
+    >>> mg.solve(bar, {"A": 0.0})["A"].effort.round(3)
+    array([5.886])
+    """
 
     kind: ClassVar[str] = "gravity"
     subject: ClassVar[str] = "gravity"
@@ -608,12 +661,18 @@ class Gravity(Load):
 
 @dataclass(frozen=True, eq=False)
 class Wrench(Load):
-    """A force at a material point and a moment on one link.
+    """Declare a force at a material point and a moment on one link.
 
-    ``point`` is in the coordinates of the declared configuration, in which link frames stand on the global one (for a link
-    placed by markers: its own frame), or the name of a point of the link; the mass centre where it is left out (a force on
-    a link without one needs it). ``frame`` says whether force and moment have global directions or turn with the link.
-    Values may be arrays over positions or a callable ``(pose, twist, t)`` of the link; ``breaks`` as of a ``ForceLaw``.
+    ``point`` is in the coordinates of the declared configuration (of a link placed by markers: in its own frame), or names a point of
+    the link. Values may be arrays over positions or a function ``(pose, twist, t)`` of the link.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> m = mg.load("four-bar").replace(loads=[mg.Wrench("coupler", force=(0, 10, 0), point=(0.25, 0.15, 0))])
+    >>> s = mg.solve(m, {"A": 0.0})
+    >>> float(s["A"].effort[0].round(6))
+    0.108696
     """
 
     kind: ClassVar[str] = "wrench"
@@ -660,9 +719,16 @@ class Wrench(Load):
 
 @dataclass(frozen=True, eq=False)
 class Effort(Load):
-    """A given effort in a freedom: couple about a turn, force along a slide; + on link b, - on link a.
+    """Declare a given effort in a freedom: a couple about a rotation, a force along a translation; + on link b, - on link a.
 
-    ``value`` may be an array over positions or a callable ``(pose, twist, t)`` of link b; ``breaks`` as of a ``ForceLaw``.
+    ``value`` may be an array over positions or a function ``(pose, twist, t)`` of link b.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> m = mg.load("four-bar").replace(loads=[mg.Effort("D", -5.0)])
+    >>> mg.solve(m, {"A": 0.5})["D"].applied_effort
+    array([-5.])
     """
 
     kind: ClassVar[str] = "effort"

@@ -160,24 +160,55 @@ def _vector(value: Any) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Mechanism(Parts, Once, Shown):
-    """A mechanism: a graph whose nodes are links and whose edges are kinematic pairs.
+    """Declare a mechanism: a graph with links as nodes and kinematic pairs as edges.
 
     Parameters
     ----------
-    name : for messages and reports.
-    links : the first is the frame unless ``frame`` names another; left out, links are inferred from the pairs, massless.
-    pairs, drives, loads : see ``Pair``, ``Drive`` (a name alone will do) and the loads.
-    couplings : linear relations between freedoms, see ``Coupling``; kept with full freedom names, ``"A.Rz"``.
-    start : pair coordinates near which to assemble, freedom -> value; picks the branch.
-    units : names of the units of ``length``, ``mass`` and ``time`` in which the numbers are declared (a consistent set).
-    tol : accuracy to which directions (radians) and distances (over L) are meant, see ``snapped``; left out, they are exact.
-    response : what ``respond`` takes where it is given nothing else: time, start, rates, motions, events, tolerances.
-    source, description, expected : where it comes from, what it is, and facts that a test checks.
+    name : str
+        Name for messages and reports.
+    links : iterable of Link or str, optional
+        The first is the frame unless ``frame`` names another. Default: inferred from the pairs, massless.
+    pairs : iterable of Pair
+        The pairs; several may join the same two links.
+    drives : iterable of Drive or str
+        Driven freedoms, ``"A"`` or ``"B.Tz"``.
+    loads : iterable of load
+        ``Gravity``, ``Wrench``, ``Effort``, ``Spring``, ``TorsionSpring``, ``Damper``, ``ForceLaw``.
+    couplings : iterable of Coupling
+        Linear relations between freedoms, gears and belts among them; kept with full freedom names, ``"A.Rz"``.
+    frame : str, optional
+        Name of the fixed link. Default: the first link.
+    start : mapping of str to float, optional
+        Pair coordinates [rad, length] near which to assemble; they select the assembly mode. Default: all 0.
+    units : mapping of str to str, optional
+        Names of the units of ``length``, ``mass`` and ``time``, a consistent set. They label results and change no number.
+    tol : float, optional
+        Accuracy of directions [rad] and distances (relative to L), see ``snapped``. Default: exact.
+    response : ResponseSetup, optional
+        Default arguments of ``respond``.
+    source : str
+        Where the mechanism comes from.
+    description : str
+        What it is.
+    expected : mapping, optional
+        Facts that a test checks; any names.
 
     Raises
     ------
     DeclarationError
-        with all faults at once.
+        With every fault of the declaration.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> z = (0, 0, 1)
+    >>> m = mg.Mechanism(
+    ...     "pendulum",
+    ...     [mg.Link("frame"), mg.Link("bob", 2.0, (0, -0.5, 0))],
+    ...     [mg.Pair("A", "R", "frame", "bob", point=(0, 0, 0), axis=z)],
+    ... )
+    >>> m.freedom_names()
+    ('A.Rz',)
     """
 
     _every_method_is_a_door = False
@@ -312,7 +343,23 @@ class Mechanism(Parts, Once, Shown):
     # --- changed copies ----------------------------------------------------------------------------------------------
 
     def replace(self, **changes: Any) -> Mechanism:
-        """A copy with the named fields changed, checked again."""
+        """Return a copy with changed fields, checked again.
+
+        Parameters
+        ----------
+        **changes
+            Fields of ``Mechanism``.
+
+        Returns
+        -------
+        Mechanism
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> mg.load("four-bar").replace(loads=[]).loads
+        ()
+        """
         unknown = set(changes) - set(self.formats)
         if unknown:
             raise DeclarationError(
@@ -356,7 +403,32 @@ class Mechanism(Parts, Once, Shown):
 
     @door
     def with_pair_type(self, pair: str, type: str | PairType, *, pitch: float | None = None) -> Mechanism:
-        """A copy in which one pair has another type, at the same markers; drives that it cannot take are dropped."""
+        """Return a copy in which one pair has another type at the same markers; drives that it cannot take are dropped.
+
+        Parameters
+        ----------
+        pair : str
+            Name of the pair.
+        type : str or PairType
+            The new type.
+        pitch : float, optional
+            Advance per radian [length] of a helical pair.
+
+        Returns
+        -------
+        Mechanism
+
+        Raises
+        ------
+        DeclarationError
+            Unknown pair or type.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> mg.check(mg.load("four-bar").with_pair_type("B", "S")).redundancy
+        1
+        """
         old = self.pair(pair)
         new = Pair(
             old.name,
@@ -389,9 +461,29 @@ class Mechanism(Parts, Once, Shown):
 
     @door
     def to_units(self, **units: str) -> Mechanism:
-        """The same mechanism in other units, e.g. ``m.to_units(length="mm", mass="g")`` (``units`` extra).
+        """Return the mechanism in other units (``units`` extra).
 
-        Needs the present units declared.
+        Parameters
+        ----------
+        **units
+            Names of units by ``length``, ``mass``, ``time``.
+
+        Returns
+        -------
+        Mechanism
+
+        Raises
+        ------
+        DeclarationError
+            The mechanism declares no units, or a name is unknown.
+        MissingExtraError
+            Without pint.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> mg.load("four-bar").to_units(length="mm").link("crank").center
+        (0.0, 50.0, 0.0)
         """
         faults = [wrong(unit, name, "the name of a unit") for name, unit in units.items() if not isinstance(unit, str)]
         if faults:
@@ -410,17 +502,33 @@ class Mechanism(Parts, Once, Shown):
 
     @door
     def snapped(self, tol: float) -> Mechanism:
-        """The mechanism with the smallest change that makes near-special geometry exact; ``changes`` of it prints what was moved.
+        """Return the mechanism with the smallest change that makes near-special geometry exact; ``changes`` of it lists the changes.
 
-        Axes, directions, centres and lengths that miss being parallel, square, in one line or place, intersecting or equal by what
-        rounding to ``tol`` (radians, lengths / L) may make of them are made so, and what is left is fitted for the mechanism to move
-        (see ``structure.snapping``). The change is the smallest in the sum of ``angle^2 + (shift / L)^2`` over the pairs.
-        Relations that cannot hold together within ``tol`` are listed in ``changes.dropped`` and not applied.
+        Axes, directions, centers and lengths that are parallel, perpendicular, in line, intersecting or equal within rounding to
+        ``tol`` become exactly so; the rest is fitted for the mechanism to move. The change is the least
+        ``sum angle^2 + (shift / L)^2`` over the pairs. Relations that cannot hold together are in ``changes.dropped``.
+
+        Parameters
+        ----------
+        tol : float
+            Accuracy of directions [rad] and distances (relative to L).
+
+        Returns
+        -------
+        Mechanism
 
         Raises
         ------
         DeclarationError, AssemblyError
-            where the mechanism has no geometry, or its loops do not close to ``tol``.
+            No geometry, or loops that do not close to ``tol``.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> m = mg.load("four-bar")
+        >>> tilted = m.replace(pairs=[*m.pairs[:3], m.pairs[3].replace(axis=(0.001, 0, 1))])
+        >>> mg.check(tilted).mobility, mg.check(tilted.snapped(0.005)).mobility
+        (0, 1)
         """
         # this, equivalent() and view() call up to a room above: a user looks for them here
         made: Mechanism = importlib.import_module("mechgraph.determinacy.snapping").snapped(self, tol)
@@ -428,15 +536,31 @@ class Mechanism(Parts, Once, Shown):
 
     @door
     def equivalent(self, at: Mapping[str, float] | None = None, *, rollers: str = "removed") -> Mechanism:
-        """The planar mechanism with links and lower pairs in place of higher pairs, gears and belts, with freedoms at values ``at``.
+        """Return the planar mechanism with links and lower pairs in place of higher pairs, gears and belts.
 
-        It has the same velocities and accelerations there. ``rollers="kept"`` keeps a roller on a pin as a
-        link that spins passively; it is otherwise itself the link that takes the place of its contact.
+        It has the same velocities and accelerations at that position.
+
+        Parameters
+        ----------
+        at : mapping of str to float, optional
+            Coordinates [rad, length]. Default: the start.
+        rollers : {"removed", "kept"}
+            Keep a roller on a pin as a link that spins passively.
+
+        Returns
+        -------
+        Mechanism
 
         Raises
         ------
         DeclarationError
-            where it is not planar, or has couplings without a line of contact.
+            Not planar, or couplings without a line of contact.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> mg.load("geneva").equivalent().name
+        'geneva, lower pairs'
         """
         made: Mechanism = importlib.import_module("mechgraph.determinacy.equivalent").equivalent(
             self, at, rollers=rollers
@@ -444,20 +568,44 @@ class Mechanism(Parts, Once, Shown):
         return made
 
     def view(self) -> Any:
-        """The mechanism in a notebook, in space, with every freedom, self-stress and advice (``notebook`` extra).
+        """Show the mechanism in a notebook, in space, with every freedom, self-stress and recommendation (``notebook`` extra).
 
-        It moves as its drivers' stored motions say, where they all store one.
+        Returns
+        -------
+        object
+            A widget; it moves as the stored motions of its drives say, if all have one.
 
         Raises
         ------
         DeclarationError
-            where it cannot be drawn; MissingExtraError without anywidget.
+            It cannot be drawn.
+        MissingExtraError
+            Without anywidget.
         """
         return importlib.import_module("mechgraph.show.page.write").view(self)
 
     @door
     def moved(self, pose: Any) -> Mechanism:
-        """The whole mechanism after a rigid motion: a 4 x 4 (or 3 x 4) pose. Coordinates of the pairs stay what they are."""
+        """Return the mechanism after a rigid motion; pair coordinates do not change.
+
+        Parameters
+        ----------
+        pose : (4, 4) or (3, 4) array_like
+            The motion.
+
+        Returns
+        -------
+        Mechanism
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> import numpy as np
+        >>> pose = np.eye(4)
+        >>> pose[:3, 3] = 1, 2, 3
+        >>> mg.load("four-bar").moved(pose).pair("A").point
+        (1.0, 2.0, 3.0)
+        """
         fits = is_numeric(pose, (4, 4)) or is_numeric(pose, (3, 4))
         G = np.asarray(pose, dtype=float)[:3] if fits else np.zeros((3, 4))
         R = G[:, :3]

@@ -55,17 +55,35 @@ NO_POINTS: Mapping[str, tuple[float, ...]] = MappingProxyType({})
 
 @dataclass(frozen=True)
 class Link(Described):
-    """A link (rigid body).
+    """Declare a link, a rigid body.
 
     Parameters
     ----------
-    name : its name in the graph.
-    mass : not negative.
-    center : mass centre in the link's frame (global coordinates at the declared configuration for the point/axis form);
-        needed where mass > 0.
-    inertia : 3 x 3 tensor about the mass centre, in the link's frame (off-diagonals are minus the products of inertia).
-    unphysical : accept an inertia that no body can have.
-    points : named points, ``{"tip": (x, y, z)}`` in the coordinates of ``center``, for loads, prescribed motion and results.
+    name : str
+        Name in the graph.
+    mass : float
+        Mass, not negative. Default: 0.
+    center : (3,) array_like, optional
+        Mass center [length] in the frame of the link (global coordinates if pairs are given by point and axis). Required if mass > 0.
+    inertia : (3, 3) array_like, optional
+        Tensor about the mass center [mass length^2] in the frame of the link; off-diagonals are minus the products of inertia.
+        Default: 0, a point mass.
+    unphysical : bool
+        Accept an inertia that no body can have.
+    points : mapping of str to (3,) array_like, optional
+        Named points in the coordinates of ``center``, for loads, prescribed motion and results.
+
+    Raises
+    ------
+    DeclarationError
+        From ``Mechanism``, which checks all links.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> rod = mg.inertia.rod(12.0, (0, 0, 0), (1, 0, 0))
+    >>> mg.Link("crank", 12.0, (0.5, 0, 0), rod, points={"tip": (1, 0, 0)}).inertia
+    ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     """
 
     name: Annotated[str, TEXT("in a chain: `frame`, `link1`, `link2`, ...")]
@@ -169,7 +187,15 @@ def largest_cosine(tol: float) -> float:
 
 @dataclass(frozen=True)
 class Marker(Described):
-    """A marker frame on a link: origin ``point``, z along ``axis``, x along ``second`` (projected perpendicular to z)."""
+    """Declare a marker frame on a link: origin ``point``, z along ``axis``, x along ``second`` (projected perpendicular to z).
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> a, b = mg.Marker((1, 0, 0), (0, 0, 1)), mg.Marker((0, 0, 0), (0, 0, 1))
+    >>> mg.Pair("B", "R", "crank", "rod", on_a=a, on_b=b).on_a.point
+    (1.0, 0.0, 0.0)
+    """
 
     point: Annotated[Any, POINT("origin", LENGTH, default="0")] = (0.0, 0.0, 0.0)
     axis: Annotated[Any, DIRECTION("z: pair axis, plane normal or groove direction, any length", default="z")] = (
@@ -206,28 +232,59 @@ class Marker(Described):
 
 @dataclass(frozen=True)
 class Pair(Described):
-    """A kinematic pair from link ``a`` to link ``b``; its reaction is the wrench that ``a`` exerts on ``b``.
+    """Declare a kinematic pair from link ``a`` to link ``b``; its reaction is the wrench of ``a`` on ``b``.
+
+    Give the marker of the pair either as ``point`` and ``axis`` in global coordinates, at a configuration with closed loops, or as
+    ``on_a`` and ``on_b``, one marker per link in the frame of that link. With neither, the pair is topology: it can be counted, not
+    solved.
 
     Parameters
     ----------
-    name : its name in the graph; freedoms are named ``"name.Rz"`` after it.
-    type : a symbol of the pair table or its name there (``"R"``, ``"revolute"``), or a PairType.
-    a, b : the links. Groove, plane and slot belong to ``a``.
-    point, axis, second : marker in global coordinates at the declared configuration (all coordinates zero).
-    pitch, lead : advance per radian or per turn, right-hand positive; exactly one where the type needs it.
-    on_a, on_b : instead of point/axis, a Marker on each link in that link's own frame.
-    closed : of a contact, "form" (b is held on both sides) or "force" (a can only push b, along the axis of a plane, along ``second`` of a
-        groove: where it would have to pull, the solution says that b lifts off). Left out, b is held; where the profile is open (two
-        curves, a cam, a roller or ball on a curve or surface) and would have to pull, the solution asks for it.
-    radius : of the ball or cylinder on link b.
-    hertz : Hertz, materials and what else the pressure in a contact takes.
-    curve : a ``Curve`` in the frame of link a, along which the marker travels: of P, C, Sg, and of the types Ps and Kc that need one. Then
-        ``point`` is a place on it (where it begins if left out), and axis and second direction are those of its frame there; in a
-        straight slot (Ps) ``axis`` is that of the pin. With ``on_b`` instead of a point, coordinates are arc lengths from where the
-        curve is nearest to that of ``on_a`` (where it begins if left out; see ``start``).
-    curve_b : the curve on link b that touches it (Kc); a straight face where left out.
-    surface : a ``Surface`` in the frame of link a, on which the marker of Sp travels; ``point`` is a place on it.
-    roller : radius of a roller that runs on the curve, or of a ball on the surface; ``point`` is its centre.
+    name : str
+        Name in the graph; its freedoms are named after it, ``"name.Rz"``.
+    type : str or PairType
+        Symbol or name in the pair table (``"R"``, ``"revolute"``), or a pair type of your own.
+    a, b : str
+        Names of the links. Groove, plane and slot belong to ``a``.
+    point : (3,) array_like, optional
+        Origin of the marker [length], global.
+    axis : (3,) array_like, optional
+        z of the marker: pair axis, plane normal or groove direction; any length.
+    second : (3,) array_like, optional
+        x of the marker. Default: the global axis least aligned with ``axis``.
+    pitch, lead : float, optional
+        Advance per radian or per turn [length], right-hand positive; give exactly one for a helical pair.
+    on_a, on_b : Marker, optional
+        Marker on each link, in the frame of that link.
+    closed : {"", "form", "force"}
+        Of a contact: ``"form"`` holds b on both sides; with ``"force"`` a can only push b (along the axis of a plane, along
+        ``second`` of a groove), and the solution reports loss of contact. Default: held; an open profile (cam, two curves) with
+        tensile contact force warns.
+    radius : float, optional
+        Radius [length] of the ball or cylinder on link b.
+    hertz : Hertz, optional
+        Materials, for the contact pressure.
+    curve : Curve, optional
+        Curve in the frame of link a along which the marker travels: P, C, Sg, and required for Ps and Kc. ``point`` is then a place
+        on it (default: where it begins), ``axis`` and ``second`` are those of its frame there; in a straight slot (Ps) ``axis`` is
+        that of the pin.
+    curve_b : Curve, optional
+        Curve on link b that touches ``curve`` (Kc). Default: a straight face.
+    roller : float, optional
+        Radius [length] of a roller on the curve or a ball on the surface; ``point`` is its center.
+    surface : Surface, optional
+        Surface in the frame of link a on which the marker of Sp travels; ``point`` is a place on it.
+
+    Raises
+    ------
+    DeclarationError
+        From ``Mechanism``, which checks all pairs.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> mg.Pair("B", "C", "crank", "rod", point=(0.1, 0, 0), axis=(0, 0, 1)).freedom_names
+    ('B.Rz', 'B.Tz')
     """
 
     name: Annotated[str, TEXT("freedoms are named NAME.Rz and so on")]

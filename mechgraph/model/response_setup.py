@@ -47,10 +47,17 @@ WHATS: tuple[What, ...] = get_args(What)
 
 @dataclass(frozen=True)
 class Event(Described):
-    """A quantity that passes a value: ``of`` is the name of a freedom, or a function of the Solution at one time that gives a number.
+    """Declare an event: a quantity passes a value during ``respond``.
 
-    ``what``: of a freedom its ``"position"``, ``"velocity"`` or ``"acceleration"``; ``direction``: 1 for rising, -1 for falling, 0 for
-    both; ``terminal``: the motion ends there.
+    ``of`` names a freedom, or is a function of the Solution at one time that returns a number.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> m = mg.load("windows-2")
+    >>> r = mg.respond(m, (0, 10), rates={"A0": -1.0}, events=[mg.Event("A0", -3.0, terminal=True)])
+    >>> len(r.events), round(float(r["A0"].position[-1, 0]), 6)
+    (1, -3.0)
     """
 
     of: Annotated[Any, FREEDOM_NAME("the freedom that is watched")]
@@ -94,7 +101,18 @@ class Event(Described):
 
 @dataclass(frozen=True)
 class Stop(Described):
-    """Limits of a freedom, ``lower`` and ``upper`` (None: no limit), which it strikes with a coefficient of ``restitution`` 0 to 1."""
+    """Declare limits of a freedom for ``respond``: impact at ``lower`` and ``upper`` with a coefficient of restitution.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> bob = mg.Mechanism("bob", [mg.Link("frame"), mg.Link("bob", 1.0, (1, 0, 0))], [
+    ...     mg.Pair("A", "R", "frame", "bob", point=(0, 0, 0), axis=(0, 0, 1)),
+    ... ], loads=[mg.Gravity((0, -9.81, 0))])  # fmt: skip
+    >>> r = mg.respond(bob, (0, 1), stops=[mg.Stop("A", lower=-1.0, restitution=0.5)])
+    >>> print(r.events[0])
+    A meets its lower stop at t = 0.459381
+    """
 
     freedom: Annotated[str, FREEDOM_NAME("the freedom that is limited")]
     lower: Annotated[float | None, NUMBER("lower limit; at least one of the two", default="none", **POSITION)] = None
@@ -124,10 +142,14 @@ PassiveName = Literal["free", "held"]
 
 @dataclass(frozen=True, eq=False)
 class ResponseSetup(Described):
-    """What ``respond(m)`` takes where its arguments are left out; see there.
+    """Store default arguments of ``respond`` with a mechanism, ``Mechanism(..., response=...)`` or ``[response]`` in its file.
 
-    ``time``: ``(begin, end)`` or the times of the outputs, rising; ``points``: with ``(begin, end)`` so many outputs, evenly spread;
-    ``motions``: freedom -> ``Motion``, or ``Drive``s that carry one.
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> m = mg.load("windows-2").replace(response=mg.ResponseSetup((0, 1), points=5, rates={"A0": -1.0}))
+    >>> mg.respond(m).t
+    array([0.  , 0.25, 0.5 , 0.75, 1.  ])
     """
 
     time: Annotated[Any, SERIES("begin and end, or the rising times of the outputs", TIME)]

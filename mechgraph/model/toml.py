@@ -76,12 +76,22 @@ def library_path(name: str | None = None) -> Path:
 
 
 def library_names() -> tuple[str, ...]:
-    """Names of the mechanisms in the library, sorted: the stems of its TOML files.
+    """List the names of the library mechanisms, sorted.
+
+    Returns
+    -------
+    tuple of str
 
     Raises
     ------
     FileError
-        No library folder, see `library_path`.
+        The library folder is missing.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> mg.library()[:3]
+    ('7r', 'andrews', 'bennett')
     """
     return _stems(library_path())
 

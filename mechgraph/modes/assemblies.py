@@ -503,24 +503,45 @@ def assemblies(
     cache: bool = True,
     progress: Progress | None = None,
 ) -> Any:
-    """All real assemblies with some freedoms, points of links or link poses given: the closure solved over the complex numbers.
+    """Find all assembly modes for given joint values, points or link poses by homotopy continuation.
 
-    All assemblies of a random complex mechanism of the same class (topology, and the relations that make closure rows dependent) are
-    found once by monodromy and kept; tracks lead from these to the mechanism at hand. Where no class is known (helical pairs, relations
-    such as Bennett's), real assemblies are searched from random guesses, and the result says so.
+    Monodromy finds all solutions of a generic complex mechanism of the same class (topology, and relations that make closure
+    equations dependent) and keeps them; parameter homotopy tracks them to your mechanism. If no homotopy is available (helical
+    pairs), real assembly modes are searched from random guesses, and the result says so. Source: Sommese and Wampler, 2005.
 
     Parameters
     ----------
-    values : as for ``solve``: freedom -> value, ``"bucket.tip"`` -> point, ``"platform"`` -> pose (4, 4). One position gives
-        ``Assemblies``, a list of values ``AssembliesOver``.
-    seed : of all random numbers; the assemblies and their order do not depend on it.
-    guesses, turns : of a search, and the turns about the start within which angles are guessed.
-    cache : whether start sets are kept in the user's folder (see ``modes.store``).
-    progress : called with a line of text now and then; an exception raised in it ends the call.
+    m : Mechanism
+        The mechanism.
+    values : mapping, optional
+        As in ``solve``: freedom -> value, ``"bucket.tip"`` -> point, ``"platform"`` -> pose ``(4, 4)``. Lists of values give
+        ``AssembliesOver``.
+    seed : int
+        Seed of all random numbers; modes and their order do not depend on it.
+    guesses : int
+        Number of guesses of a search.
+    turns : float
+        Turns about the start within which a search guesses angles.
+    cache : bool
+        Keep start solutions in the user's folder (``MECHGRAPH_CACHE``, else ``~/.cache/mechgraph``).
+    progress : callable, optional
+        Called with a line of text now and then; an exception raised in it ends the call.
+
+    Returns
+    -------
+    Assemblies or AssembliesOver
 
     Raises
     ------
     DeclarationError, AssemblyError, IndeterminateError
+        Invalid values; no position; freedoms left open.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> modes = mg.assemblies(mg.load("7r"), {"O1": 0.3})
+    >>> len(modes), modes.total, modes.completeness
+    (4, 16, 'proved')
     """
     question = Question(m, values)
     found = Finder(question, int(seed), cache, progress).positions(int(guesses), float(turns))

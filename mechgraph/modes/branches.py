@@ -288,17 +288,29 @@ class Defects:
 
 @dataclass(frozen=True, repr=False)
 class Branches(Shown):
-    """All branches of a mechanism over the range of one driver.
+    """All branches of a mechanism over the range of one driver. Returned by ``branches``.
 
     Attributes
     ----------
-    mechanism, driver : what moves, and by what.
-    branches, folds, bifurcations : see there; folds by driver value.
-    circuits : numbers of the branches of each: what can be run through without taking the mechanism apart.
-    completeness : of the assemblies at the samples, see ``Assemblies``.
-    resolution : distance of the samples; a branch that begins and ends between two of them is not seen.
-    open_ends : ends of branches that are neither a fold at which another one ends too nor at the end of the range; 0 where the map is
-        whole.
+    mechanism, driver : Mechanism, str
+        The mechanism and its driver.
+    branches, folds, bifurcations : tuple
+        Curves between singular positions; folds ordered by driver value.
+    circuits : tuple of tuple of int
+        Numbers of the branches that the mechanism can run through without disassembly.
+    completeness : str
+        Of the assembly modes at the samples, see ``Assemblies``.
+    resolution : float
+        Distance of the samples; a branch that begins and ends between two of them is missed.
+    open_ends : int
+        Ends of branches that are neither a fold shared with another branch nor at the end of the range; 0 if the map is whole.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> b = mg.branches(mg.load("four-bar"), "A", samples=6, points=60)
+    >>> b.circuits, b.open_ends
+    (((0,), (1,)), 0)
     """
 
     mechanism: Mechanism
@@ -334,14 +346,32 @@ class Branches(Shown):
         )
 
     def defects(self, positions: Iterable[Mechanism | Mapping[str, float]]) -> Defects:
-        """Branch, circuit and order defects of positions, given as assemblies or as coordinates of all freedoms, in their order.
+        """Report branch, circuit and order defects of a sequence of positions.
 
-        From each, the path is followed to the next point of the map: it is on the branch that leads there.
+        From each position, mechgraph tracks the path to the next point of the map.
+
+        Parameters
+        ----------
+        positions : iterable
+            Assemblies (Mechanism with ``start``), or coordinates of all freedoms, in their order.
+
+        Returns
+        -------
+        Defects
 
         Raises
         ------
         DeclarationError
-            where no branch of the map leads to a position.
+            No branch of the map leads to a position.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> m = mg.load("four-bar")
+        >>> b = mg.branches(m, "A", samples=6, points=60)
+        >>> places = [mg.assemblies(m, {"A": 0.5})[0], mg.assemblies(m, {"A": 1.0})[1]]
+        >>> b.defects(places).branches
+        (0, 1)
         """
         places, faults, q = [], [], Question(self.mechanism, _at(self.mechanism, self.driver, [0.0]))
         for number, position in enumerate(positions):
@@ -400,7 +430,26 @@ class Branches(Shown):
         return bool(min(np.mod(steps, period).sum(), np.mod(-steps, period).sum()) >= period)
 
     def plot(self, output: str | None = None, *, ax: Any = None, current: int | None = None) -> Any:
-        """A picture: ``output`` (a freedom) over the driver, all branches, folds marked, branch ``current`` highlighted; the axes."""
+        """Draw a freedom over the driver on all branches, with the folds.
+
+        Parameters
+        ----------
+        output : str, optional
+            The freedom. Default: the first that moves.
+        ax : Axes, optional
+            Axes of matplotlib. Default: new ones.
+        current : int, optional
+            Number of a branch to highlight.
+
+        Returns
+        -------
+        Axes
+
+        Raises
+        ------
+        MissingExtraError
+            Without matplotlib.
+        """
         return importlib.import_module("mechgraph.show.diagrams").draw_branches(self, output, ax=ax, current=current)
 
     def document(self) -> Document:
@@ -485,21 +534,39 @@ def branches(
     cache: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> Branches:
-    """Every assembly followed over the whole range of a driver: branches, folds, bifurcations, circuits, full turns, ranges.
+    """Map every assembly mode over the range of a driver: branches, folds, bifurcations, circuits, full turns.
 
-    At ``samples`` values of the driver all assemblies are found (see ``assemblies``); from each, the path follower of ``solve`` goes to
-    both neighbours, so that a fold is where ``solve`` ends.
+    ``assemblies`` finds all modes at ``samples`` values of the driver; from each, the path tracker of ``solve`` goes to both
+    neighbors, so a fold is where ``solve`` stops.
 
     Parameters
     ----------
-    driver : a freedom; other declared drives stay at their start.
-    over : range of the driver; left out, a whole turn, or twice the mean radius of the mechanism to both sides for a slide.
-    samples, points : values of the driver at which assemblies are found, and in all.
-    seed, cache, progress : as for ``assemblies``.
+    m : Mechanism
+        The mechanism.
+    driver : str
+        A freedom; other declared drives stay at their start.
+    over : (2,) tuple of float, optional
+        Range of the driver [rad, length]. Default: a full turn; for a translation twice the characteristic length to both sides.
+    samples, points : int
+        Numbers of driver values at which assembly modes are found, and in all.
+    seed, cache, progress
+        As in ``assemblies``.
+
+    Returns
+    -------
+    Branches
 
     Raises
     ------
     DeclarationError, AssemblyError, IndeterminateError
+        As in ``assemblies``.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> b = mg.branches(mg.load("four-bar"), "A", samples=6, points=60)
+    >>> len(b.branches), b.full_turn, b.folds
+    (2, (True, True), ())
     """
     why = m.freedom_fault(driver, single=True)
     faults = [f"driver {driver!r}: {why}"] if why else []

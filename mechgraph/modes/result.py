@@ -129,23 +129,39 @@ class Continuum:
 
 @dataclass(frozen=True, repr=False)
 class Assemblies(Shown, Sequence[Mechanism]):
-    """All real assemblies at one position that cannot move, each a Mechanism whose ``start`` is that assembly; continua are beside them.
+    """All isolated real assembly modes at one position, each a Mechanism with ``start`` set. Returned by ``assemblies``.
 
     Attributes
     ----------
-    mechanism, at : the mechanism, and the values given.
-    poses : ``(M, N, 4, 4)`` of all links.
-    coordinates : ``(M, F)`` of all freedoms, in the order of ``freedom_names``.
-    kinds : of every assembly ``"regular"`` or ``"double"`` (assemblies meet).
-    condition : condition numbers ``(M,)`` of the closure equations; infinite where singular.
-    certificates : of regular ones, else None.
-    complex : those that are not real.
-    completeness : ``"proved"`` (the count equals a bound), ``"tested"`` (a trace test was passed, loops of random mechanisms of the class
-        bring no further one, and no track was lost) or ``"searched"``.
-    evidence : what that rests on, in words with numbers.
-    total : assemblies of a random complex mechanism of the class; None where no class is known. ``infinite`` of them lie at infinity here,
-        ``on_continua`` on continua.
-    continua : what can move with the drivers at rest; ``completeness`` is not about these.
+    mechanism, at : Mechanism, mapping
+        The mechanism and the given values.
+    poses : (M, N, 4, 4) array
+        Poses of all links.
+    coordinates : (M, F) array
+        All freedoms, in the order of ``freedom_names`` [rad, length].
+    kinds : tuple of str
+        Per mode ``"regular"`` or ``"double"`` (double root: modes meet).
+    condition : (M,) array
+        Condition numbers of the closure equations; infinite if singular.
+    certificates : tuple
+        Of regular modes, else None.
+    complex : object
+        The solutions that are not real.
+    completeness : {"proved", "tested", "searched"}
+        The count equals a bound; a trace test passed, further monodromy loops found nothing and no path failed; or neither.
+    evidence : tuple of str
+        The reasons, with numbers.
+    total : int or None
+        Solutions of a generic member of the class; ``infinite`` of them diverged here, ``on_continua`` ended on self-motions.
+    continua : tuple
+        Self-motions with the drivers fixed; ``completeness`` does not cover them.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> modes = mg.assemblies(mg.load("four-bar"), {"A": 0.5})
+    >>> [round(mode.start["D.Rz"], 4) for mode in modes]
+    [-2.2613, -0.163]
     """
 
     mechanism: Mechanism
@@ -209,7 +225,18 @@ class Assemblies(Shown, Sequence[Mechanism]):
         return Document(title, (Table(header, tuple(rows)), Paragraph(words)))
 
     def plot(self) -> Any:
-        """A picture of all assemblies side by side; the figure."""
+        """Draw all assembly modes side by side.
+
+        Returns
+        -------
+        Figure
+            Of matplotlib.
+
+        Raises
+        ------
+        MissingExtraError
+            Without matplotlib.
+        """
         return importlib.import_module("mechgraph.show.diagrams").draw_assemblies(self)
 
     @property
@@ -236,7 +263,15 @@ class Assemblies(Shown, Sequence[Mechanism]):
 
 @dataclass(frozen=True, repr=False)
 class AssembliesOver(Shown, Sequence[Assemblies]):
-    """The assemblies at several positions, one after the other: ``modes[position][mode]``."""
+    """Assembly modes at several positions, ``modes[position][mode]``. Returned by ``assemblies`` for lists of values.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> modes = mg.assemblies(mg.load("four-bar"), {"A": [0.5, 0.6]})
+    >>> [len(at) for at in modes], modes.completeness
+    ([2, 2], 'proved')
+    """
 
     positions: tuple[Assemblies, ...]
 

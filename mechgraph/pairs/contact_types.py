@@ -530,13 +530,19 @@ class Pressed(NamedTuple):
 
 @dataclass(frozen=True)
 class Hertz(Described):
-    """What the pressure in a contact takes: both materials, and what else of the elements decides.
+    """Declare what the Hertz pressure in a contact needs beside the radii: materials and line length.
 
-    Parameters
-    ----------
-    moduli, poisson : Young's modulus and Poisson's ratio of the elements on link a and on link b.
-    groove_radius : of the cross section of a groove or slot, larger than that of the ball.
-    length : of the line along which a cylinder touches.
+    Source: K. L. Johnson, Contact Mechanics, 1985.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> steel = mg.Hertz(moduli=(210e9, 210e9))
+    >>> p = mg.Pair(
+    ...     "E", "Sp", "lever", "slider", point=(0, 0, 0), axis=(1, 0, 0), closed="force", radius=0.008, hertz=steel
+    ... )
+    >>> p.hertz.poisson
+    (0.3, 0.3)
     """
 
     moduli: Annotated[Any, TWO_POSITIVE("Young's moduli of the elements on a and on b", PRESSURE)]

@@ -113,11 +113,23 @@ FRAMES = ("minimizing", "guided", "held")
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Curve(Described, Once):
-    """A curve in the frame of a link; ``Curve.circle(...)`` and so on make one.
+    """Base of the curves in the frame of a link; make one by ``Curve.circle(...)`` and so on.
 
-    Its frame has the tangent as one direction. ``minimizing`` turns as little as possible about it (a plane curve keeps its normal);
-    ``guided`` holds the direction ``guide`` in the plane of tangent and third direction, the axis of the curve where left out. ``held``
-    does not turn at all (P and C): what travels along a circle is then translated as the coupler of a parallelogram is.
+    ``line``, ``circle``, ``ellipse``, ``helix``, ``involute``, ``cam``, ``arm_cam``, ``through`` (points) and ``function`` make
+    curves. The moving frame has the tangent as one direction. ``"minimizing"`` rotates as little as possible about it (a plane curve
+    keeps its normal); ``"guided"`` keeps the direction ``guide`` in the plane of tangent and third direction; ``"held"`` does not
+    rotate (P and C): a body on a circle is then translated, as the coupler of a parallelogram.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> slot = mg.Curve.circle(center=(0, 0, 0), radius=0.2, axis=(0, 0, 1))
+    >>> bead = mg.Mechanism(
+    ...     "bead", pairs=[mg.Pair("K", "P", "frame", "bead", point=(0.2, 0, 0), curve=slot)], drives=["K"]
+    ... )
+    >>> s = mg.kinematics(bead, {"K": mg.Motion(0.0, velocity=3.0)})
+    >>> float(abs(s.link("bead").angular_velocity[2]).round(6))
+    15.0
     """
 
     kind: ClassVar[str]

@@ -36,10 +36,22 @@ UNIT_WRENCHES: dict[str, Six] = {
 
 @dataclass(frozen=True)
 class Freedom:
-    """One freedom: a constant unit twist ``twist + pitch * per_pitch``, angular part first.
+    """One freedom of a pair type: the constant unit twist ``twist + pitch * per_pitch``, angular part first.
 
-    The angular part has length one (a turn) or zero (a slide; then the linear part has length one). ``per_pitch`` is the
-    part that is multiplied by the pitch of the pair, as in a helical pair.
+    Parameters
+    ----------
+    name : str
+        E.g. ``"Rz"``.
+    twist : 6 numbers
+        Angular part of length 1 (a rotation) or 0 (a translation; then the linear part has length 1).
+    per_pitch : 6 numbers
+        Part multiplied by the pitch of the pair. Default: 0.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> mg.PairType("Rx", freedoms=[mg.Freedom("turn", (1, 0, 0, 0, 0, 0))]).f
+    1
     """
 
     name: str
@@ -89,9 +101,27 @@ class Touching:
 
 @dataclass(frozen=True)
 class Component:
-    """One reaction component or effort: a constant wrench ``wrench + pitch * per_pitch`` in frame ``frame``.
+    """One reaction component or effort of a pair type: the constant wrench ``wrench + pitch * per_pitch`` in a frame.
 
-    Its origin is that of the frame, or of marker B where ``at_b``.
+    Parameters
+    ----------
+    name : str
+        E.g. ``"Fx"``.
+    wrench : 6 numbers
+        Moment first.
+    frame : int
+        Number of single freedoms before the frame; 0 is the marker on link a.
+    per_pitch : 6 numbers
+        Part multiplied by the pitch of the pair. Default: 0.
+    at_b : bool
+        Whether its origin is that of marker b instead of that of the frame.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> fz = mg.Component("Fz", (0, 0, 0, 0, 0, 1), frame=2)
+    >>> fz.is_couple
+    False
     """
 
     name: str
@@ -115,10 +145,23 @@ class Component:
 
 @dataclass(frozen=True)
 class Bookkeeping:
-    """How a ledger in Lee's manner writes the pair: a free dual force plus parts along the axis, under conditions.
+    """Lee's unknowns of a pair type: a free dual force plus parts along the axis, under conditions.
 
-    The dual force has six unknowns; ``conditions`` are unit twists of frame 0 to which it is reciprocal (equations) and
-    ``along`` the components that the pair does transmit along its axis (unknowns). Source: Lee 1977, section 3.3.
+    The dual force has six unknowns. Source: Lee 1977, section 3.3.
+
+    Parameters
+    ----------
+    conditions : tuple of Freedom
+        Unit twists of frame 0 to which the dual force is reciprocal: the conditions, one equation each.
+    along : tuple of Component
+        Components that the pair transmits along its axis: further unknowns.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> lee = mg.pair_types()["R"].bookkeeping
+    >>> lee.unknowns, lee.equations
+    (7, 2)
     """
 
     conditions: tuple[Freedom, ...]

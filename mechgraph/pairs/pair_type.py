@@ -56,25 +56,42 @@ def _factors(given: Sequence[object], faults: list[str]) -> tuple[Factor, ...]:
 
 @dataclass(frozen=True, init=False)
 class PairType:
-    """A row of the pair table.
+    """Declare a row of the pair table: freedoms, reaction components, efforts.
+
+    Pass it to ``Pair`` in place of a symbol. Freedom k acts in frame k - 1, the frame left by the freedoms before it; frame 0 is the
+    marker on link a.
 
     Parameters
     ----------
-    symbol, name : e.g. ``"Sc"``, ``"sphere in slotted cylinder"``; the symbol starts with a letter.
-    freedoms : in order; each one of ``"Rx" .. "Tz"``, ``"Rz + pitch Tz"``, ``"rotation"`` (three freedoms kept as one
-        rotation), a ``Freedom``, or a ``Factor``: any relative motion, such as that of a frame along a curve.
-    reactions : components that do no work, each ``"Fx"`` (frame 0), ``"Fz@2"`` (frame 2) or a ``Component``; None where no
-        constant components exist: the null space of ``S^T`` serves then, named n1, n2, ...
-    efforts : one for every freedom; None for a unit couple about each turn and a unit force along each slide through
-        the origin of marker B (where these are not dual to the freedoms, their combinations that are, position by position).
-    bookkeeping : how Lee's ledger writes the pair; None counts ``(6 - f, 0)``.
-    directed : whether the pair has an axis (False for a sphere or a weld).
-    square_second : whether the second direction must be perpendicular to the axis as given.
+    symbol : str
+        Starts with a letter, e.g. ``"Sc"``.
+    name : str
+        E.g. ``"sphere in slotted cylinder"``.
+    freedoms : sequence
+        In order, each ``"Rx"`` to ``"Tz"``, ``"Rz + pitch Tz"``, ``"rotation"`` (three freedoms kept as one rotation) or a ``Freedom``.
+    reactions : sequence, optional
+        Components that do no work, each ``"Fx"`` (frame 0), ``"Fz@2"`` (frame 2) or a ``Component``. Default: the null space of the
+        freedoms, components named n1, n2, ...
+    efforts : sequence, optional
+        One ``Component`` per freedom. Default: a unit couple about each rotation, a unit force along each translation.
+    bookkeeping : Bookkeeping, optional
+        Lee's choice of unknowns. Default: ``(6 - f, 0)``.
+    directed : bool
+        Whether the pair has an axis (False for a sphere or a weld).
+    square_second : bool
+        Whether ``second`` must be perpendicular to ``axis`` as given.
 
     Raises
     ------
     DeclarationError
-        naming every fault: unknown names, reactions not reciprocal to the freedoms at random positions, ``S^T E != 1``.
+        With every fault: unknown names, reactions that do work in the freedoms, efforts that are not dual to them.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> slot = mg.PairType("Pn", "pin in slot", freedoms=["Tx", "Rz"], reactions=["Fy@1", "Fz@1", "Mx@1", "My@1"])
+    >>> slot.f, slot.component_names
+    (2, ('Fy', 'Fz', 'Mx', 'My'))
     """
 
     symbol: str
@@ -470,5 +487,17 @@ TABLE = PairTable(
 
 
 def pair_types() -> PairTable:
-    """The pair table of mechgraph: a mapping symbol -> PairType that prints as a table."""
+    """Return the pair table, a mapping symbol -> PairType that prints as a table.
+
+    Returns
+    -------
+    PairTable
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> table = mg.pair_types()
+    >>> table["U"].name, table["U"].component_names
+    ('universal (slotted sphere)', ('Fx', 'Fy', 'Fz', 'My'))
+    """
     return TABLE

@@ -44,7 +44,19 @@ BESIDE_POLE = 0.25
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Surface(Described):
-    """A surface in the frame of a link; ``Surface.sphere(...)`` and so on make one."""
+    """Base of the surfaces in the frame of a link; make one by ``Surface.sphere(...)`` and so on.
+
+    ``plane``, ``sphere``, ``cylinder``, ``cone``, ``torus``, ``revolution``, ``patch`` (a spline) and ``function`` make surfaces. The
+    coordinates ``Tu``, ``Tv`` of a pair Sp on it are lengths along the surface.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> dome = mg.Surface.sphere(center=(0, 0, 0), radius=2.0)
+    >>> p = mg.Pair("K", "Sp", "frame", "ball", point=(2, 0, 0), surface=dome)
+    >>> p.freedom_names
+    ('K.Tu', 'K.Tv', 'K.Rx', 'K.Ry', 'K.Rz')
+    """
 
     kind: ClassVar[str]
     plane: ClassVar[Any]

@@ -88,13 +88,23 @@ class Energy(Shown):
 
 
 class Response(Solution):
-    """A Solution over time: positions, rates, accelerations, efforts of prescribed drivers and all reactions.
+    """A Solution over time: positions, rates, accelerations, efforts of prescribed drivers and all reactions. Returned by ``respond``.
 
     Attributes
     ----------
-    energy : kinetic and potential energy, and the work done.
-    stopped : why the motion was not followed to its end; empty where it was.
-    events : what happened, in the order of time.
+    energy : object
+        ``kinetic``, ``potential``, ``work`` and ``balance`` ``(T,)``; an exact solution leaves the balance zero.
+    stopped : str
+        Why the integration stopped early; empty if it did not.
+    events : tuple
+        Events in the order of time.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> r = mg.respond(mg.load("windows-2"), [0.0, 0.5, 1.0], rates={"A0": -1.0})
+    >>> r.t, r["A0"].position.shape
+    (array([0. , 0.5, 1. ]), (3, 1))
     """
 
     stopped = ""
@@ -136,9 +146,23 @@ class Response(Solution):
         return dict(plain(response_data(self)))
 
     def at(self, t: ArrayLike) -> Response:
-        """The response at other times within those that were integrated (dense output of the stepper, closed and with all forces).
+        """Return the response at other times within the integrated range (dense output; closed, with all forces).
 
-        At the time of an impact it is what was before.
+        Parameters
+        ----------
+        t : (...) array_like
+            Times. At an impact the values are those before it.
+
+        Returns
+        -------
+        Response
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> r = mg.respond(mg.load("windows-2"), (0, 1), rates={"A0": -1.0})
+        >>> r.at([0.25, 0.75]).t
+        array([0.25, 0.75])
         """
         return self._course.response(t)
 

@@ -284,21 +284,38 @@ def _balanced(arguments: dict[str, Any], stable: bool | None, idle: tuple[str, .
 def equilibrium(
     m: Mechanism, start: Mapping[str, float] | None = None, *, kind: EndKind = "stable", engine: EngineName = "auto"
 ) -> Equilibrium:
-    """A position in which the declared loads balance, with the declared drives at their place.
+    """Find a position in which the declared loads balance, with the declared drives fixed.
 
     Parameters
     ----------
-    start : coordinates of freedoms near which to look, beside the declared ``start``.
-    kind : ``"stable"``: the way down from ``start``, in steps along which the loads do work, so that it ends at rest as damped motion
-        does; ``"nearest"``: Newton from ``start``, which ends in any equilibrium. Where the one finds none, the other is tried; ``stable``
-        says what was found.
-    engine : as in ``solve``.
+    m : Mechanism
+        The mechanism.
+    start : mapping of str to float, optional
+        Coordinates [rad, length] near which to look, beside the declared ``start``.
+    kind : {"stable", "nearest"}
+        ``"stable"``: descend from ``start`` along the work of the loads, as damped motion does; ``"nearest"``: Newton from ``start``,
+        which ends in any equilibrium. If one finds none, mechgraph tries the other; ``stable`` of the result says which it is.
+    engine : {"auto", "dense", "sparse"}
+        As in ``solve``.
+
+    Returns
+    -------
+    Equilibrium
+        A Mechanism with ``start`` set, ``stable``, and ``solution`` with all forces.
 
     Raises
     ------
     DeclarationError, AssemblyError
+        Invalid arguments; loops that cannot be closed.
     ResponseError
-        where none is found.
+        No equilibrium found.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> m = mg.equilibrium(mg.load("windows-2").replace(drives=[]), {"A0": 3.0})
+    >>> m.stable, round(m.start["A0.Rz"], 6)
+    (True, 3.141593)
     """
     place = Place(m, "equilibrium of", start, engine)
     begin, why = place.chart.x0, ""
@@ -544,11 +561,33 @@ class Linearized(Shown):
 
 @door
 def linearize(m: Mechanism, at: Mapping[str, float] | None = None, *, engine: EngineName = "auto") -> Linearized:
-    """Small motions about the declared ``start`` or the coordinates ``at``, the drives at rest; meant for an equilibrium.
+    """Compute small motions about the declared ``start`` or the coordinates ``at``: ``M u'' + C u' + K u = 0``, drivers stationary.
+
+    Parameters
+    ----------
+    m : Mechanism
+        The mechanism, usually in equilibrium.
+    at : mapping of str to float, optional
+        Coordinates [rad, length] at which to assemble first.
+    engine : {"auto", "dense", "sparse"}
+        As in ``solve``.
+
+    Returns
+    -------
+    Linearized
+        ``M``, ``C``, ``K``, ``eigenvalues``, ``frequencies`` [rad / time], ``damping``, ``modes``.
 
     Raises
     ------
     DeclarationError, AssemblyError
+        Every freedom is driven; the position cannot be reached.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> hanging = mg.equilibrium(mg.load("windows-2").replace(drives=[]), {"A0": 3.0})
+    >>> mg.linearize(hanging).frequencies.round(4)
+    array([3.383])
     """
     place = Place(m, "linearize", at, engine)
     d = place.derivatives()

@@ -255,45 +255,70 @@ def respond(
     tol: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Response:
-    """The motion that given efforts and loads produce, with all reactions (dynamic response).
+    """Integrate the motion under given loads (forward dynamics), with all reactions.
 
-    The accelerations of as many independent freedoms as the mechanism has mobility are unknowns beside the reactions; see
-    ``response.motion_equations``. Integrated by the steppers of ``scipy.integrate``; every output is closed.
-
-    Arguments from ``t`` to ``stops`` that are left out are those of ``m.response`` (``[response]`` in a file) where it has one.
+    The accelerations of as many independent freedoms as the mechanism has mobility are unknowns beside the reactions:
+    ``M(u) u'' + h(u, u') = Q``. Steppers of ``scipy.integrate``; the loops are closed at every output. Arguments from ``t`` to
+    ``stops`` default to those of ``m.response``.
 
     Parameters
     ----------
-    t : ``(begin, end)``, for outputs at the steps taken, or the times of the outputs, rising.
-    start : coordinates of freedoms at the beginning; others as near as they can stay to the declared ``start``.
-    rates : rates of freedoms at the beginning; what they leave open is at rest (least rates).
-    motions : freedoms that are prescribed: freedom -> ``Motion`` with ``t`` (its quintic spline), or a callable ``t -> (position,
-        velocity, acceleration)``. A drive with a stored motion is prescribed; other declared drives are free.
-    loads : replace the declared ones; constants and functions, no arrays over positions.
-    rtol, atol : tolerances of a step, relative and absolute (radians and lengths / L, and their rates); left out, 1e-8 and 1e-10.
-    method : a stepper of ``scipy.integrate``: explicit ``"RK23"``, ``"RK45"``, ``"DOP853"``, for stiff laws ``"Radau"``, ``"BDF"``,
-        ``"LSODA"``; ``"auto"`` is DOP853.
-    max_step : the longest step. Steps end at the ``breaks`` of loads, and are refused where a look at 2,000 times between begin and end
-        sees a load or a prescribed motion do what they missed; a pulse that is shorter needs its ``breaks``, or ``max_step``.
-    engine : ``"dense"`` or ``"sparse"`` linear algebra of numpy, ``"compiled"``: accelerations in independent freedoms by the kernel in C,
-        built at first use; or ``"auto"``, the kernel where it is installed and carries the mechanism and its loads. The engine of the
-        response says what ran: the path of a motion of one freedom is tabulated by numpy.
-    events : ``Event``s to be watched; a terminal one ends the motion, at its time.
-    stops : ``Stop``s, limits of freedoms that they strike, rest on and leave; what a stop exerts is an ``applied_effort``.
-    on_stop : where the motion cannot be followed to its end, or is interrupted: ``"raise"``, or ``"return"`` what there is, with
-        ``stopped`` saying why.
-    passive : what passive freedoms do, such as the spin of a coupler between two spheres: ``"free"``, they move by their inertia and the
-        loads, or ``"held"``, they are at rest as in ``solve``, and ``passive_effort`` is what that takes.
-    tol : as in ``solve``.
-    progress : called with the time reached after every step.
+    m : Mechanism
+        The mechanism. Declared drives without a motion are free.
+    t : (2,) or (T,) array_like, optional
+        ``(begin, end)``, for outputs at the steps taken, or the rising times of the outputs.
+    start : mapping of str to float, optional
+        Coordinates at the beginning [rad, length]; others stay as near as possible to the declared ``start``.
+    rates : mapping of str to float, optional
+        Rates at the beginning; what they leave open is stationary (least rates).
+    motions : mapping, optional
+        Prescribed freedoms: freedom -> ``Motion`` with ``t`` (its quintic spline), or a function
+        ``t -> (position, velocity, acceleration)``. A drive with a stored motion is prescribed.
+    loads : iterable of load, optional
+        Replace the declared loads; constants and functions, no arrays over positions.
+    rtol, atol : float
+        Relative and absolute tolerance of a step (radians and lengths / L, and their rates). Default: 1e-8 and 1e-10.
+    method : str
+        Integrator: explicit ``"RK23"``, ``"RK45"``, ``"DOP853"`` (default), for stiff loads ``"Radau"``, ``"BDF"``, ``"LSODA"``.
+    max_step : float, optional
+        Longest step. Steps end at the ``breaks`` of loads. A look at 2,000 times between begin and end finds loads that steps missed; a
+        shorter pulse needs its ``breaks``, or ``max_step``.
+    engine : {"auto", "dense", "sparse", "compiled"}
+        As in ``solve``; the kernel finds the accelerations of several independent freedoms.
+    events : Event or iterable of Event, optional
+        Watched quantities; a terminal event ends the motion.
+    stops : Stop or iterable of Stop, optional
+        Limits of freedoms: impact, rest and release; their force is an ``applied_effort``.
+    on_stop : {"raise", "return"}
+        If the motion cannot be integrated to its end: raise, or return what there is, with ``stopped`` set.
+    passive : {"free", "held"}
+        Passive freedoms move by inertia and loads, or are held fixed as in ``solve`` (``passive_effort`` is what that takes).
+    tol : float, optional
+        As in ``solve``.
+    progress : callable, optional
+        Called with the time reached after every step.
+
+    Returns
+    -------
+    Response
 
     Raises
     ------
     DeclarationError
-        which names what ``engine="compiled"`` does not carry; MissingExtraError for it where there is no C compiler.
+        Invalid arguments, or what ``engine="compiled"`` does not carry.
     AssemblyError
+        The loops cannot be closed at the beginning.
     ResponseError
-        where the motion cannot be followed to its end, or is interrupted; carries the Response so far.
+        The motion cannot be integrated to its end; ``error.solution`` is the Response so far.
+    MissingExtraError
+        ``engine="compiled"`` without a C compiler.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> r = mg.respond(mg.load("windows-2"), (0, 1), rates={"A0": -1.0})
+    >>> bool(abs(r.energy.balance).max() < 1e-6 * r.energy.kinetic.max())
+    True
     """
     given = {"t": t, "start": start, "rates": rates, "motions": motions, "rtol": rtol, "atol": atol, "method": method}
     how = _how(m, given | {"max_step": max_step, "events": events, "stops": stops, "passive": passive})

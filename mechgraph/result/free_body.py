@@ -157,14 +157,28 @@ class BalancedLoads:
     # --- positions -----------------------------------------------------------------------------------------------------
 
     def cases(self, at: At = "worst") -> tuple[Case, ...]:
-        """The load cases at positions.
+        """Return the load cases at positions.
 
-        ``"worst"``: where the force or the moment of something that acts is greatest; ``"all"``; or an index of the flat batch.
+        Parameters
+        ----------
+        at : {"worst", "all"}, int or sequence of int
+            Where the force or moment of something that acts is largest; all positions; or flat indices.
+
+        Returns
+        -------
+        tuple of Case
 
         Raises
         ------
         DeclarationError
-            for no such position, or one that was not solved.
+            No such position, or one that was not solved.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> body = mg.free_body(mg.solve(mg.load("slider-crank"), {"A": [0.0, 1.0]}), "rod")
+        >>> [case.place for case in body.cases("all")]
+        ['A.Rz = 0 deg', 'A.Rz = 57.296 deg']
         """
         why = self._greatest()
         places = list(why) if isinstance(at, str) and at == "worst" else self._positions(at)
@@ -208,7 +222,12 @@ class BalancedLoads:
         return max(moment, arm * force), max(force, moment / arm if arm else 0.0)
 
     def envelope(self) -> tuple[Range, ...]:
-        """Least and greatest of every component of all that acts, over the solved positions."""
+        """Return the smallest and largest value of every component of all that acts, over the solved positions.
+
+        Returns
+        -------
+        tuple of Range
+        """
         out = []
         units = {letter: unit_of(self.mechanism.units, (2 if letter == "M" else 1, 1, -2)) for letter in "MF"}
         for one in self.acting:
@@ -224,7 +243,23 @@ class BalancedLoads:
         return tuple(out)
 
     def not_unique(self, position: int) -> dict[str, tuple[str, ...]]:
-        """What acts -> its components that equilibrium alone does not give, at a position."""
+        """Return the components that equilibrium does not determine, at a position.
+
+        Parameters
+        ----------
+        position : int
+            Flat index.
+
+        Returns
+        -------
+        dict of str to tuple of str
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> mg.free_body(mg.solve(mg.load("slider-crank"), {"A": [0.0, 1.0]}), "rod").not_unique(0)["B"]
+        ('Mx', 'My', 'Fz')
+        """
         at = place_among(position, self.solution.status.size, "position", f"free body of {self.link.name!r}")
         found = {one.name: one.unique.reshape(-1, 6)[at] for one in self.acting}
         return {
@@ -503,23 +538,61 @@ FORMATS = (
 
 
 class FreeBody(BalancedLoads, Shown):
-    """A link with all that acts on it; see ``free_body``."""
+    """A link with all that acts on it, in its own frame. Returned by ``free_body``.
+
+    Attributes
+    ----------
+    solution, link : Solution, Link
+        Where it comes from.
+    acting : tuple
+        Loads with ``name``, place, force and moment.
+    acceleration : (..., 6) array
+        Acceleration of the link in its own frame.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> s = mg.solve(mg.load("slider-crank"), {"A": [0.0, 1.0]}, redundant="minimum_norm")
+    >>> bool(mg.free_body(s, "rod").balance < 1e-12)
+    True
+    """
 
     def write(self, path: str | os.PathLike[str], at: At = "worst", **options: Any) -> None:
-        """Write the loads at positions as the suffix says, whole or not at all.
+        """Write the loads at positions to a file, atomically; the extension selects the format.
 
-        ``.csv``: one row for each of what acts at each position, components that are not unique left empty and named. ``.inp``: a load
-        deck of CalculiX or Abaqus with a step a position, see ``load_deck`` for its options.
+        ``.csv``: one row per acting load and position; indeterminate components are empty and named. ``.inp``: a load deck of
+        CalculiX or Abaqus, one step per position.
+
+        Parameters
+        ----------
+        path : str or path
+            The file.
+        at : {"worst", "all"}, int or sequence of int
+            As in ``cases``.
+        **options
+            Of a load deck: ``held``, ``couples``, ``model``, ...
 
         Raises
         ------
         DeclarationError
-            where something not unique would have to be written as known; FileError.
+            An indeterminate component would have to be written as known.
+        FileError
+            The file cannot be written.
         """
         format_of(path, FORMATS).write(self, path, at, **options)
 
     def document(self, at: At = "worst") -> Document:
-        """What acts with its greatest force and moment, and the load cases at positions."""
+        """Return what acts, with its largest force and moment, and the load cases.
+
+        Parameters
+        ----------
+        at : {"worst", "all"}, int or sequence of int
+            As in ``cases``.
+
+        Returns
+        -------
+        Document
+        """
         ranges = {(r.name, r.component): r for r in self.envelope()}
         most = dict(zip(("|F|", "|M|"), reversed(self.scales), strict=True))
         rows = []
@@ -567,15 +640,34 @@ class FreeBody(BalancedLoads, Shown):
 
 @door
 def free_body(s: Solution, link: str) -> FreeBody:
-    """All that acts on a link, at points of it and in its own frame: what its pairs transmit, loads, and its inertia.
+    """Cut a link free: list all that acts on it, at points of it and in its own frame.
 
-    The sum is zero at every position. Pairs act at their markers on the link, loads at their points, weight and inertia
-    ``-m a``, ``-(I alpha + w x I w)`` at the mass centre. On the frame there is also what supports it.
+    The sum of reactions, loads, weight and inertia ``-m a``, ``-(I alpha + w x I w)`` is zero at every position. On the frame it
+    includes the support.
+
+    Parameters
+    ----------
+    s : Solution
+        A solution with forces.
+    link : str
+        Name of the link.
+
+    Returns
+    -------
+    FreeBody
 
     Raises
     ------
     DeclarationError
-        for an unknown link, or a solution without forces.
+        Unknown link, or a solution without forces.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> s = mg.solve(mg.load("slider-crank"), {"A": [0.0, 1.0]})
+    >>> body = mg.free_body(s, "rod")
+    >>> [one.name for one in body.acting]
+    ['B', 'C', 'loads[0] gravity', 'inertia']
     """
     m, i = s.mechanism, s.mechanism.place_of_link(link)
     if not s.has_forces:

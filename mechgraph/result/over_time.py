@@ -246,18 +246,33 @@ class OverTimeData:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OverTime(Shown):
-    """What a motion takes over time; see ``over_time``. Arrays ``(...)`` over the cases.
+    """What a motion takes over time; arrays ``(...)`` over the cases. Returned by ``over_time``.
 
     Attributes
     ----------
-    duration : the time from the first position to the last, or to the first again where the cycle is closed.
-    closed : whether the last position leads back to the first, so that it is a whole cycle.
-    revolutions : turns of the driver that runs round; NaN where none does.
-    efforts, powers : figures of every driver, by its freedom.
-    shaking : figures of force and moment on the frame, ``"Fx"`` ... ``"Mz"``, ``"|F|"``, ``"|M|"``, moments about ``about``.
-    work : of every driver and of every load by its name, ``"loads[0] gravity"``: the integral of its power over the time.
-    kinetic_change : the kinetic energy at the end less that at the beginning.
-    balance : the sum of all work less ``kinetic_change``, relative to what the powers turn over (the integral of their sizes).
+    duration : array
+        From the first position to the last, or to the first again if the cycle is closed.
+    closed : array of bool
+        Whether it is a whole cycle.
+    revolutions : array
+        Turns of the driver that makes full turns; NaN if none does.
+    efforts, powers : mapping
+        Figures of every driver: ``peak``, ``mean``, ``rms``.
+    shaking : mapping
+        Figures of force and moment on the frame, ``"Fx"`` to ``"Mz"``, ``"|F|"``, ``"|M|"``.
+    work : mapping
+        Integral of the power of every driver and load.
+    kinetic_change : array
+        Kinetic energy at the end less that at the beginning.
+    balance : array
+        Sum of all work less ``kinetic_change``, relative to the integral of the absolute powers.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> c = mg.over_time(mg.solve(mg.load("four-bar")))
+    >>> round(float(c.efforts["A.Rz"].rms), 3), bool(abs(c.balance) < 1e-3)
+    (0.214, True)
     """
 
     solution: Solution
@@ -278,12 +293,16 @@ class OverTime(Shown):
         return {name: work / self.revolutions for name, work in self.work.items()}
 
     def to_dict(self) -> dict[str, Any]:
-        """All figures as plain data, of one row of positions.
+        """Return all figures of one row of positions as plain data.
+
+        Returns
+        -------
+        dict
 
         Raises
         ------
         DeclarationError
-            for several cases.
+            Several cases.
         """
         if self.duration.shape:
             raise DeclarationError("figures as data", [f"{self.duration.size} cases: solve them one by one"])
@@ -362,20 +381,33 @@ def _with_error(one: Figures) -> str:
 
 @door
 def over_time(s: Solution, about: ArrayLike = (0.0, 0.0, 0.0)) -> OverTime:
-    """Peak, mean and RMS of driver efforts and powers and of the shaking force and moment, and the work, over time or a whole cycle.
+    """Integrate over time: peak, mean and RMS of driver efforts, powers and shaking, and the work of drivers and loads.
 
-    Positions need not be evenly spaced. Times are those of the motion, or follow from the rate of a driver that runs one way,
-    ``t = int dq / q'``. A driver that runs round makes a whole cycle where the last position is the first again, or comes one step before
-    it (its end left out), and all coordinates and rates return.
+    Positions need not be evenly spaced. Times are those of the motion, or follow from the rate of a driver that never reverses,
+    ``t = int dq / q'``. A whole cycle is detected if the last position is the first again, or one step before it, and all rates return.
 
     Parameters
     ----------
-    about : the point about which the shaking moment is taken, global.
+    s : Solution
+        A solution with forces and times (or a driver velocity).
+    about : (3,) array_like
+        Global point of the shaking moment [length].
+
+    Returns
+    -------
+    OverTime
 
     Raises
     ------
     DeclarationError
-        where the solution has no forces, or its positions no times.
+        The solution has no forces, or its positions no times.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> c = mg.over_time(mg.solve(mg.load("four-bar")))
+    >>> bool(c.closed), round(float(c.duration), 4)
+    (True, 0.6283)
     """
     faults = [] if s.has_forces else ["the solution has no forces: use solve()"]
     faults += [fault] if (fault := vector_fault(about, "about")) else []

@@ -275,9 +275,19 @@ def axis_names(batch: tuple[int, ...]) -> list[str]:
 
 
 class Solution(Shown):
-    """Motion and forces at a batch of positions, by name: ``s["D"].reaction``, ``s.link("coupler").pose``.
+    """Motion and forces at a batch of positions, by name. Returned by ``solve`` and ``kinematics``.
 
-    It can be pickled where its loads can: those that hold numbers, or a function of a module.
+    ``s["D"]`` is a pair, ``s.link("coupler")`` a link, ``s.coupling("g")`` a coupling, ``s.load(0)`` a load, ``s.contact("E")`` a
+    contact. Leading axes of all arrays are positions. A solution can be pickled if its loads can.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> s = mg.solve(mg.load("four-bar"), {"A": [0.0, 0.5, 1.0]})
+    >>> s["D"].reaction.shape, s.link("coupler").pose.shape
+    ((3, 6), (3, 4, 4))
+    >>> print(s.status)
+    ['ok' 'ok' 'ok']
     """
 
     _wanted = "a Solution; mg.solve(mechanism) makes one"
@@ -314,18 +324,59 @@ class Solution(Shown):
         return PairResult(self._values, self.whole.place_of_pair(pair))
 
     def link(self, name: str) -> LinkResult:
-        """Motion of a link."""
-        return LinkResult(self._values, self.mechanism.place_of_link(name))
+        """Return the motion of a link.
 
-    def on_link(self, pair: str, link: str) -> tuple[Array, Mask]:
-        """All that a pair transmits to one of its links, ``(..., 6)``, (M, F) in the link's frame about the pair's marker on that link.
+        Parameters
+        ----------
+        name : str
+            Name of the link.
 
-        With it ``(..., 6)`` truth values: which of these numbers are unique. The others are NaN unless the solution is of least norm.
+        Returns
+        -------
+        LinkResult
+            ``pose``, ``twist``, ``acceleration``, ``center``, ``center_velocity``, ``point(p)``, ``at("tip")``, ...
 
         Raises
         ------
         DeclarationError
-            where the pair does not join that link.
+            Unknown link.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> s = mg.kinematics(mg.load("four-bar"), {"A": mg.Motion(0.0, velocity=10.0)})
+        >>> s.link("crank").twist.round(6) + 0
+        array([ 0.,  0., 10.,  0.,  0.,  0.])
+        """
+        return LinkResult(self._values, self.mechanism.place_of_link(name))
+
+    def on_link(self, pair: str, link: str) -> tuple[Array, Mask]:
+        """Return all that a pair transmits to one of its links, in the frame of the link about the pair's marker on it.
+
+        Parameters
+        ----------
+        pair, link : str
+            Names.
+
+        Returns
+        -------
+        wrench : (..., 6) array
+            (M, F); NaN where not unique, unless the solution has minimum norm.
+        unique : (..., 6) array of bool
+            Which of these numbers are unique.
+
+        Raises
+        ------
+        DeclarationError
+            The pair does not join that link.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> s = mg.solve(mg.load("four-bar"), {"A": 0.5})
+        >>> wrench, unique = s.on_link("B", "coupler")
+        >>> unique
+        array([False, False,  True,  True,  True, False])
         """
         k, i = self.whole.place_of_pair(pair), self.whole.place_of_link(link)
         if link not in (self.whole.pairs[k].a, self.whole.pairs[k].b):
@@ -346,7 +397,36 @@ class Solution(Shown):
         return self._values.on_link(self.whole.place_of_pair(pair), self.whole.place_of_link(link))[2]
 
     def coupling(self, name: str) -> CouplingResult:
-        """Values of a coupling."""
+        """Return the values of a coupling.
+
+        Parameters
+        ----------
+        name : str
+            Name of the coupling.
+
+        Returns
+        -------
+        CouplingResult
+            ``effort`` (multiplier); of gears also ``force``, ``point`` and ``sliding``.
+
+        Raises
+        ------
+        DeclarationError
+            Unknown coupling.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> pairs = [
+        ...     mg.Pair(k, "R", "frame", link, point=(x, 0, 0), axis=(0, 0, 1))
+        ...     for k, link, x in [("A", "p", 0), ("B", "w", 6)]
+        ... ]
+        >>> m = mg.Mechanism(
+        ...     "gears", pairs=pairs, couplings=[mg.Coupling({"A": 20, "B": 40}, name="teeth")], drives=["A"]
+        ... )
+        >>> float(mg.solve(m, {"A": 1.0}, loads=[mg.Effort("B", -3)]).coupling("teeth").effort)
+        0.075
+        """
         m = self.mechanism
         return CouplingResult(self._values, m.couplings.index(m.coupling(name)))
 
@@ -356,11 +436,57 @@ class Solution(Shown):
         return contacts_of(self._values)
 
     def contact(self, pair: str) -> ContactResult:
-        """Facts of one of them."""
+        """Return the facts of a contact: paths, normal force, sliding, rolling, pressure.
+
+        Parameters
+        ----------
+        pair : str
+            Name of a pair whose elements touch at a point or along a line.
+
+        Returns
+        -------
+        ContactResult
+
+        Raises
+        ------
+        DeclarationError
+            The pair is not a contact.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> s = mg.solve(mg.load("r-sp-r"))
+        >>> [name for name in s.contacts]
+        ['B']
+        >>> s.contact("B").normal_force.shape == s.batch
+        True
+        """
         return ContactResult(self._values, place_of_contact(self._values, pair))
 
     def load(self, index: int) -> LoadResult:
-        """What the load of that number in ``mechanism.loads`` does: wrenches on links, power, and how a force law is read."""
+        """Return what a load does: wrenches on links, power, and the coordinate of a force law.
+
+        Parameters
+        ----------
+        index : int
+            Number in ``mechanism.loads``.
+
+        Returns
+        -------
+        LoadResult
+
+        Raises
+        ------
+        DeclarationError
+            No such load.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> s = mg.solve(mg.load("four-bar"), {"A": mg.Motion([0.0, 0.5], velocity=10.0)})
+        >>> s.load(0).power.shape
+        (2,)
+        """
         of = f"load of {self.mechanism.name!r}"
         return self._values.load(place_among(index, len(self.mechanism.loads), "index", of))
 
@@ -469,84 +595,264 @@ class Solution(Shown):
         return (*self.doubts, *self._values.crossings(), *worst)
 
     def document(self, asked: bool = False) -> Document:
-        """What ``print`` shows; ``asked`` as in ``summary()``, also what takes long."""
+        """Return what ``print`` shows as a document.
+
+        Parameters
+        ----------
+        asked : bool
+            Include what takes long, as ``summary`` does.
+
+        Returns
+        -------
+        Document
+        """
         return summary(self._values, asked)
 
     def summary(self) -> str:
-        """Positions, ranges of the drivers and of their efforts, greatest reactions and where, checks, engine and work, as text.
+        """Return positions, ranges of drivers and efforts, largest reactions, checks, engine and work as text.
 
-        The text of the command line and of ``print``, which leaves out what takes long at many positions of many pairs.
+        ``print`` leaves out what takes long at many positions of many pairs.
+
+        Returns
+        -------
+        str
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> print(mg.solve(mg.load("four-bar"), {"A": [0.0, 0.5]}).summary().splitlines()[3])
+        Solved 2 of 2 positions.
         """
         return to_text(self.document(asked=True))
 
     def to_dict(self) -> dict[str, Any]:
-        """What the summary tells as plain data, of all pairs."""
+        """Return the contents of the summary, of all pairs, as plain data.
+
+        Returns
+        -------
+        dict
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> sorted(mg.solve(mg.load("four-bar"), {"A": 0.5}).to_dict())[:3]
+        ['applied_efforts', 'checks', 'crossings']
+        """
         return dict(plain(solution_data(self._values)))
 
     def to_json(self) -> str:
-        """The same as JSON."""
+        """Return the contents of ``to_dict`` as JSON.
+
+        Returns
+        -------
+        str
+        """
         return json_text(self.to_dict())
 
     def view(self) -> Any:
-        """The solution in a notebook: the mechanism in space, its forces and curves (``notebook`` extra).
+        """Show the solution in a notebook: the mechanism in space, its forces and curves (``notebook`` extra).
+
+        Returns
+        -------
+        object
+            A widget.
 
         Raises
         ------
         MissingExtraError
-            without anywidget.
+            Without anywidget.
         """
         # up to a room above: a user looks for it here
         return importlib.import_module("mechgraph.show.page.write").view(self)
 
     def place(self, index: int) -> str:
-        """A position of the flat batch in words: the values of the drivers, or its time."""
+        """Describe a position of the flat batch: driver values, or time.
+
+        Parameters
+        ----------
+        index : int
+            Flat index.
+
+        Returns
+        -------
+        str
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> mg.kinematics(mg.load("four-bar"), {"A": [0.0, 0.5]}).place(1)
+        'A.Rz = 28.648 deg'
+        """
         return Places(self._values).full_name(place_among(index, self.status.size, "index", "place of a position"))
 
     def state(self, index: int | slice | tuple[int, ...] = ()) -> State:
-        """Screws, loads and coordinates at one position, for ``Formulation.assemble``."""
+        """Return screws, loads and coordinates at one position, for ``Formulation.assemble``.
+
+        Parameters
+        ----------
+        index : int, slice or tuple
+            Index of the position. Default: the only one.
+
+        Returns
+        -------
+        State
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> m = mg.load("rcsr")
+        >>> A, b = mg.formulate(m).assemble(mg.solve(m, {"O1": [2.6, 2.7]}).state(1))
+        >>> A.shape
+        (24, 24)
+        """
         return self._values.state(index)
 
     def part(self, places: slice) -> Solution:
-        """The same at a range of flat positions, without a copy; its checks stay relative to the whole batch."""
+        """Return the solution at a range of flat positions, without a copy; its checks stay relative to the whole batch.
+
+        Parameters
+        ----------
+        places : slice
+            Flat positions.
+
+        Returns
+        -------
+        Solution
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> s = mg.kinematics(mg.load("four-bar"), {"A": [0.0, 0.5, 1.0]})
+        >>> s.part(slice(1, 3))["A"].position[:, 0]
+        array([0.5, 1. ])
+        """
         return Solution(self._values.part(places))
 
     # --- tables --------------------------------------------------------------------------------------------------------
 
     def columns(self, include: Sequence[Include] = ()) -> Mapping[str, Array]:
-        """All numbers of the table by column name with unit, ``(...)`` each.
+        """Return all numbers of the table by column name with unit, ``(...)`` each.
 
-        ``include`` adds the motion of named ``"points"``, the poses of ``"links"`` (origin x, y, z and rotation matrix Rxx, Rxy, ...) with
-        angular rates, the motion of mass ``"centers"``, what the ``"loads"`` do, and the facts of ``"contacts"``.
+        Parameters
+        ----------
+        include : sequence of str
+            Add the motion of named ``"points"``, of ``"links"`` (origin, rotation matrix, angular rates) and of mass ``"centers"``,
+            what ``"loads"`` do, facts of ``"contacts"``.
+
+        Returns
+        -------
+        mapping of str to array
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> s = mg.solve(mg.load("four-bar"), {"A": [0.0, 0.5]})
+        >>> list(s.columns())[:3]
+        ['A.Rz [rad]', 'A.Rz velocity [rad/s]', 'A.Rz acceleration [rad/s^2]']
         """
         return {column.label: column.values for column in table_of(self._values, include)}
 
     def to_pandas(self, include: Sequence[Include] = ()) -> pandas.DataFrame:
-        """A DataFrame, one row a position (``pandas`` extra); ``include`` as in ``columns``."""
+        """Return a DataFrame with one row per position (``pandas`` extra).
+
+        Parameters
+        ----------
+        include : sequence of str
+            As in ``columns``.
+
+        Returns
+        -------
+        pandas.DataFrame
+
+        Raises
+        ------
+        MissingExtraError
+            Without pandas.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> mg.solve(mg.load("four-bar"), {"A": [0.0, 0.5]}).to_pandas().shape[0]
+        2
+        """
         return to_pandas(self._values, include)
 
     def to_xarray(self, include: Sequence[Include] = ()) -> xarray.Dataset:
-        """A Dataset over the batch axes (``xarray`` extra); ``include`` as in ``columns``.
+        """Return a Dataset over the batch axes (``xarray`` extra).
 
-        Names are those of ``columns`` without units, which stand in ``attrs["units"]``. Coordinates are the times and what was
-        prescribed; one row of rising times is the dimension ``t``, every other last axis is ``position``.
+        Names are those of ``columns`` without units, which are in ``attrs["units"]``. Coordinates are times and prescribed values;
+        one row of rising times is the dimension ``t``, every other last axis is ``position``.
+
+        Parameters
+        ----------
+        include : sequence of str
+            As in ``columns``.
+
+        Returns
+        -------
+        xarray.Dataset
+
+        Raises
+        ------
+        MissingExtraError
+            Without xarray.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> d = mg.solve(mg.load("four-bar"), {"A": [0.0, 0.5]}).to_xarray()
+        >>> d["B:Fx"].dims, d["B:Fx"].attrs["units"]
+        (('position',), 'N')
         """
         return to_xarray(self._values, include)
 
     def write(self, path: str | os.PathLike[str], include: Sequence[Include] = ()) -> None:
-        """Write the table, whole or not at all, as the suffix says; ``include`` as in ``columns``.
+        """Write the table to a file, atomically; the extension selects the format.
 
-        ``.csv``; ``.nc``, the Dataset as NetCDF 4 (``netcdf`` extra; slashes in names, and spaces in those of coordinates, are quoted:
-        ``%2F``); ``.parquet``, the DataFrame (``parquet`` extra).
+        ``.csv``; ``.nc``, the Dataset as NetCDF 4 (``netcdf`` extra; slashes and spaces in coordinate names are quoted: ``%2F``);
+        ``.parquet``, the DataFrame (``parquet`` extra).
+
+        Parameters
+        ----------
+        path : str or path
+            The file.
+        include : sequence of str
+            As in ``columns``.
 
         Raises
         ------
         FileError
-            for another suffix, or where the file cannot be written; MissingExtraError.
+            Another extension, or the file cannot be written.
+        MissingExtraError
+            Without the extra of the format.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> import tempfile, pathlib
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     path = pathlib.Path(folder) / "table.csv"
+        ...     mg.solve(mg.load("four-bar"), {"A": [0.0, 0.5]}).write(path)
+        ...     print(len(path.read_text().splitlines()))
+        3
         """
         write(self._values, path, include)
 
     def to_csv(self, path: str | os.PathLike[str], include: Sequence[Include] = ()) -> None:
-        """Write the table as CSV, whole or not at all; ``include`` as in ``columns``."""
+        """Write the table as CSV, atomically.
+
+        Parameters
+        ----------
+        path : str or path
+            The file.
+        include : sequence of str
+            As in ``columns``.
+
+        Raises
+        ------
+        FileError
+            The file cannot be written.
+        """
         to_csv(self._values, path, include)
 
     def __repr__(self) -> str:

@@ -133,23 +133,40 @@ def effort_curve(
     ax: Axes = None,
     marked: int | None = None,
 ) -> Any:
-    """Draw what drivers supply, and where loads act in their freedoms what these do. Returns the axes.
+    """Draw driver efforts (solid), and applied efforts in their freedoms (dashed).
 
-    Couples are read on the left, forces on the right where there are both. What the driver supplies is drawn full, what loads do in its
-    freedom dashed.
+    Couples are on the left axis; forces on the right one if there are both.
 
     Parameters
     ----------
-    s : a solution with forces, or a response.
-    freedom : a driven freedom or several; all of them where it is left out.
-    over : a freedom, ``"t"`` or ``"position"``; left out, time of a response, else the first freedom that was prescribed.
-    ax : axes of matplotlib to draw on; new ones where left out.
-    marked : flat index of a position to mark on the curves, e.g. the one that a skeleton shows.
+    s : Solution
+        A solution with forces, or a response.
+    freedom : str or iterable of str, optional
+        Driven freedoms. Default: all.
+    over : str, optional
+        A freedom, ``"t"`` or ``"position"``. Default: time of a response, else the first prescribed freedom.
+    ax : Axes, optional
+        Axes of matplotlib. Default: new ones.
+    marked : int, optional
+        Flat index of a position to mark.
+
+    Returns
+    -------
+    Axes
 
     Raises
     ------
     DeclarationError
-        where the solution has no forces or no such driver; MissingExtraError without matplotlib.
+        No forces, or no such driver.
+    MissingExtraError
+        Without matplotlib.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> from mechgraph import show
+    >>> s = mg.solve(mg.load("four-bar"), {"A": [0.0, 0.5, 1.0]})
+    >>> ax = show.effort_curve(s)
     """
     names, m = _driver_names(s, freedom), s.whole
     x = abscissa(s, over)
@@ -236,19 +253,38 @@ def _legend(ax: Any, others: Sequence[Any], entries: int) -> None:
 def reaction_curve(
     s: Solution, pair: str, *, moment: bool = False, over: str | None = None, ax: Axes = None, marked: int | None = None
 ) -> Any:
-    """Draw the components of a pair's reaction in its own frame, with their ranges in the legend. Returns the axes.
+    """Draw the components of a pair's reaction in its own frame, with their ranges in the legend.
 
-    A component that is not unique has no curve but a hatched strip, also where the solution holds the one of least norm.
+    An indeterminate component has a hatched strip and no curve.
 
     Parameters
     ----------
-    moment : the couples rather than the forces.
-    over, ax, marked : as in ``effort_curve``.
+    s : Solution
+        A solution with forces.
+    pair : str
+        Name of the pair.
+    moment : bool
+        Moments in place of forces.
+    over, ax, marked
+        As in ``effort_curve``.
+
+    Returns
+    -------
+    Axes
 
     Raises
     ------
     DeclarationError
-        where the solution has no forces, no such pair, or the pair transmits no such component.
+        No forces, no such pair, or the pair transmits no such component.
+    MissingExtraError
+        Without matplotlib.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> from mechgraph import show
+    >>> s = mg.solve(mg.load("four-bar"), {"A": [0.0, 0.5, 1.0]})
+    >>> ax = show.reaction_curve(s, "B")
     """
     m = s.whole
     if not s.has_forces:
@@ -292,11 +328,35 @@ def reaction_curve(
 
 @door
 def margin_curve(s: Solution, *, over: str | None = None, ax: Axes = None) -> Any:
-    """Draw over the positions how far they are from singular ones. Returns the axes.
+    """Draw over the positions how far they are from singular ones.
 
-    The smallest singular value of the scaled closure equations that was kept, over the largest, with the drivers free (a change point
-    of the mechanism where it falls to zero) and at rest (a dead point of the drivers): of ``mg.check`` there. Below the dashed line a
-    report calls a position nearly singular.
+    The smallest nonzero singular value of the scaled closure equations over the largest: with free drivers (zero at a change point)
+    and with fixed ones (zero at a dead point). Below the dashed line a report calls a position nearly singular.
+
+    Parameters
+    ----------
+    s : Solution
+        A solution.
+    over : str, optional
+        As in ``effort_curve``.
+    ax : Axes, optional
+        Axes of matplotlib. Default: new ones.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    MissingExtraError
+        Without matplotlib.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> from mechgraph import show
+    >>> s = mg.kinematics(mg.load("four-bar"), {"A": [0.0, 0.5, 1.0]})
+    >>> ax = show.margin_curve(s)
     """
     x = abscissa(s, over)
     found = margins(s)
@@ -355,16 +415,36 @@ def margins(s: Solution) -> Margins:
 
 @door
 def reaction_ranges(s: Solution, *, moment: bool = False, ax: Axes = None) -> Any:
-    """Draw from what to what the reactions of all pairs range over the positions. Returns the axes.
+    """Draw the ranges of the reactions of all pairs over the positions, one bar per pair.
 
-    One bar a pair: the size of its force (of its couple about its own point with ``moment``), the dot where the mean is. Where parts are
-    not unique the bar is that of the others, which the name of the pair tells, and is hatched up to the end of the axis: the whole may be
-    of any size.
+    The dot is the mean. If parts are indeterminate, the bar is that of the others and is hatched up to the end of the axis.
+
+    Parameters
+    ----------
+    s : Solution
+        A solution with forces.
+    moment : bool
+        Moments about the pair points in place of forces.
+    ax : Axes, optional
+        Axes of matplotlib. Default: new ones.
+
+    Returns
+    -------
+    Axes
 
     Raises
     ------
     DeclarationError
-        where the solution has no forces; MissingExtraError without matplotlib.
+        No forces.
+    MissingExtraError
+        Without matplotlib.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> from mechgraph import show
+    >>> s = mg.solve(mg.load("four-bar"), {"A": [0.0, 0.5, 1.0]})
+    >>> ax = show.reaction_ranges(s)
     """
     m = s.mechanism
     if not s.has_forces:
@@ -426,19 +506,38 @@ def _sizes(s: Solution, pair: str, moment: bool) -> tuple[Array, list[str], bool
 
 @door
 def polar_force(s: Solution, pair: str, *, on: Literal["a", "b"] = "a", ax: Axes = None) -> Any:
-    """Draw how the force in a bearing turns: its part across the axis in polar coordinates, fixed on a link. Returns the axes.
+    """Draw the radial force in a bearing in polar coordinates, fixed on a link.
 
-    The force of link a on link b, the angle counted about the axis from x of the marker on the chosen link: where a housing (``on="a"``) or
-    a pin (``"b"``) is loaded. The circle is the largest force.
+    The force of link a on link b, the angle about the axis from x of the marker on the chosen link. The circle is the largest force.
 
     Parameters
     ----------
-    ax : polar axes of matplotlib (``projection="polar"``); new ones where left out.
+    s : Solution
+        A solution with forces.
+    pair : str
+        Name of the pair.
+    on : {"a", "b"}
+        Link on which the picture is fixed: housing or pin.
+    ax : PolarAxes, optional
+        Polar axes of matplotlib (``projection="polar"``). Default: new ones.
+
+    Returns
+    -------
+    Axes
 
     Raises
     ------
     DeclarationError
-        where the solution has no forces, no such pair, the axes are not polar, or the force across the axis is not unique.
+        No forces, no such pair, axes that are not polar, or an indeterminate radial force.
+    MissingExtraError
+        Without matplotlib.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> from mechgraph import show
+    >>> s = mg.solve(mg.load("four-bar"), {"A": [0.0, 0.5, 1.0]})
+    >>> ax = show.polar_force(s, "B")
     """
     m = s.mechanism
     p = m.pair(known_pair(s, pair))
@@ -514,18 +613,34 @@ def motion_of(s: Solution, point: str) -> MaterialPoint:
 
 @door
 def point_path(s: Solution, points: str | Iterable[str] | None = None, *, ax: Axes = None) -> Any:
-    """Draw the paths of points: in the plane of a plane mechanism, else in space. Returns the axes.
+    """Draw the paths of points, in the plane of a planar mechanism, else in space.
 
     Parameters
     ----------
-    points : names of points (``"bucket.tip"``), of links (their mass centres) or of pairs (on link b); left out, all named points, or where
-        there are none all pairs that move.
-    ax : axes of matplotlib, of two or three dimensions; of a spatial mechanism on two dimensions, x and y are drawn.
+    s : Solution
+        A solution.
+    points : str or iterable of str, optional
+        Named points (``"bucket.tip"``), links (their mass centers) or pairs (on link b). Default: all named points, or all moving pairs.
+    ax : Axes, optional
+        Axes of matplotlib in two or three dimensions; on two, x and y of a spatial mechanism. Default: new ones.
+
+    Returns
+    -------
+    Axes
 
     Raises
     ------
     DeclarationError
-        where there is no such point; MissingExtraError without matplotlib.
+        No such point.
+    MissingExtraError
+        Without matplotlib.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> from mechgraph import show
+    >>> s = mg.kinematics(mg.load("four-bar"), {"A": [0.0, 0.5, 1.0]})
+    >>> ax = show.point_path(s, ["B", "coupler"])
     """
     s, names = finely(s), _names(s, points)
     return _draw(s, {name: motion_of(s, name).position for name in names}, 0, ax)
@@ -539,9 +654,36 @@ def hodograph(
     of: Literal["velocity", "acceleration"] = "velocity",
     ax: Axes = None,
 ) -> Any:
-    """Draw the hodograph of points: the curve of the tips of their velocities (or accelerations), from one origin. Returns the axes.
+    """Draw the hodograph of points: the curve of the tips of their velocities (or accelerations) from one origin.
 
-    Parameters as in ``point_path``.
+    Parameters
+    ----------
+    s : Solution
+        A solution.
+    points : str or iterable of str, optional
+        As in ``point_path``.
+    of : {"velocity", "acceleration"}
+        What is drawn.
+    ax : Axes, optional
+        Axes of matplotlib. Default: new ones.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    DeclarationError
+        No such point.
+    MissingExtraError
+        Without matplotlib.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> from mechgraph import show
+    >>> s = mg.kinematics(mg.load("four-bar"), {"A": mg.Motion([0.0, 0.5, 1.0], velocity=10.0)})
+    >>> ax = show.hodograph(s, "C")
     """
     if of not in ("velocity", "acceleration"):
         raise DeclarationError(

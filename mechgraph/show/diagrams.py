@@ -54,9 +54,31 @@ LABELLED = 64
 
 @door
 def draw_graph(m: Mechanism, *, ax: Axes = None) -> Any:
-    """Draw the link-pair graph: links as dots, pairs as lines between them, coloured by the loops that they lie in. Returns the axes.
+    """Draw the link-pair graph: links as dots, pairs as lines in the colors of their loops.
 
-    A pair in several loops has a strand for each; one in no loop is grey. The frame is a square. Dotted lines are couplings.
+    A pair in several loops has one strand per loop; a pair in none is gray. The frame is a square. Dotted lines are couplings.
+
+    Parameters
+    ----------
+    m : Mechanism
+        The mechanism; needs no geometry.
+    ax : Axes, optional
+        Axes of matplotlib. Default: new ones.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    MissingExtraError
+        Without matplotlib.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> from mechgraph import show
+    >>> ax = show.draw_graph(mg.load("windows-2"))
     """
     loops = [tuple(m.pairs[k].name for k, _ in loop) for loop in m.once(link_graph).loops]
     at = places(m.link_names(), ((p.a, p.b) for p in m.pairs))
@@ -128,10 +150,32 @@ def on_lines(curves: Mapping[str, Array], texts: Mapping[str, str], dots: Array)
 
 @door
 def draw_structure(m: Mechanism, *, groups: Decomposition | None = None, ax: Axes = None) -> Any:
-    """Draw the structural diagram: links as lines between two pairs and as polygons between more, pairs as crossed circles.
+    """Draw the structural diagram: links as lines and polygons, pairs as crossed circles; not to scale.
 
-    Returns the axes. The frame is hatched, a dotted line ties the pairs of a coupling. Nothing is to scale: it is the graph alone. With
-    ``groups`` (those of ``mg.groups``) the links are numbered and have a colour for each driver link and group, which the legend names.
+    Parameters
+    ----------
+    m : Mechanism
+        The mechanism.
+    groups : Decomposition, optional
+        Of ``mg.groups``: links are numbered and colored by group, with a legend.
+    ax : Axes, optional
+        Axes of matplotlib. Default: new ones.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    MissingExtraError
+        Without matplotlib.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> from mechgraph import show
+    >>> m = mg.load("windows-2")
+    >>> ax = show.draw_structure(m, groups=mg.groups(m))
     """
     of_link = {name: [p.name for p in m.pairs if name in (p.a, p.b)] for name in m.link_names()}
     at = places((p.name for p in m.pairs), chain.from_iterable(combinations(names, 2) for names in of_link.values()))
@@ -252,9 +296,31 @@ class _Canvas:
 
 @door
 def draw_sparsity(f: Formulation, *, ax: Axes = None) -> Any:
-    """Draw which unknown appears in which equation, with their names; equations of one owner have one colour. Returns the axes.
+    """Draw which unknown appears in which equation; equations of one owner share a color.
 
-    Up to 64 equations each is named, beyond that their owners are. Lines separate the equations of links, pairs and couplings.
+    Up to 64 equations each is named, beyond that their owners are. Lines separate links, pairs and couplings.
+
+    Parameters
+    ----------
+    f : Formulation
+        The equations.
+    ax : Axes, optional
+        Axes of matplotlib. Default: new ones.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    MissingExtraError
+        Without matplotlib.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> from mechgraph import show
+    >>> ax = show.draw_sparsity(mg.formulate(mg.load("rcsr")))
     """
     rows, columns, _, _ = f.pattern
     owners = list(dict.fromkeys(e.owner for e in f.equations))
@@ -313,10 +379,36 @@ MARKER_SIZE = {"o": 14, "s": 20, "D": 60}
 
 @door
 def draw_chains(chains: Iterable[Chain], *, columns: int = 6, titles: Iterable[str] | None = None) -> Any:
-    """Draw chains on one page, numbered in their order; returns the figure.
+    """Draw chains on one page, numbered in order.
 
-    Binary links are lines, others polygons, each number of joints in a colour of its own. Turning joints are circles, multiple ones filled,
-    sliding ones squares, others diamonds with the symbol of their type.
+    Binary links are lines, others polygons with a color per number of joints. Revolute joints are circles (multiple ones filled),
+    prismatic ones squares, others diamonds with their symbol.
+
+    Parameters
+    ----------
+    chains : iterable of Chain
+        E.g. ``mg.atlas(8)``.
+    columns : int
+        Chains per row.
+    titles : iterable of str, optional
+        Titles in place of the numbers.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib.
+
+    Raises
+    ------
+    MissingExtraError
+        Without matplotlib.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> from mechgraph import show
+    >>> len(show.draw_chains(mg.atlas(6)).axes) >= 2
+    True
     """
     some = list(chains)
     if not 0 < len(some) <= MOST_ON_A_PAGE or columns < 1:
@@ -442,19 +534,41 @@ def study_histogram(
     bins: Count | BinsName = "auto",
     ax: Axes = None,
 ) -> Any:
-    """Draw how an output is spread over the variants, with the mechanism itself, the mean and the quantiles. Returns the axes.
+    """Draw the distribution of an output over the variants, with the mechanism itself, the mean and the quantiles.
 
     Parameters
     ----------
-    output : its name.
-    position : of an output over positions the number of one; left out, the value of greatest size of every variant.
-    part : of an output with several entries the number of one.
-    bins : as in ``numpy.histogram_bin_edges``.
+    study : Study
+        Results of ``mg.study``.
+    output : str
+        Name of an output.
+    position : int, optional
+        Position of an output over positions. Default: the value of largest magnitude of every variant.
+    part : int, optional
+        Entry of an output with several.
+    bins : int or str
+        As in ``numpy.histogram_bin_edges``.
+    ax : Axes, optional
+        Axes of matplotlib. Default: new ones.
+
+    Returns
+    -------
+    Axes
 
     Raises
     ------
     DeclarationError
-        where there is no such output, position or part, or no variant was solved.
+        No such output, position or part, or no variant was solved.
+    MissingExtraError
+        Without matplotlib.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> from mechgraph import show
+    >>> masses = {"crank.mass": [0.03, 0.04, 0.05]}
+    >>> study = mg.study(mg.load("four-bar"), masses, "A.effort", sampling="grid", motions={"A": 0.5})
+    >>> ax = show.study_histogram(study, "A.effort", bins=3)
     """
     picked = _Picked(study, output, part)
     values, itself, label = picked.one(position)
@@ -484,17 +598,39 @@ def study_histogram(
 
 @door
 def study_bands(study: Study, output: str, *, over: str | None = None, part: int | None = None, ax: Axes = None) -> Any:
-    """Draw the quantiles of an output over the positions, as bands about the median, with the mechanism itself. Returns the axes.
+    """Draw the quantiles of an output over the positions, as bands about the median, with the mechanism itself.
 
     Parameters
     ----------
-    over : a driver of the study; left out, the first that moves, else the number of the position.
-    part : of an output with several entries the number of one.
+    study : Study
+        Results of ``mg.study``.
+    output : str
+        Name of an output over positions.
+    over : str, optional
+        A driver. Default: the first that moves, else the number of the position.
+    part : int, optional
+        Entry of an output with several.
+    ax : Axes, optional
+        Axes of matplotlib. Default: new ones.
+
+    Returns
+    -------
+    Axes
 
     Raises
     ------
     DeclarationError
-        where there is no such output, part or driver, or the output has one value a variant.
+        No such output, part or driver, or one value per variant.
+    MissingExtraError
+        Without matplotlib.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> from mechgraph import show
+    >>> masses = {"crank.mass": [0.03, 0.04, 0.05]}
+    >>> study = mg.study(mg.load("four-bar"), masses, "A.effort", sampling="grid", motions={"A": [0.0, 0.5]})
+    >>> ax = show.study_bands(study, "A.effort")
     """
     picked = _Picked(study, output, part)
     if not picked.placed:
@@ -519,10 +655,41 @@ def study_bands(study: Study, output: str, *, over: str | None = None, part: int
 def study_tornado(
     study: Study, output: str, *, position: int | None = None, part: int | None = None, ax: Axes = None
 ) -> Any:
-    """Draw what every parameter alone changes of an output, to first order, at its ends, the largest on top. Returns the axes.
+    """Draw how much each parameter alone changes an output, to first order, at its ends, the largest on top.
 
-    A distribution without ends has them at three standard deviations. Parameters as in ``study_histogram``; without ``position`` the place
-    is that of the greatest size of the mechanism itself.
+    A distribution without ends has them at three standard deviations.
+
+    Parameters
+    ----------
+    study : Study
+        Results of ``mg.study``.
+    output : str
+        Name of an output.
+    position : int, optional
+        Position of an output over positions. Default: that of the largest magnitude of the mechanism itself.
+    part : int, optional
+        Entry of an output with several.
+    ax : Axes, optional
+        Axes of matplotlib. Default: new ones.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    DeclarationError
+        No such output, position or part.
+    MissingExtraError
+        Without matplotlib.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> from mechgraph import show
+    >>> masses = {"crank.mass": [0.03, 0.04, 0.05]}
+    >>> study = mg.study(mg.load("four-bar"), masses, "A.effort", sampling="grid", motions={"A": 0.5})
+    >>> ax = show.study_tornado(study, "A.effort")
     """
     picked = _Picked(study, output, part)
     itself = np.atleast_1d(picked.itself)

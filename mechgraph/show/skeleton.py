@@ -80,31 +80,52 @@ def draw_skeleton(
     highlight: Sequence[str | tuple[str, int]] = (),
     view: tuple[float, float] = (24.0, -58.0),
 ) -> Any:
-    """Draw the mechanism at one position, faint at others, with the paths of its pair points. Returns the axes.
+    """Draw the mechanism at one position, faint at others, with the paths of its pair points.
 
-    Links are drawn as what they join: rods between two pairs, plates between more, named points among them; a circle with a dot is a mass
-    centre, the frame stands on hatched feet. Symbols follow from the freedoms of a pair: a drum for a turn (with a thread for a screw), a
-    guide for a slide, a plate for two, a ball for a rotation, a cross of pins for two turns, a square for a weld. Driven freedoms have an
-    arrow; springs, dampers, given forces and moments are drawn where they act. A mechanism all of whose points move in a plane is drawn in
-    it, on axes of two dimensions. More than a dozen pairs are numbered, with a legend.
+    Links are rods between two pairs, plates between more; a circle with a dot is a mass center. Pair symbols follow from the
+    freedoms: a drum rotates (with a thread: screw), a guide translates, a ball is spherical, a cross of pins universal, a square a
+    weld. Driven freedoms have an arrow; springs, dampers, forces and moments are drawn where they act. A planar mechanism is drawn in
+    its plane.
 
     Parameters
     ----------
-    s : a solution or response; or a mechanism with geometry, which is drawn where its loops are closed.
-    position : flat index of the position drawn in full.
-    ax : axes of matplotlib, of two or three dimensions; new ones where left out, in a figure of their own: ``ax.figure.savefig(...)``.
-    ghosts : number of further positions, drawn faintly.
-    traces : whether to draw the paths of pair points and named points; or the names of those whose paths are drawn: ``["B", "arm.tip"]``.
-    labels : names of pairs (with their type) and links.
-    forces : arrows of the reaction forces (what link a exerts on link b); hatched where the force is not unique.
-    highlight : names of pairs, or a loop of the report (``report.loops[0]``): all other links are drawn in grey.
-    view : elevation and azimuth in degrees of a spatial mechanism.
+    s : Solution or Mechanism
+        A solution or response; or a mechanism with geometry, drawn where its loops are closed.
+    position : int
+        Flat index of the position drawn in full.
+    ax : Axes, optional
+        Axes of matplotlib in two or three dimensions. Default: new ones, ``ax.figure.savefig(...)``.
+    ghosts : int
+        Number of further positions, drawn faintly.
+    traces : bool or sequence of str
+        Draw the paths of pair points and named points, or those named: ``["B", "arm.tip"]``.
+    labels : bool
+        Names of pairs (with their type) and links.
+    forces : bool
+        Arrows of the reaction forces of link a on link b; hatched if the force is indeterminate.
+    highlight : sequence
+        Names of pairs, or a loop (``report.loops[0]``); all other links are gray.
+    view : (2,) tuple of float
+        Elevation and azimuth [deg] of a spatial mechanism.
+
+    Returns
+    -------
+    Axes
 
     Raises
     ------
     DeclarationError
-        where that position was not solved, or a pair to be highlighted is not there; AssemblyError where a mechanism cannot be
-        closed; MissingExtraError without matplotlib.
+        That position was not solved, or a highlighted pair does not exist.
+    AssemblyError
+        The mechanism cannot be closed.
+    MissingExtraError
+        Without matplotlib.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> from mechgraph import show
+    >>> ax = show.draw_skeleton(mg.load("four-bar"))
     """
     found = scene(s, forces=forces)
     m, size = found.mechanism, 1 if isinstance(s, Mechanism) else int(np.asarray(s.status).size)
@@ -373,24 +394,45 @@ def animate(
     dpi: Dpi = 100.0,
     progress: Callable[[int, int], None] | None = None,
 ) -> None:
-    """Write a film of the mechanism over its positions: ``.gif``, ``.mp4`` (needs ffmpeg, or the ``film`` extra) or ``.png``.
+    """Write an animation of the mechanism: ``.gif``, ``.mp4`` (ffmpeg or the ``film`` extra) or ``.png``.
 
-    Of ``motion.png`` the frames are ``motion-000.png``, ``motion-001.png``, ... Names keep their places from frame to frame as far as they
-    can. Files are written whole or not at all.
+    ``motion.png`` gives the frames ``motion-000.png``, ``motion-001.png``, ... Labels keep their places from frame to frame if possible.
 
     Parameters
     ----------
-    frames : the number of frames, evenly spread over the solved positions, or flat indices of positions; left out, all of them, at most 72.
-    fps : frames a second.
-    size, dpi : of a frame, inches and pixels an inch.
-    forces, traces, labels, view : as in ``draw_skeleton``.
-    progress : called with the numbers of frames done and of all frames.
+    s : Solution
+        A solution or response.
+    path : str or path
+        The file, written atomically; the extension selects the format.
+    frames : int or sequence of int, optional
+        Number of frames, evenly spread over the solved positions, or flat indices of positions. Default: all, at most 72.
+    fps : float
+        Frames per second.
+    forces, traces, labels, view
+        As in ``draw_skeleton``.
+    size, dpi
+        Of a frame: inches, and pixels per inch.
+    progress : callable, optional
+        Called with the numbers of frames done and of all frames.
 
     Raises
     ------
     DeclarationError
-        where no position was solved, or a frame is none; FileError where the file cannot be written or ffmpeg is not there;
-        MissingExtraError without matplotlib.
+        No position was solved, or a frame does not exist.
+    FileError
+        The file cannot be written, or ffmpeg is missing.
+    MissingExtraError
+        Without matplotlib.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> from mechgraph import show
+    >>> import tempfile, pathlib
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     show.animate(mg.kinematics(mg.load("four-bar"), {"A": [0, 1]}), pathlib.Path(folder) / "a.gif", frames=2)
+    ...     print([file.name for file in pathlib.Path(folder).iterdir()])
+    ['a.gif']
     """
     target = format_of(path, FORMATS)
     writable(path)
@@ -518,12 +560,31 @@ FORMATS = (
 
 @door
 def save_picture(ax: Annotated[Any, DRAWN], path: str | os.PathLike[str], *, dpi: Dpi = 150.0) -> None:
-    """Write the figure of axes, whole or not at all, as the suffix says: ``.png``, ``.svg`` or ``.pdf``; the same bytes each time.
+    """Write the figure of axes atomically; the extension selects the format. The same picture gives the same bytes.
+
+    Parameters
+    ----------
+    ax : Axes or Figure
+        Of matplotlib.
+    path : str or path
+        ``.png``, ``.svg`` or ``.pdf``.
+    dpi : float
+        Pixels per inch of a ``.png``.
 
     Raises
     ------
     FileError
-        for another suffix, or where the file cannot be written.
+        Another extension, or the file cannot be written.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> from mechgraph import show
+    >>> import tempfile, pathlib
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     show.save_picture(show.draw_graph(mg.load("rcsr")), pathlib.Path(folder) / "graph.svg")
+    ...     print([file.name for file in pathlib.Path(folder).iterdir()])
+    ['graph.svg']
     """
     format_of(path, PICTURES).write(ax, path, dpi)
 

@@ -198,16 +198,31 @@ VARIANTS_LISTED = 10
 
 
 class Study(Shown):
-    """Results of ``study``; arrays have the variants first, then the positions, then components.
+    """Results of many variants; arrays have the variants first, then positions, then components. Returned by ``study``.
 
     Attributes
     ----------
-    parameters : name -> values ``(n,)``.
-    outputs : name -> array ``(n, ...)``, NaN where a variant or position was not solved.
-    nominal : name -> array ``(...)`` of the mechanism itself (with the motion of the first variant, where each has its own).
-    units : name -> unit of an output, one for every entry of its last axis where they differ; empty where it is not known.
-    messages : variant -> why it could not be solved.
-    warnings : what makes reactions doubtful, as in ``Solution.warnings``, with the greatest effort, pull or error in all variants.
+    parameters : mapping of str to (n,) array
+        Values of the parameters.
+    outputs : mapping of str to (n, ...) array
+        NaN for variants and positions that were not solved.
+    nominal : mapping of str to (...) array
+        Outputs of the mechanism itself (with the motion of the first variant, if each has its own).
+    units : mapping
+        Unit of each output, one per entry of its last axis if they differ; empty if unknown.
+    messages : mapping of int to str
+        Variant -> why it was not solved.
+    warnings : tuple
+        As ``Solution.warnings``, with the largest values of all variants.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> study = mg.study(
+    ...     mg.load("four-bar"), {"crank.mass": [0.03, 0.04]}, "A.effort", sampling="grid", motions={"A": 0.5}
+    ... )
+    >>> study.outputs["A.effort"][:, 0].round(4)
+    array([0.2641, 0.2618])
     """
 
     def __init__(
@@ -307,12 +322,30 @@ class Study(Shown):
         return np.asarray(self._outcomes.any(axis=1))
 
     def variant(self, i: int) -> Mechanism:
-        """The ``i``-th variant as a mechanism, to be solved and checked alone.
+        """Return the ``i``-th variant as a mechanism.
+
+        Parameters
+        ----------
+        i : int
+            Number of the variant.
+
+        Returns
+        -------
+        Mechanism
 
         Raises
         ------
         DeclarationError
-            where no such mechanism can be.
+            Its numbers declare no valid mechanism.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> study = mg.study(
+        ...     mg.load("four-bar"), {"crank.mass": [0.03, 0.04]}, "A.effort", sampling="grid", motions={"A": 0.5}
+        ... )
+        >>> study.variant(1).link("crank").mass
+        0.04
         """
         n = self._values.shape[1]
         if isinstance(i, bool) or not isinstance(i, int | np.integer) or not -n <= i < n:
@@ -338,7 +371,28 @@ class Study(Shown):
         return self._near.outputs[name]
 
     def quantiles(self, name: str, q: ArrayLike = (0.00135, 0.5, 0.99865)) -> Array:
-        """Quantiles of an output over the variants that were solved, ``(*shape of q, ...)``; NaN where none was."""
+        """Compute quantiles of an output over the solved variants.
+
+        Parameters
+        ----------
+        name : str
+            Name of the output.
+        q : (...) array_like
+            Probabilities, 0 to 1.
+
+        Returns
+        -------
+        (*shape of q, ...) array
+            NaN if no variant was solved.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> masses = {"crank.mass": [0.03, 0.04, 0.05]}
+        >>> study = mg.study(mg.load("four-bar"), masses, "A.effort", sampling="grid", motions={"A": 0.5})
+        >>> study.quantiles("A.effort", 0.5).round(4)
+        array([0.2618])
+        """
         values = self._output(name)
         if not ((np.asarray(q) >= 0) & (np.asarray(q) <= 1)).all():
             raise DeclarationError("study", [f"quantiles q = {q!r}: expected numbers from 0 to 1"])
@@ -351,20 +405,59 @@ class Study(Shown):
         return out.reshape(at.shape + values.shape[1:])
 
     def mean(self, name: str) -> Array:
-        """Mean of an output over the variants that were solved."""
+        """Compute the mean of an output over the solved variants.
+
+        Parameters
+        ----------
+        name : str
+            Name of the output.
+
+        Returns
+        -------
+        (...) array
+        """
         values = self._output(name)
         count = np.isfinite(values).sum(axis=0)
         return np.where(count > 0, np.nansum(values, axis=0) / np.maximum(count, 1), np.nan)
 
     def std(self, name: str) -> Array:
-        """Standard deviation of an output over the variants that were solved (of the sample, ``n - 1``)."""
+        """Compute the standard deviation of an output over the solved variants (of the sample, ``n - 1``).
+
+        Parameters
+        ----------
+        name : str
+            Name of the output.
+
+        Returns
+        -------
+        (...) array
+        """
         values = self._output(name)
         count = np.isfinite(values).sum(axis=0)
         squares = np.nansum((values - self.mean(name)) ** 2, axis=0)
         return np.where(count > 1, np.sqrt(squares / np.maximum(count - 1, 1)), np.nan)
 
     def sensitivities(self, name: str) -> dict[str, Array]:
-        """Derivative of an output after every parameter at the mechanism itself, ``(...)`` each, by central differences."""
+        """Compute the derivatives of an output by every parameter at the mechanism itself, by central differences.
+
+        Parameters
+        ----------
+        name : str
+            Name of the output.
+
+        Returns
+        -------
+        dict of str to (...) array
+            Unit of the output per unit of the parameter.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> masses = {"crank.mass": [0.03, 0.04]}
+        >>> study = mg.study(mg.load("four-bar"), masses, "A.effort", sampling="grid", motions={"A": 0.5})
+        >>> study.sensitivities("A.effort")["crank.mass"].round(4)  # -9.81 * 0.05 * sin(0.5)
+        array([-0.2352])
+        """
         near = self._near_output(name)
         k = len(self._ways)
         return {
@@ -377,17 +470,36 @@ class Study(Shown):
         return np.array([reach(way) for way in self._ways.values()]) - self._source.start[:, None]
 
     def moves(self, name: str) -> dict[str, Array]:
-        """What every parameter alone changes of an output, to first order, at its two ends (see ``worst_case``), ``(2, ...)``."""
+        """Compute how much each parameter alone changes an output, to first order, at its two ends (see ``worst_case``).
+
+        Parameters
+        ----------
+        name : str
+            Name of the output.
+
+        Returns
+        -------
+        dict of str to (2, ...) array
+        """
         return {
             parameter: np.stack([g * end for end in ends])
             for (parameter, g), ends in zip(self.sensitivities(name).items(), self._ends, strict=True)
         }
 
     def worst_case(self, name: str) -> tuple[Array, Array]:
-        """Smallest and largest value of an output, to first order, with every parameter at its worse end.
+        """Compute the smallest and largest value of an output, to first order, with every parameter at its worse end.
 
-        ``f_0 + sum_j min(or max)(df/dp_j low_j, df/dp_j high_j)``; a distribution without end ends at three standard deviations (of a
-        normal one). Compare with the extremes of the sample: the mechanism may be far from linear.
+        ``f_0 + sum_j min(or max)(df/dp_j low_j, df/dp_j high_j)``; a distribution without end ends at three standard deviations.
+        Compare with the extremes of the sample: the mechanism may be far from linear.
+
+        Parameters
+        ----------
+        name : str
+            Name of the output.
+
+        Returns
+        -------
+        low, high : (...) array
         """
         middle, moves = self._near_output(name)[0], self.moves(name).values()
         low, high = (
@@ -396,7 +508,17 @@ class Study(Shown):
         return low, high
 
     def linear_std(self, name: str) -> Array:
-        """Standard deviation to first order, ``sqrt(sum_j (df/dp_j sigma_j)^2)``, of independent parameters."""
+        """Compute the standard deviation to first order, ``sqrt(sum_j (df/dp_j sigma_j)^2)``, of independent parameters.
+
+        Parameters
+        ----------
+        name : str
+            Name of the output.
+
+        Returns
+        -------
+        (...) array
+        """
         sigma = [deviation(way) for way in self._ways.values()]
         return np.sqrt(
             sum(
@@ -408,7 +530,17 @@ class Study(Shown):
     # --- tables --------------------------------------------------------------------------------------------------------------
 
     def to_xarray(self) -> xarray.Dataset:
-        """A Dataset over variants and positions, parameters as coordinates of the variants (``xarray`` extra)."""
+        """Return a Dataset over variants and positions, with the parameters as coordinates (``xarray`` extra).
+
+        Returns
+        -------
+        xarray.Dataset
+
+        Raises
+        ------
+        MissingExtraError
+            Without xarray.
+        """
         xr = optional("xarray", "xarray")
         N = self._outcomes.shape[1]
         data: dict[str, Any] = {}
@@ -424,7 +556,17 @@ class Study(Shown):
         )
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A DataFrame, one row a variant: parameters, outputs that are one number a variant, positions not solved (``pandas`` extra)."""
+        """Return a DataFrame with one row per variant: parameters, outputs of one number, positions not solved (``pandas`` extra).
+
+        Returns
+        -------
+        pandas.DataFrame
+
+        Raises
+        ------
+        MissingExtraError
+            Without pandas.
+        """
         pd = optional("pandas", "pandas")
         single = {name: v.reshape(len(v)) for name, v in self.outputs.items() if v.size == len(v)}
         missing = (self._outcomes != 0).sum(axis=1)
@@ -466,40 +608,54 @@ def study(
     tol: float | None = None,
     progress: Progress | None = None,
 ) -> Study:
-    """Solve many variants of one mechanism: how outputs vary with its numbers.
+    """Solve many variants of a mechanism (Monte Carlo, Latin hypercube, grid).
 
     Parameters
     ----------
-    m : a mechanism; or a function ``build(**parameters)`` that returns one, always of the same topology.
-    parameters : declared number -> distribution of ``scipy.stats`` or numbers. Declared numbers are named as in
-        ``mechgraph.variants.numbers``: ``crank.mass``, ``B.on_a.point.x``, ``loads[0].stiffness``, ``length[2]`` of a chain.
-    outputs : quantities by name (``"A.effort"``, ``"B.force"``, ``"B:Fx"``, ``"coupler.center"``), or a mapping name -> quantity or
-        function of a Solution with the batch ``(variants, positions)``.
-    n : number of variants; on a grid, of levels of every distribution (a list of numbers is taken as given).
-    seed : of the sample. The same seed gives the same result, whatever the executor.
-    motions : of the drivers as in ``solve``; a leading axis of length ``n`` gives every variant its own.
-    sampling : ``"random"``, ``"latin"`` (Latin hypercube) or ``"grid"``.
-    executor : any ``concurrent.futures`` Executor, e.g. that of a cluster; left out, the processors of this machine: threads where the
-        compiled kernel serves, else processes.
-    actuate, method, redundant, engine, tol : as in ``solve``; every variant is taken as it is meant with the tolerance.
-    progress : called with the numbers of parts done and of all parts.
+    m : Mechanism or callable
+        A mechanism, or a function ``build(**parameters)`` that returns one of constant topology.
+    parameters : mapping
+        Declared number (``crank.mass``, ``B.on_a.point.x``, ``loads[0].stiffness``, ``length[2]`` of a chain) -> distribution of
+        ``scipy.stats`` or numbers.
+    outputs : str, iterable or mapping
+        Quantities by name (``"A.effort"``, ``"B.force"``, ``"B:Fx"``, ``"coupler.center"``), or name -> quantity or function of a
+        Solution with the batch ``(variants, positions)``.
+    n : int
+        Number of variants; on a grid, levels of every distribution (lists of numbers are taken as given).
+    seed : int
+        Seed of the sample. The same seed gives the same result on any executor.
+    motions : mapping, optional
+        As in ``solve``; a leading axis of length ``n`` gives every variant its own motion.
+    actuate, method, redundant, engine, tol
+        As in ``solve``.
+    sampling : {"random", "latin", "grid"}
+        How the parameters are sampled.
+    executor : concurrent.futures.Executor, optional
+        Default: the processors of this machine, threads if the compiled kernel serves, else processes.
+    progress : callable, optional
+        Called with the numbers of parts done and of all parts.
 
     Returns
     -------
     Study
-        A variant that cannot be built, assembled or moved has NaN in its outputs and says so in ``status`` and ``messages``; it
-        never stops the others. The start of every variant is followed from the mechanism itself while its numbers change into those of
-        the variant, so that it is on the same branch, also where the variant is then solved alone because a position is out of
-        reach or near a dead point. Where that path cannot be followed, the variant is assembled and solved alone, as ``solve``
-        does. The orientation of a passive body whose centre is off its line is the one that it reaches along that path.
+        A variant that cannot be built, assembled or moved has NaN outputs, with the reason in ``status`` and ``messages``. Every
+        variant starts on the branch of the mechanism itself: mechgraph tracks the start while the numbers change.
 
     Raises
     ------
     DeclarationError
-        with all faults of parameters and outputs at once. Errors of the mechanism itself as in ``solve``.
+        With all faults of parameters and outputs. Errors of the mechanism itself as in ``solve``.
     StudyError
-        where processes ended before their variants were solved, again when these were tried alone, where an executor gave up, or
-        ``progress`` raised; carries the Study of all others.
+        Processes ended before their variants were solved, or ``progress`` raised; ``error.study`` has the others.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> import scipy.stats
+    >>> sizes = {"crank.mass": scipy.stats.uniform(0.03, 0.01)}
+    >>> study = mg.study(mg.load("four-bar"), sizes, "A.effort", n=20, motions={"A": 0.5})
+    >>> study.outputs["A.effort"].shape
+    (20, 1)
     """
     ways = distributions(parameters)
     faults = [] if ways else ["parameters: none are named"]

@@ -227,22 +227,39 @@ def write_report(
     *,
     path: str | os.PathLike[str],
 ) -> None:
-    """Write the page of a mechanism: one HTML file that needs no network and can be passed on.
+    """Write a report page: one self-contained HTML file (``report`` extra).
 
-    The verdict first, then the determinacy report, the mechanism in space with every freedom, self-stress and advice, the curves and
-    tables of a solution, the outputs of a study, the equations, and where all this comes from.
+    It shows the verdict, the report, the mechanism in space with freedoms, self-stresses and recommendations, curves and tables of a
+    solution, outputs of a study, and the equations.
 
     Parameters
     ----------
-    solution : of that mechanism. Left out, the motions that its drivers store are solved, where all of them do.
-    study : of that mechanism, for its tables.
-    path : the file, written whole or not at all.
+    m : Mechanism
+        The mechanism.
+    solution : Solution, optional
+        Of that mechanism. Default: the stored motions, if all drives have one.
+    study : Study, optional
+        Of that mechanism.
+    path : str or path
+        The file, written atomically.
 
     Raises
     ------
     DeclarationError
-        where solution or study belong to another mechanism; FileError where the file cannot be written; MissingExtraError without the
-        ``report`` extra (jinja2, matplotlib).
+        Solution or study belong to another mechanism.
+    FileError
+        The file cannot be written.
+    MissingExtraError
+        Without jinja2 or matplotlib.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> import tempfile, pathlib
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     mg.write_report(mg.load("rcsr").replace(drives=["O1"]), path=pathlib.Path(folder) / "page.html")
+    ...     print([file.name for file in pathlib.Path(folder).iterdir()])
+    ['page.html']
     """
     write_whole(path, [report_page(m, solution, study)])
 
