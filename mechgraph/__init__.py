@@ -4,7 +4,6 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from mechgraph import errors  # noqa: F401  # isort: skip  # before all that takes time to load
-from mechgraph.algebra import inertia
 from mechgraph.determinacy.decomposition import Decomposition, Group
 from mechgraph.determinacy.equivalent import multiple_joints, split_joint
 from mechgraph.determinacy.families import Families
@@ -40,6 +39,7 @@ from mechgraph.graph.atlas import (
 )
 from mechgraph.graph.chains import Chain
 from mechgraph.kinetostatics import assemble, kinematics, solve
+from mechgraph.maths import inertia
 from mechgraph.model.chain import chain
 from mechgraph.model.couplings import Coupling
 from mechgraph.model.gears import Belt, BevelGears, Rack, SpurGears, WormGear

@@ -14,19 +14,18 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
-from mechgraph.closure.configuration import ROUNDINGS, Configuration
-from mechgraph.closure.driver_path import in_blocks
-from mechgraph.closure.indexing import Index, System
-from mechgraph.closure.passive_motion import are_alone
-from mechgraph.closure.rates import Rates, Velocities, expected_error
-from mechgraph.closure.solver import ClosureSolver
 from mechgraph.kernel import build
 from mechgraph.kernel.path import MIDDLE, Kernel, Mask, Records
 from mechgraph.kernel.tables import START, Layout, layout, tables, why_not
+from mechgraph.kinematics.motion_path import in_blocks
+from mechgraph.kinematics.rates import Rates, Velocities, are_alone, expected_error
+from mechgraph.kinematics.solver import ClosureSolver
+from mechgraph.kinematics.state import ROUNDINGS, Configuration
+from mechgraph.kinematics.system import System
+from mechgraph.maths.newton import Work
+from mechgraph.maths.se3 import Array, Index
 from mechgraph.model.couplings import Contact
 from mechgraph.model.loads import Load
-from mechgraph.numerics.newton import Work
 from mechgraph.outcome import Call, Outcome, Starts, system_at
 from mechgraph.result.kept import BlockMotion
 

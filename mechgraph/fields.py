@@ -19,8 +19,8 @@ from typing import Any, ClassVar, Self, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
+from mechgraph.maths.se3 import Array
 from mechgraph.quantities import (
     LENGTH,
     PURE,

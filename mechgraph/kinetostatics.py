@@ -11,21 +11,7 @@ from typing import Any, Literal, TypeVar
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
 from mechgraph.by_kernel import compiled
-from mechgraph.closure.assembly import CLOSED, assembled_at, closed_start, last_closed, named_columns
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.driver_motion import DriverMotion
-from mechgraph.closure.driver_path import FARTHEST, DriverPath, Positions, Status, far_faults, requests
-from mechgraph.closure.following import follow
-from mechgraph.closure.indexing import Index, System
-from mechgraph.closure.passive_motion import PassiveMotion, PassiveMotions, are_alone
-from mechgraph.closure.passive_rest import unspun
-from mechgraph.closure.poles import away_from_poles, ends_at_pole
-from mechgraph.closure.rates import distance_to_dead_point
-from mechgraph.closure.reduced_path import follow_reduced
-from mechgraph.closure.reduction import Reduction, reduction_of
-from mechgraph.closure.solver import ClosureSolver, MotionEngineName, closure_solver, engine_for, solver_at_start
 from mechgraph.determinacy.finite_motion import branches, branches_text
 from mechgraph.determinacy.mobility import Freedoms, actuation_fault, free_motion
 from mechgraph.determinacy.report import (
@@ -49,12 +35,23 @@ from mechgraph.errors import (
 )
 from mechgraph.force.block import hold_names
 from mechgraph.force.reactions import MethodName
+from mechgraph.kinematics.assembly import CLOSED, assembled_at, closed_start, last_closed, named_columns
+from mechgraph.kinematics.motion_path import FARTHEST, DriverPath, Positions, Status, far_faults, requests
+from mechgraph.kinematics.passive_rest import unspun
+from mechgraph.kinematics.prescribed import DriverMotion
+from mechgraph.kinematics.rates import PassiveMotion, PassiveMotions, are_alone, distance_to_dead_point
+from mechgraph.kinematics.reach import away_from_poles, ends_at_pole, follow
+from mechgraph.kinematics.rods import Reduction, follow_reduced, reduction_of
+from mechgraph.kinematics.solver import ClosureSolver, MotionEngineName, closure_solver, engine_for, solver_at_start
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
+from mechgraph.maths.linear import independent_rows
+from mechgraph.maths.se3 import Array, Index
+from mechgraph.maths.tolerances import MOTIONS, PATH
+from mechgraph.maths.track import Nodes
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import declared
-from mechgraph.numerics.linear import independent_rows
-from mechgraph.numerics.tolerances import MOTIONS, PATH
-from mechgraph.numerics.tracks import Nodes
 from mechgraph.outcome import Followed, Options, Outcome, Starts
 from mechgraph.quantities import door
 from mechgraph.result.solution import Solution

@@ -9,25 +9,23 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
-from mechgraph.closure.assembly import CLOSED
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.coordinates import continued
-from mechgraph.closure.driver_motion import DriverMotion
-from mechgraph.closure.driver_path import BLOCK, DriverPath, Positions, Status, in_blocks
-from mechgraph.closure.indexing import Index, System
-from mechgraph.closure.passive_motion import PassiveMotion
-from mechgraph.closure.rates import Rates, Velocities, accuracy, at_dead_points, disagreement, rates
-from mechgraph.closure.reduction import FORMS
-from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_solver
 from mechgraph.determinacy.finite_motion import branches
 from mechgraph.determinacy.mobility import stand_still
 from mechgraph.errors import DeclarationError
 from mechgraph.force.block import BlockForces, ForceTask, forces_of_block
+from mechgraph.kinematics.assembly import CLOSED
+from mechgraph.kinematics.motion_path import BLOCK, DriverPath, Positions, Status, continued, in_blocks
+from mechgraph.kinematics.prescribed import DriverMotion
+from mechgraph.kinematics.rates import PassiveMotion, Rates, Velocities, accuracy, at_dead_points, disagreement, rates
+from mechgraph.kinematics.rods import FORMS
+from mechgraph.kinematics.solver import ClosureSolver, FactoredClosure, closure_solver
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
+from mechgraph.maths.se3 import Array, Index
+from mechgraph.maths.singular_point import passed
+from mechgraph.maths.tracker import Follower
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.numerics.continuation import Follower
-from mechgraph.numerics.crossings import passed
 from mechgraph.quantities import option_faults
 from mechgraph.result.kept import BlockMotion
 from mechgraph.result.trajectory import Trajectory

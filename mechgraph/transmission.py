@@ -21,11 +21,11 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
 from mechgraph.document import Document, Paragraph, Shown
 from mechgraph.errors import DeclarationError, MechgraphWarning
 from mechgraph.files import plain
 from mechgraph.kinetostatics import solve
+from mechgraph.maths.se3 import Array
 from mechgraph.model.couplings import Contact
 from mechgraph.model.loads import Effort
 from mechgraph.quantities import door, wrong

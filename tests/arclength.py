@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from mechgraph.closure.assembly import assembled, named_columns
-from mechgraph.closure.configuration import Configuration
+from mechgraph.kinematics.assembly import assembled, named_columns
+from mechgraph.kinematics.state import Configuration
 
 
 class _Path:

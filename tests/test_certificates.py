@@ -9,8 +9,8 @@ import pytest
 from mechanisms import hexapod, linked_four_bar, ring
 
 import mechgraph as mg
-from mechgraph.closure.assembly import close_all, closed_start, scaled_start
-from mechgraph.closure.configuration import Configuration
+from mechgraph.kinematics.assembly import close_all, closed_start, scaled_start
+from mechgraph.kinematics.state import Configuration
 from mechgraph.modes import certificate as certificates
 from mechgraph.modes.assemblies import Question
 from mechgraph.modes.certificate import Ball, certificate, curvature, loop_rows, rows, told_apart

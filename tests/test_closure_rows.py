@@ -6,9 +6,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 import mechgraph as mg
-from mechgraph.closure.assembly import scaled_system
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import System
+from mechgraph.kinematics.assembly import scaled_system
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
 from mechgraph.model.toml import library_path
 
 

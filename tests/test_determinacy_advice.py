@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
-from mechgraph.algebra.se3 import rotation_exp
 from mechgraph.determinacy import pair_changes
 from mechgraph.determinacy.pair_changes import Effect, changes_of
 from mechgraph.determinacy.report import DeterminacyReport
+from mechgraph.maths.se3 import rotation_exp
 
 BUILDERS = {
     "planar": known.planar,

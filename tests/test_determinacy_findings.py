@@ -8,7 +8,7 @@ import pytest
 from mechanisms import X, Z
 
 import mechgraph as mg
-from mechgraph.algebra.se3 import pose_exp
+from mechgraph.maths.se3 import pose_exp
 
 # --- unique by principal direction ----------------------------------------------------------------------------------------
 

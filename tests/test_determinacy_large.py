@@ -18,18 +18,18 @@ from lattices import LATTICES
 from strategies import closed_mechanism, with_drives
 
 import mechgraph as mg
-from mechgraph.closure.assembly import assembled
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.elimination import Elimination
-from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
-from mechgraph.closure.rank import ClosureRank, closure_rank, rank_of_rows
 from mechgraph.determinacy import findings, snapping
 from mechgraph.determinacy.facts import counted_ledger
 from mechgraph.determinacy.families import kind_of
 from mechgraph.determinacy.mobility import free_motion, random_rows
 from mechgraph.determinacy.uniqueness import uniqueness
 from mechgraph.graph.linkgraph import link_graph
-from mechgraph.numerics.tolerances import RANKS
+from mechgraph.kinematics.assembly import assembled
+from mechgraph.kinematics.loop_rows import ClosureRows, ReducedRows
+from mechgraph.kinematics.rank import ClosureRank, closure_rank, rank_of_rows
+from mechgraph.kinematics.sparse_system import Elimination
+from mechgraph.kinematics.state import Configuration
+from mechgraph.maths.tolerances import RANKS
 
 ENGINES = ("dense", "sparse")
 

@@ -10,8 +10,8 @@ from test_groups import random_mechanism
 from test_large import AGREE, assert_same
 
 import mechgraph as mg
-from mechgraph.closure.solver import engine_for
-from mechgraph.numerics.block_triangular import BlockTriangular
+from mechgraph.kinematics.solver import engine_for
+from mechgraph.maths.sparse import BlockTriangular
 
 SIZES = (3, 1, 4, 3, 2)
 T = 7

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import scipy
 
-from mechgraph.algebra import inertia
 from mechgraph.errors import DeclarationError
+from mechgraph.maths import inertia
 
 EDGE, WEIGHT = np.polynomial.legendre.leggauss(4)
 

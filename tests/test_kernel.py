@@ -22,9 +22,9 @@ from strategies import closed_mechanism, motions, with_drives, with_loads, with_
 
 import mechgraph as mg
 from mechgraph import by_kernel
-from mechgraph.closure.driver_motion import DriverMotion
 from mechgraph.kernel import build, tables
 from mechgraph.kernel.path import pointer
+from mechgraph.kinematics.prescribed import DriverMotion
 from mechgraph.kinetostatics import Pipeline
 from mechgraph.outcome import Options
 

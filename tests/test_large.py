@@ -16,17 +16,16 @@ from numpy.testing import assert_allclose
 from strategies import body, motions, solvable
 
 import mechgraph as mg
-from mechgraph.closure import tree
-from mechgraph.closure.assembly import assembled, scaled_start
-from mechgraph.closure.bordering import LoopSystem
-from mechgraph.closure.coefficients import Numbers
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import System
-from mechgraph.closure.loop_rows import ClosureRows
-from mechgraph.closure.tree import Tree
 from mechgraph.graph.linkgraph import link_graph
+from mechgraph.kinematics import batches
+from mechgraph.kinematics.assembly import assembled, scaled_start
+from mechgraph.kinematics.batches import Numbers, Tree
+from mechgraph.kinematics.loop_rows import ClosureRows
+from mechgraph.kinematics.sparse_system import LoopSystem
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
+from mechgraph.maths.sparse import SparseFactors
 from mechgraph.model.parameters import parameters
-from mechgraph.numerics.sparse import SparseFactors
 
 AGREE = 1e-9
 LONG = [pytest.param(name, marks=pytest.mark.slow) if name == "tree" else name for name in LATTICES]
@@ -284,7 +283,7 @@ def test_deep_trees_by_pointer_doubling(monkeypatch: pytest.MonkeyPatch) -> None
     x = system.state_of(rng.uniform(-1, 1, (system.n_freedoms, 2)))
     terms, loads = rng.normal(size=(6, P, 2)), rng.normal(size=(6, n, 2))
     shallow, poses = Tree(link_graph(m)), Configuration(system, x).poses
-    monkeypatch.setattr(tree, "DEEP", 0)
+    monkeypatch.setattr(batches, "DEEP", 0)
     deep = Tree(link_graph(m))
     assert deep.deep
     assert not shallow.deep

@@ -107,8 +107,8 @@ def test_the_check_finds_an_import_upward(source: str) -> None:
     [
         "import numpy as np\nfrom scipy import linalg",
         "from mechgraph.errors import FileError",
-        "from mechgraph.algebra import se3",
-        "from . import pair\nfrom .pair import PAIR_TYPES\nfrom ..algebra.se3 import exp",
+        "from mechgraph.maths import se3",
+        "from . import pair\nfrom .pair import PAIR_TYPES\nfrom ..maths.se3 import exp",
         "if TYPE_CHECKING:\n    from mechgraph.force import dalembert",
         "if typing.TYPE_CHECKING:\n    import mechgraph.force",
     ],

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
-from mechgraph.closure.assembly import assembled_at
+from mechgraph.kinematics.assembly import assembled_at
 from mechgraph.response.along_path import POINTS, Arc, Way, _coarse
 from mechgraph.response.charts import Prescribed, Task
 from mechgraph.response.motion_equations import Loads

@@ -5,13 +5,13 @@ import pytest
 from mechanisms import unclosable_four_bar
 
 import mechgraph as mg
-from mechgraph.closure.assembly import assembled, named_columns, scaled_system
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.driver_path import DriverPath, Request, Status
-from mechgraph.closure.following import follow
-from mechgraph.closure.indexing import System
-from mechgraph.closure.solver import closure_solver
 from mechgraph.graph.linkgraph import link_graph
+from mechgraph.kinematics.assembly import assembled, named_columns, scaled_system
+from mechgraph.kinematics.motion_path import DriverPath, Request, Status
+from mechgraph.kinematics.reach import follow
+from mechgraph.kinematics.solver import closure_solver
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
 
 MOVING = tuple(name for name in mg.library() if mg.load(name).drives[0].motion is not None)
 RANK = 1e-9

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mechgraph as mg
-from mechgraph.closure.indexing import indexed
 from mechgraph.graph.linkgraph import graph_of_ends, link_graph, network
+from mechgraph.kinematics.system import indexed
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -11,10 +11,10 @@ import pytest
 from mechanisms import Z, bennett, linked_four_bar, ring
 
 import mechgraph as mg
-from mechgraph.closure.assembly import close_all, closed_start
-from mechgraph.closure.configuration import Configuration
 from mechgraph.files import cache_folder
 from mechgraph.force.loads import user_poses
+from mechgraph.kinematics.assembly import close_all, closed_start
+from mechgraph.kinematics.state import Configuration
 from mechgraph.model.chain import chain_symbols
 from mechgraph.modes import start_sets
 from mechgraph.modes.assemblies import Finder, Question

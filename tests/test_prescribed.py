@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from strategies import motions, solvable
 
 import mechgraph as mg
-from mechgraph.closure.driver_motion import driven
+from mechgraph.kinematics.prescribed import driven
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 WAYS = [(engine, method) for engine in ("dense", "sparse") for method in ("loop_wrench", "newton_euler", "printed")]

@@ -19,8 +19,8 @@ from typer.testing import CliRunner
 
 import mechgraph as mg
 from mechgraph.cli import app
-from mechgraph.closure.driver_path import Status
 from mechgraph.compiled.tabled import STATUSES
+from mechgraph.kinematics.motion_path import Status
 
 ROOT = Path(__file__).resolve().parents[1]
 README = ROOT / "README.md"

@@ -12,8 +12,8 @@ from lattices import ladder, parallelograms, scissors, spatial_ladder, tree_of_l
 from typer.testing import CliRunner
 
 import mechgraph as mg
-from mechgraph.algebra.se3 import pose_exp
 from mechgraph.cli import app
+from mechgraph.maths.se3 import pose_exp
 
 BUILDERS = (
     {n: (lambda n=n: mg.load(n)) for n in mg.library()}

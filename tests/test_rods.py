@@ -11,9 +11,9 @@ import pytest
 from mechanisms import Z, hexapod
 
 import mechgraph as mg
-from mechgraph.algebra.se3 import quaternion_matrix, rotation_exp
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import indexed
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import indexed
+from mechgraph.maths.se3 import quaternion_matrix, rotation_exp
 from mechgraph.modes.assemblies import Finder, Question
 from mechgraph.modes.continua import searched
 from mechgraph.modes.family import Member

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mechgraph.algebra import se3
+from mechgraph.maths import se3
 
 SIX = st.lists(st.floats(-3, 3), min_size=6, max_size=6).map(np.array)
 

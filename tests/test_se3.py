@@ -6,7 +6,7 @@ import scipy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mechgraph.algebra import se3
+from mechgraph.maths import se3
 
 VECTORS = st.lists(st.floats(-1, 1), min_size=3, max_size=3).map(np.array).filter(lambda v: np.linalg.norm(v) > 1e-3)
 RATES = st.lists(st.floats(-2, 2), min_size=3, max_size=3).map(np.array)

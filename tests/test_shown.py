@@ -55,7 +55,7 @@ def results() -> dict[str, Any]:
     }  # fmt: skip
 
 
-INTERNAL = ("mechgraph.closure", "mechgraph.numerics", "mechgraph.document", "mechgraph.fields")
+INTERNAL = ("mechgraph.kinematics", "mechgraph.maths", "mechgraph.document", "mechgraph.fields")
 """Where what a user does not ask for is made: unrolled equations, work arrays."""
 INSIDE = {
     "System",

@@ -26,12 +26,12 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
 import mechgraph as mg
-from mechgraph.closure.prescription import coordinate
 from mechgraph.document import Document, to_text
 from mechgraph.errors import INTERRUPTED, MechgraphError, MechgraphWarning, did_you_mean, near_names, shortened, visible
 from mechgraph.exchange.comparison import compare
 from mechgraph.exchange.files import READERS
 from mechgraph.files import Format, format_of, formats_text, writable
+from mechgraph.kinematics.prescribed import coordinate
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.model.toml import swept

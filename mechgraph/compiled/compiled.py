@@ -11,12 +11,12 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array, turn_tangent
 from mechgraph.compiled.tabled import STATUSES, Tabled, tabled
 from mechgraph.compiled.write import InputsName, write_tables
 from mechgraph.errors import DeclarationError, listed
 from mechgraph.kernel import build
 from mechgraph.kernel.tables import START
+from mechgraph.maths.se3 import Array, turn_tangent
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import door, has_quantity, is_numeric, real_array, with_doors, without_units, wrong
 

@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array, homogeneous
 from mechgraph.by_kernel import cannot, gives_forces
-from mechgraph.closure.assembly import closed_start
-from mechgraph.closure.driver_motion import DriverMotion
-from mechgraph.closure.indexing import System
 from mechgraph.determinacy.snapping import meant
 from mechgraph.errors import DeclarationError, listed
 from mechgraph.kernel.loads import EFFORT
 from mechgraph.kernel.tables import HEAD_LOAD_NUMBERS, HEAD_LOADS, Integers, Layout, layout, tables
+from mechgraph.kinematics.assembly import closed_start
+from mechgraph.kinematics.prescribed import DriverMotion
+from mechgraph.kinematics.system import System
 from mechgraph.kinetostatics import Pipeline
+from mechgraph.maths.se3 import Array, homogeneous
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Declared, declared

@@ -40,13 +40,12 @@ from functools import cached_property
 import numpy as np
 import scipy
 
-from mechgraph.algebra.se3 import Array
-from mechgraph.closure.indexing import Index
 from mechgraph.determinacy.families import Kind
 from mechgraph.determinacy.mobility import Freedoms, Position
 from mechgraph.document import Block, Document, Paragraph, Shown, Table
 from mechgraph.graph.atlas import MultipleJoint
-from mechgraph.numerics.tolerances import MOTIONS, RANKS
+from mechgraph.maths.se3 import Array, Index
+from mechgraph.maths.tolerances import MOTIONS, RANKS
 
 
 @dataclass(frozen=True, eq=False)

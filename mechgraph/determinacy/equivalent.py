@@ -20,16 +20,15 @@ from functools import cached_property
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
-from mechgraph.closure.assembly import assembled, assembled_at, at_position
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.contact_lines import ContactLines
 from mechgraph.determinacy.decomposition import LinkRows, joints_at
 from mechgraph.determinacy.families import kind_of
 from mechgraph.determinacy.mobility import Position
 from mechgraph.errors import DeclarationError
 from mechgraph.force.loads import user_poses
 from mechgraph.graph.atlas import MultipleJoint
+from mechgraph.kinematics.assembly import assembled, assembled_at, at_position
+from mechgraph.kinematics.state import Configuration, ContactLines
+from mechgraph.maths.se3 import Array
 from mechgraph.model.couplings import Contact
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Marker, Pair

@@ -13,10 +13,6 @@ from time import monotonic
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.algebra.se3 import Array
-from mechgraph.closure.assembly import at_position
-from mechgraph.closure.indexing import Index, System
-from mechgraph.closure.rank import EngineName
 from mechgraph.determinacy import findings
 from mechgraph.determinacy.decomposition import Decomposition, decomposition
 from mechgraph.determinacy.families import Families, Kind, families, kind_of, kind_of_mechanism
@@ -39,9 +35,13 @@ from mechgraph.equations.terms import Ledger, LedgerRow
 from mechgraph.errors import DeclarationError
 from mechgraph.force.block import hold_names
 from mechgraph.graph.linkgraph import LinkGraph, Parts, parts_of
+from mechgraph.kinematics.assembly import at_position
+from mechgraph.kinematics.rank import EngineName
+from mechgraph.kinematics.system import System
+from mechgraph.maths.linear import independent_rows
+from mechgraph.maths.se3 import Array, Index
+from mechgraph.maths.tolerances import RANKS
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.numerics.linear import independent_rows
-from mechgraph.numerics.tolerances import RANKS
 from mechgraph.quantities import wrong
 
 

@@ -33,15 +33,14 @@ from functools import cached_property
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array, skew
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import Index
-from mechgraph.closure.rank import ClosureRank
 from mechgraph.determinacy.finite_motion import FiniteMotion
 from mechgraph.determinacy.mobility import Freedoms, Position, freedoms_at
+from mechgraph.kinematics.rank import ClosureRank
+from mechgraph.kinematics.state import Configuration
+from mechgraph.maths.linear import rank_of, singular_values
+from mechgraph.maths.se3 import Array, Index, skew
+from mechgraph.maths.tolerances import MOTIONS, RANKS
 from mechgraph.model.parameters import Parameters
-from mechgraph.numerics.linear import rank_of, singular_values
-from mechgraph.numerics.tolerances import MOTIONS, RANKS
 
 MOST_MOTIONS = 200
 """Mobility up to which the motions of pairs of other kinds are looked at."""

@@ -17,12 +17,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.algebra.se3 import Array, rotation_exp
-from mechgraph.closure.assembly import closed_start
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import Index, System
-from mechgraph.closure.passive_motion import PassiveMotion
-from mechgraph.closure.rank import EngineName
 from mechgraph.determinacy.families import kind_of
 from mechgraph.determinacy.mobility import Freedoms, Position, drive_order, single_freedoms
 from mechgraph.determinacy.near_relations import EXACT
@@ -40,11 +34,17 @@ from mechgraph.determinacy.snapping import TOOK_TOO_LONG, SearchEnded, SnappedMe
 from mechgraph.errors import MechgraphError
 from mechgraph.files import patch
 from mechgraph.force.block import hold_at_rest, hold_names, is_idle
+from mechgraph.kinematics.assembly import closed_start
+from mechgraph.kinematics.rank import EngineName
+from mechgraph.kinematics.rates import PassiveMotion
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
+from mechgraph.maths.linear import independent_rows, rank_of, singular_values
+from mechgraph.maths.se3 import Array, Index, rotation_exp
+from mechgraph.maths.tolerances import MOTIONS
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.toml import to_data
-from mechgraph.numerics.linear import independent_rows, rank_of, singular_values
-from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.pairs.factors import Component
 from mechgraph.pairs.pair_type import TABLE, PairType
 from mechgraph.quantities import unit_of

@@ -13,7 +13,7 @@ a direction in which nothing moves on loses its part at any step size and does n
 So the mobility is never above a nullity on the way. Chords of a curved motion are never ranked against each other: they differ in
 direction by its curvature. Source for the notion: Connelly and Whiteley, Second-order rigidity and prestress stability, 1996.
 
-From a regular position the motion is then followed as every path is (``numerics.continuation``), n of its freedoms being given. The test
+From a regular position the motion is then followed as every path is (``maths.tracker``), n of its freedoms being given. The test
 itself cannot be left to the follower: it presumes a regular start, chooses other rows where those chosen do not close all loops, and
 takes no step on a branch along which the rank is nowhere full (a shaky part carried by a mechanism that moves).
 
@@ -34,20 +34,20 @@ from functools import cached_property
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array, null_space
-from mechgraph.closure.assembly import CLOSED, CLOSURE_GOAL, close
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.driver_path import DriverPath
-from mechgraph.closure.indexing import Index, System
-from mechgraph.closure.loop_rows import ClosureRows, ReducedRows
-from mechgraph.closure.passive_motion import PassiveMotion
-from mechgraph.closure.rank import ClosureRank, EngineName, rank_of_rows
-from mechgraph.closure.solver import closure_solver, engine_for
-from mechgraph.numerics.continuation import Follower
-from mechgraph.numerics.linear import independent_rows
-from mechgraph.numerics.newton import closest_zeros
-from mechgraph.numerics.tolerances import RANKS
-from mechgraph.numerics.tracks import Paths
+from mechgraph.kinematics.assembly import CLOSED, CLOSURE_GOAL, close
+from mechgraph.kinematics.loop_rows import ClosureRows, ReducedRows
+from mechgraph.kinematics.motion_path import DriverPath
+from mechgraph.kinematics.rank import ClosureRank, EngineName, rank_of_rows
+from mechgraph.kinematics.rates import PassiveMotion
+from mechgraph.kinematics.solver import closure_solver, engine_for
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
+from mechgraph.maths.linear import independent_rows
+from mechgraph.maths.newton import closest_zeros
+from mechgraph.maths.se3 import Array, Index, null_space
+from mechgraph.maths.tolerances import RANKS
+from mechgraph.maths.track import Paths
+from mechgraph.maths.tracker import Follower
 
 TRIAL_STEPS = (0.05, 0.0125, 0.003)
 """Lengths of trial steps (radians, or lengths / L): the first ones tell a motion that returns, the last ones tolerate curvature."""

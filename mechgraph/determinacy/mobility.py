@@ -26,12 +26,6 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from mechgraph.algebra.se3 import Array, compose, null_space, pose_exp, rotation_exp
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import Index, System
-from mechgraph.closure.loop_rows import ClosureRows
-from mechgraph.closure.passive_motion import PassiveMotion
-from mechgraph.closure.rank import ClosureRank, EngineName, rank_of_rows
 from mechgraph.determinacy.finite_motion import MOVED, states_nearby
 from mechgraph.graph.linkgraph import (
     LinkGraph,
@@ -41,9 +35,15 @@ from mechgraph.graph.linkgraph import (
     labels_of_bipartite,
     members,
 )
+from mechgraph.kinematics.loop_rows import ClosureRows
+from mechgraph.kinematics.rank import ClosureRank, EngineName, rank_of_rows
+from mechgraph.kinematics.rates import PassiveMotion
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
+from mechgraph.maths.linear import complement, independent_rows, rank_of, singular_values
+from mechgraph.maths.se3 import Array, Index, compose, null_space, pose_exp, rotation_exp
+from mechgraph.maths.tolerances import MOTIONS, PATH, RANKS
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.numerics.linear import complement, independent_rows, rank_of, singular_values
-from mechgraph.numerics.tolerances import MOTIONS, PATH, RANKS
 from mechgraph.pairs import kinematics as evaluation
 from mechgraph.pairs.pair_type import PairType
 

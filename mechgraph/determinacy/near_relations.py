@@ -15,9 +15,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array, compose, inverse, rotation_exp, rotation_log
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import Index, System
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
+from mechgraph.maths.se3 import Array, Index, compose, inverse, rotation_exp, rotation_log
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.pairs.pair_type import PairType
 

@@ -28,16 +28,15 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.algebra.se3 import Array, null_space
-from mechgraph.closure.assembly import assembled, at_position, named_columns
-from mechgraph.closure.indexing import Index
-from mechgraph.closure.rank import EngineName
-from mechgraph.closure.sparse_solver import PROBES
 from mechgraph.determinacy.mobility import Freedoms, PlacedPair, Position, free_motion, freedoms_at
 from mechgraph.determinacy.uniqueness import pair_states
+from mechgraph.kinematics.assembly import assembled, at_position, named_columns
+from mechgraph.kinematics.rank import EngineName
+from mechgraph.kinematics.solver import PROBES
+from mechgraph.maths.se3 import Array, Index, null_space
+from mechgraph.maths.tolerances import MOTIONS, STRESSES
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Marker, Pair
-from mechgraph.numerics.tolerances import MOTIONS, STRESSES
 from mechgraph.pairs import kinematics as evaluation
 from mechgraph.pairs.pair_type import TABLE, PairType
 

@@ -12,8 +12,6 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
 from typing import Any, NamedTuple
 
-from mechgraph.closure.assembly import assembled, assembled_at, named_columns
-from mechgraph.closure.solver import MotionEngineName
 from mechgraph.determinacy import sentences
 from mechgraph.determinacy.facts import Facts, Geometry
 from mechgraph.determinacy.findings import LIMIT, Rounding, component_words, listed, plural, rounding
@@ -29,8 +27,10 @@ from mechgraph.errors import AssemblyError, DeadPointError, IndeterminateError, 
 from mechgraph.files import Json, json_text, members, plain, schema_of
 from mechgraph.graph.linkgraph import link_graph
 from mechgraph.kernel import build
+from mechgraph.kinematics.assembly import assembled, assembled_at, named_columns
+from mechgraph.kinematics.solver import MotionEngineName
+from mechgraph.maths.tolerances import RANKS
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.numerics.tolerances import RANKS
 from mechgraph.pairs.pair_type import TABLE
 from mechgraph.quantities import Limit, door
 

@@ -7,14 +7,14 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.closure.indexing import Index
 from mechgraph.determinacy.facts import Facts
 from mechgraph.determinacy.families import Kind
 from mechgraph.determinacy.findings import KINDS, NAMED, alternatives, component_words, joined, listed, plural, vector
 from mechgraph.determinacy.uniqueness import Uniqueness
 from mechgraph.document import Block, Bullets, Document, Paragraph, to_text
+from mechgraph.maths.se3 import Index
+from mechgraph.maths.tolerances import RANKS
 from mechgraph.model.pair import second_direction
-from mechgraph.numerics.tolerances import RANKS
 
 SETS = 3
 """Most sets of components that the verdict names."""

@@ -24,17 +24,17 @@ from typing import Any, TypeAlias
 import numpy as np
 import scipy
 
-from mechgraph.algebra.se3 import Array, cross
-from mechgraph.closure.assembly import closed_start
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import Index, System
 from mechgraph.determinacy.near_relations import EXACT, Placed, Relation, Relations
 from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, MechgraphError
 from mechgraph.fields import tolerance_fault
+from mechgraph.kinematics.assembly import closed_start
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
+from mechgraph.maths.linear import singular_values
+from mechgraph.maths.se3 import Array, Index, cross
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Declared
-from mechgraph.numerics.linear import singular_values
 
 FIRMLY_MEANT = (0.25, 0.0625)
 """Parts of the tolerance: relations that are nearer than others stay, where not all let the mechanism move."""

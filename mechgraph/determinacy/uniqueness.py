@@ -25,16 +25,14 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from mechgraph.algebra.se3 import Array, null_space
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.contact_lines import ContactLines
-from mechgraph.closure.indexing import Index
-from mechgraph.closure.rank import ClosureRank, EngineName, closure_rank
-from mechgraph.closure.sparse_solver import PROBES, SEED
 from mechgraph.force.reactions import UNIQUE, PairFrames, at_pair_points
 from mechgraph.graph.linkgraph import labels_of_bipartite
+from mechgraph.kinematics.rank import ClosureRank, EngineName, closure_rank
+from mechgraph.kinematics.solver import PROBES, SEED
+from mechgraph.kinematics.state import Configuration, ContactLines
+from mechgraph.maths.se3 import Array, Index, null_space
+from mechgraph.maths.tolerances import STRESSES
 from mechgraph.model.pair import Pair
-from mechgraph.numerics.tolerances import STRESSES
 from mechgraph.pairs.factors import Component
 
 Label = tuple[str, str]

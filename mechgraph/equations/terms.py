@@ -18,13 +18,13 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from mechgraph.algebra.se3 import Array
 from mechgraph.document import Document, Equation, Paragraph, Shown, Table, latex_words
 from mechgraph.document.tree import plain
 from mechgraph.errors import DeclarationError, counted
 from mechgraph.files import cell, csv_of
+from mechgraph.maths.se3 import Array
+from mechgraph.maths.sparse import unique_solution
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.numerics.sparse import unique_solution
 from mechgraph.pairs.factors import Component, Freedom
 from mechgraph.quantities import place_among, wrong
 

@@ -27,9 +27,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array, compose, inverse, rotation_exp, rotation_log
 from mechgraph.errors import DeclarationError, FileError, listed
 from mechgraph.exchange.syntax import Node, is_name, numbers_of, tree_of
+from mechgraph.maths.se3 import Array, compose, inverse, rotation_exp, rotation_log
 from mechgraph.model.toml import LONGEST_SWEEP
 from mechgraph.pairs.factors import Freedom
 from mechgraph.pairs.pair_type import PairType

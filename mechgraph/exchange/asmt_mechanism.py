@@ -45,8 +45,6 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from mechgraph.algebra.inertia import physical_faults
-from mechgraph.algebra.se3 import Array, compose, inverse
 from mechgraph.errors import DeclarationError, listed
 from mechgraph.exchange.asmt import (
     FITS,
@@ -69,6 +67,8 @@ from mechgraph.exchange.asmt import (
 )
 from mechgraph.exchange.syntax import FormulaFault, evaluated, law
 from mechgraph.fields import second_direction
+from mechgraph.maths.inertia import physical_faults
+from mechgraph.maths.se3 import Array, compose, inverse
 from mechgraph.model.couplings import Coupling
 from mechgraph.model.loads import ForceLaw, Gravity, Spring
 from mechgraph.model.mechanism import Mechanism

@@ -17,13 +17,13 @@ from pathlib import Path
 import numpy as np
 import scipy
 
-from mechgraph.algebra.se3 import Array
 from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import ContentError, DeclarationError, FileError, MechgraphWarning
 from mechgraph.exchange.asmt import Assembly, Connection, Results, results_of
 from mechgraph.exchange.asmt_mechanism import mechanism_of
 from mechgraph.exchange.files import assembly_of
 from mechgraph.kinetostatics import solve
+from mechgraph.maths.se3 import Array
 from mechgraph.result.solution import Solution
 
 AGREES = 1e-4

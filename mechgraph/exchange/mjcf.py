@@ -28,12 +28,12 @@ from typing import Any
 import numpy as np
 import scipy
 
-from mechgraph.algebra.inertia import physical_faults, shifted
-from mechgraph.algebra.se3 import Array, compose, inverse, matrix_quaternion, move_twist, quaternion_matrix
 from mechgraph.errors import HIDDEN, DeclarationError, FileError
 from mechgraph.exchange.syntax import Element, read_xml
 from mechgraph.files import write_whole
 from mechgraph.kinetostatics import assemble
+from mechgraph.maths.inertia import physical_faults, shifted
+from mechgraph.maths.se3 import Array, compose, inverse, matrix_quaternion, move_twist, quaternion_matrix
 from mechgraph.model.couplings import Coupling
 from mechgraph.model.loads import Gravity
 from mechgraph.model.mechanism import Mechanism

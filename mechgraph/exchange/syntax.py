@@ -24,9 +24,9 @@ from xml.parsers import expat
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
 from mechgraph.errors import FileError
 from mechgraph.files import text_of
+from mechgraph.maths.se3 import Array
 from mechgraph.quantities import LARGEST, shown
 
 

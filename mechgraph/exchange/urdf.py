@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 import scipy
 
-from mechgraph.algebra.inertia import physical_faults
-from mechgraph.algebra.se3 import Array, compose
 from mechgraph.errors import DeclarationError, listed
 from mechgraph.exchange.syntax import Element, read_xml
+from mechgraph.maths.inertia import physical_faults
+from mechgraph.maths.se3 import Array, compose
 from mechgraph.model.couplings import Coupling
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Marker, Pair, second_direction

@@ -8,13 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from mechgraph.algebra.se3 import Array, cross, rotate_back
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.contact_lines import ContactLines
-from mechgraph.closure.indexing import Index
-from mechgraph.closure.passive_motion import PassiveMotion, PassiveMotions
-from mechgraph.closure.rates import Rates, Velocities
-from mechgraph.closure.solver import FactoredClosure
 from mechgraph.errors import DeclarationError
 from mechgraph.force.loads import Site, inertia_wrenches, kinetic_power
 from mechgraph.force.reactions import (
@@ -34,10 +27,14 @@ from mechgraph.force.reactions import (
     row_efforts,
     split_stress,
 )
+from mechgraph.kinematics.rates import PassiveMotion, PassiveMotions, Rates, Velocities
+from mechgraph.kinematics.solver import FactoredClosure
+from mechgraph.kinematics.state import Configuration, ContactLines
+from mechgraph.maths.linear import add_at
+from mechgraph.maths.se3 import Array, Index, cross, rotate_back
+from mechgraph.maths.tolerances import MOTIONS
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.numerics.linear import add_at
-from mechgraph.numerics.tolerances import MOTIONS
 
 
 def is_idle(size: Array, terms: Array) -> bool:

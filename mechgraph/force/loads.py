@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array, cross, rotate, rotate_back, to_matrix
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import PerCase
+from mechgraph.kinematics.rates import Rates, Velocities
+from mechgraph.kinematics.state import Configuration
+from mechgraph.maths.se3 import Array, cross, rotate, rotate_back, to_matrix
 from mechgraph.model.loads import Load, Value
 from mechgraph.quantities import real_array, wrong
 

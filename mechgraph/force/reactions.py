@@ -20,17 +20,15 @@ from typing import Literal
 import numpy as np
 import scipy
 
-from mechgraph.algebra.se3 import Array, batch_last, cross, shift_wrench
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.contact_lines import ContactLines
-from mechgraph.closure.indexing import Index
-from mechgraph.closure.solver import FactoredClosure
 from mechgraph.equations.build import BookkeepingName, formulate
 from mechgraph.equations.formulation import Formulation
 from mechgraph.equations.terms import State
-from mechgraph.numerics.linear import Choice, ChosenSystem, add_at, choose
-from mechgraph.numerics.sparse import least_solution
-from mechgraph.numerics.tolerances import STRESSES
+from mechgraph.kinematics.solver import FactoredClosure
+from mechgraph.kinematics.state import Configuration, ContactLines
+from mechgraph.maths.linear import Choice, ChosenSystem, add_at, choose
+from mechgraph.maths.se3 import Array, Index, batch_last, cross, shift_wrench
+from mechgraph.maths.sparse import least_solution
+from mechgraph.maths.tolerances import STRESSES
 
 UNIQUE = STRESSES.unique
 """Part of a unit self-stress in a component above which the component is not unique (forces and moments / L compared)."""

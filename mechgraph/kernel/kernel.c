@@ -18,7 +18,7 @@ typedef double magnitude;
 #define REAL_PART(x) (x)
 #endif
 
-/* Tolerances; those of the package in numerics/tolerances.py have the same names there. */
+/* Tolerances; those of the package in maths/tolerances.py have the same names there. */
 static const magnitude CLOSED = 2e-14;      /* closure residual that Newton aims at, over the distance from the origin */
 static const magnitude ACCEPTED = 1e-12;    /* residual that counts as closed where rounding lets it come no nearer */
 static const magnitude CORRECTION = 0.06;   /* largest correction that a prediction may need */
@@ -623,7 +623,7 @@ static int inverted(double *U, int n) {
   return 1;
 }
 
-/* --- passive motions: what they are and which rates are at rest in them, see closure/passive_motion.py ------------------------------ */
+/* --- passive motions: what they are and which rates are at rest in them, see kinematics/rates.py ------------------------------ */
 
 /* The first link of a passive motion. */
 static int first_of(const Model *m, int i) { return m->passive_link[m->passive_first[i]]; }
@@ -1242,7 +1242,7 @@ static double radius(const double *M, int n, double *v) {
  * The closure matrix along the step is, to third order, the Hermite cubic through both ends, which lies in the hull of its Bezier points
  * C: no matrix of it is singular where |C_b^-1 (C_b - C_i)| < 1 for all of them (Banach's lemma). That b is on the branch of a and not on
  * another one: the states' own cubic is closed in the middle, where it is furthest from the track, by a correction that is small against
- * the distance of any two solutions, 2 / (|J^-1| |J'|) at least (see numerics/certificate.py, where the same limit holds). */
+ * the distance of any two solutions, 2 / (|J^-1| |J'|) at least (see maths/tracker.py, where the same limit holds). */
 static int certified(const Model *m, Work *w, double *grown) {
   const int n = m->unknowns;
   const Node *a = &w->a, *b = &w->b;
@@ -1279,7 +1279,7 @@ static int put(const Model *m, Work *w, const double *x, const double *v, const 
   return with_forces ? forces(m, w, x, record, places, largest) : MGK_OK;
 }
 
-/* --- passive links at rest, see closure/passive_rest.py ---------------------------------------------------------------------------- */
+/* --- passive links at rest, see kinematics/passive_rest.py ---------------------------------------------------------------------------- */
 
 /* The border across the passive motions of a node, in its matrix too, so that the next step begins and ends with the same rows. */
 static void set_border(const Model *m, Work *w, Node *node) {

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array, rotate
-from mechgraph.closure.indexing import System
 from mechgraph.fields import PerCase
+from mechgraph.kinematics.system import System
+from mechgraph.maths.se3 import Array, rotate
 from mechgraph.model.loads import Damper, Effort, Gravity, Load, Spring, TorsionSpring, Wrench
 
 WEIGHT, WRENCH, EFFORT, LAW, BETWEEN = range(5)

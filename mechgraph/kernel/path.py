@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.algebra.se3 import Array
 from mechgraph.kernel.tables import Integers, Layout
+from mechgraph.maths.se3 import Array
 
 Mask = NDArray[np.bool_]
 MIDDLE = 0.381966011250105

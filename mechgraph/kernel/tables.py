@@ -14,13 +14,12 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.algebra.se3 import Array, compose, identity, inverse, rotate
-from mechgraph.closure.indexing import Index, System
-from mechgraph.closure.passive_motion import PassiveMotion
-from mechgraph.closure.rows import CouplingRows
 from mechgraph.kernel.loads import Acting, acting
+from mechgraph.kinematics.rates import PassiveMotion
+from mechgraph.kinematics.system import CouplingRows, System
+from mechgraph.maths.linear import complement
+from mechgraph.maths.se3 import Array, Index, compose, identity, inverse, rotate
 from mechgraph.model.loads import Load
-from mechgraph.numerics.linear import complement
 from mechgraph.pairs.factors import ConstantScrew, Factor, Freedom, Rotation
 
 Integers = NDArray[np.int32]

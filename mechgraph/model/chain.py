@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechgraph.algebra.se3 import Array, identity, inverse
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import plain
+from mechgraph.maths.se3 import Array, identity, inverse
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.pairs.pair_type import TABLE

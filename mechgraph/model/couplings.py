@@ -19,8 +19,8 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array, cross
 from mechgraph.fields import COEFFICIENTS, FREEDOM_NAME, NUMBER, TEXT, Described, number_fault, plain, sound_tol
+from mechgraph.maths.se3 import Array, cross
 from mechgraph.model.pair import Marker, Nameable, Pair
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.quantities import LENGTH, PURE, is_numeric, shown, without_units, wrong

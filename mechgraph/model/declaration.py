@@ -19,8 +19,6 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from mechgraph.algebra.inertia import physical
-from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import (
     BY_FREEDOM,
@@ -34,6 +32,8 @@ from mechgraph.fields import (
     sound_tol,
     tolerance_fault,
 )
+from mechgraph.maths.inertia import physical
+from mechgraph.maths.se3 import Array
 from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.gears import rim_faults
 from mechgraph.model.loads import LOADS, Load

@@ -11,8 +11,8 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array, cross
 from mechgraph.fields import FLAG, NUMBER, POSITIVE, TWO_POSITIVE, TWO_WHOLE
+from mechgraph.maths.se3 import Array, cross
 from mechgraph.model.couplings import Axes, BaseCoupling, Contact, Coupling, Lines, fitting_of, teeth_lines, unit
 from mechgraph.quantities import LENGTH, PURE, wrong
 

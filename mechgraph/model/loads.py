@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Protocol, S
 import numpy as np
 import scipy
 
-from mechgraph.algebra.se3 import Array, rotate
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import (
     BREAKS,
@@ -35,6 +34,7 @@ from mechgraph.fields import (
     Described,
     same_fields,
 )
+from mechgraph.maths.se3 import Array, rotate
 from mechgraph.model.pair import Nameable
 from mechgraph.quantities import (
     ACCELERATION,

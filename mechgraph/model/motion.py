@@ -16,10 +16,10 @@ import scipy
 from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike
 
-from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import FREEDOM_NAME, SERIES, TABLE, Described
-from mechgraph.numerics.derivatives import NotSmooth, derivatives
+from mechgraph.maths.derivatives import NotSmooth, derivatives
+from mechgraph.maths.se3 import Array
 from mechgraph.quantities import LENGTH, PURE, TIME, has_quantity, real_array, shown, wrong
 
 Rates = tuple[Array, Array, Array]

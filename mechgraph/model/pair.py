@@ -10,8 +10,6 @@ from typing import Annotated, Any, ClassVar, Protocol
 
 import numpy as np
 
-from mechgraph.algebra.inertia import physical_faults
-from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError, ShapeError
 from mechgraph.fields import (
     DIRECTION,
@@ -32,6 +30,8 @@ from mechgraph.fields import (
 )
 from mechgraph.fields import TABLE as NESTED
 from mechgraph.fields import second_direction as second_direction
+from mechgraph.maths.inertia import physical_faults
+from mechgraph.maths.se3 import Array
 from mechgraph.pairs.contact_types import (
     ROWS,
     Contact,

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.algebra.se3 import Array, cross
+from mechgraph.maths.se3 import Array, cross
 from mechgraph.model.mechanism import Mechanism
 
 Index = NDArray[np.intp]

@@ -9,7 +9,6 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import (
     BY_FREEDOM,
@@ -25,6 +24,7 @@ from mechgraph.fields import (
     plain,
     same_fields,
 )
+from mechgraph.maths.se3 import Array
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Nameable
 from mechgraph.quantities import (

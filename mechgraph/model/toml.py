@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from mechgraph.algebra.se3 import Array
 from mechgraph.errors import ContentError, DeclarationError, FileError
 from mechgraph.fields import (
     BY_FREEDOM,
@@ -31,6 +30,7 @@ from mechgraph.fields import (
     sound_tol,
 )
 from mechgraph.files import text_of, toml_of, write_whole
+from mechgraph.maths.se3 import Array
 from mechgraph.model.chain import chain
 from mechgraph.model.file_format import DEGREES, KINDS, SCHEMA, TABLES_OF_FILE, USUAL
 from mechgraph.model.mechanism import Mechanism

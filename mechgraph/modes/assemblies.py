@@ -10,14 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.closure.assembly import CLOSED, close_all, closed_start, named_columns
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.driver_motion import DriverMotion
-from mechgraph.closure.indexing import Index, System
 from mechgraph.determinacy.mobility import free_motion
 from mechgraph.determinacy.report import dead_point_error, undriven_error
 from mechgraph.errors import DeclarationError, counted
 from mechgraph.force.loads import user_poses
+from mechgraph.kinematics.assembly import CLOSED, close_all, closed_start, named_columns
+from mechgraph.kinematics.prescribed import DriverMotion
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
+from mechgraph.maths.linear import rank_of, singular_values
+from mechgraph.maths.se3 import Index
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.certificate import TINY, Certificate, certificate, told_apart
 from mechgraph.modes.continua import Found, Nearby, continua, irregular, least_value, searched
@@ -36,7 +38,6 @@ from mechgraph.modes.targets import (
     groups_of,
     is_real,
 )
-from mechgraph.numerics.linear import rank_of, singular_values
 from mechgraph.quantities import Count, Positive, door
 from mechgraph.quantities import Index as Seed
 
@@ -47,7 +48,7 @@ OFF_DEAD_POINT = 0.3
 class Question:
     """Values given at one position or at several, and a closed position of the mechanism, beside the start where that is singular.
 
-    ``m`` is the mechanism with free pairs for points and links that are given (see ``closure.prescription``), ``drive (d, n)`` are the
+    ``m`` is the mechanism with free pairs for points and links that are given (see ``kinematics.prescribed``), ``drive (d, n)`` are the
     values in internal units; ``batch`` is ``()`` or ``(n,)``; ``declared`` is the closed position next to the start, singular or not.
 
     Raises

@@ -16,16 +16,18 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from mechgraph.closure.assembly import CLOSED, close, led
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.driver_path import DriverPath, Positions, Request, Status
-from mechgraph.closure.following import follow
-from mechgraph.closure.indexing import Index
-from mechgraph.closure.solver import closure_solver, engine_for
 from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, counted
 from mechgraph.files import plain
 from mechgraph.graph.linkgraph import components_of_edges, members
+from mechgraph.kinematics.assembly import CLOSED, close, led
+from mechgraph.kinematics.motion_path import DriverPath, Positions, Request, Status
+from mechgraph.kinematics.reach import follow
+from mechgraph.kinematics.solver import closure_solver, engine_for
+from mechgraph.kinematics.state import Configuration
+from mechgraph.maths.se3 import Index
+from mechgraph.maths.singular_point import passed
+from mechgraph.maths.tracker import End
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.assemblies import Finder, Question
 from mechgraph.modes.family import Array, Family
@@ -39,8 +41,6 @@ from mechgraph.modes.result import (
     values_text,
     weakest,
 )
-from mechgraph.numerics.continuation import End
-from mechgraph.numerics.crossings import passed
 from mechgraph.quantities import Index as Seed
 from mechgraph.quantities import at_least, door, is_numeric, wrong
 

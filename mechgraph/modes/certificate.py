@@ -37,9 +37,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from mechgraph.algebra.se3 import cross, rotate
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import Index
+from mechgraph.kinematics.state import Configuration
+from mechgraph.maths.se3 import Index, cross, rotate
 from mechgraph.modes.family import Array, Family
 from mechgraph.modes.form import RodSystem
 from mechgraph.pairs.factors import ConstantScrew, Rotation, screw_terms

@@ -20,10 +20,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechgraph.closure.assembly import CLOSED, close_all
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import Index, System
-from mechgraph.closure.ranges import BEYOND_END, beyond
+from mechgraph.kinematics.assembly import CLOSED, close_all
+from mechgraph.kinematics.reach import BEYOND_END, beyond
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
+from mechgraph.maths.se3 import Index
 from mechgraph.modes.family import Array, Family, parts
 
 GUESSES_TOGETHER = 200

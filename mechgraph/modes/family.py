@@ -31,12 +31,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.algebra.se3 import compose, cross_twist, finite_twist, inverse, move_twist, multiplied, pose_exp
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import Index, System
-from mechgraph.closure.rank import closure_rank
 from mechgraph.graph.chains import least_order, ranked
-from mechgraph.numerics.linear import complement
+from mechgraph.kinematics.rank import closure_rank
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
+from mechgraph.maths.linear import complement
+from mechgraph.maths.se3 import Index, compose, cross_twist, finite_twist, inverse, move_twist, multiplied, pose_exp
 from mechgraph.pairs.pair_type import PairType
 
 SPAN = 1e-6

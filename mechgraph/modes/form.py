@@ -27,8 +27,16 @@ from typing import NamedTuple, Protocol, cast
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array as Reals
-from mechgraph.algebra.se3 import (
+from mechgraph.errors import counted
+from mechgraph.graph.linkgraph import LinkGraph, components_of_edges
+from mechgraph.kinematics.loop_rows import PointNumbers, PointRows
+from mechgraph.kinematics.rods import floating_type
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import Evaluated, PositionRows, System
+from mechgraph.maths.linear import rank_of, singular_values
+from mechgraph.maths.se3 import Array as Reals
+from mechgraph.maths.se3 import (
+    Index,
     compose,
     cross,
     identity,
@@ -38,19 +46,11 @@ from mechgraph.algebra.se3 import (
     quaternion_product,
     rotate,
 )
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import Index, System
-from mechgraph.closure.point_rows import PointNumbers, PointRows
-from mechgraph.closure.reduction import floating_type
-from mechgraph.closure.rows import Evaluated, PositionRows
-from mechgraph.errors import counted
-from mechgraph.graph.linkgraph import LinkGraph, components_of_edges
+from mechgraph.maths.tolerances import RANKS
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Pair
 from mechgraph.model.parameters import Parameters
 from mechgraph.modes.family import SPAN, Array, Family
-from mechgraph.numerics.linear import rank_of, singular_values
-from mechgraph.numerics.tolerances import RANKS
 from mechgraph.pairs import kinematics
 from mechgraph.pairs.pair_type import PairType
 

@@ -17,11 +17,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.algebra.se3 import finite_twist, homogeneous, move_twist, multiplied, quaternion_product
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import Index
+from mechgraph.kinematics.state import Configuration
+from mechgraph.maths.linear import complement
+from mechgraph.maths.se3 import Index, finite_twist, homogeneous, move_twist, multiplied, quaternion_product
 from mechgraph.modes.family import Array, Family, Member
-from mechgraph.numerics.linear import complement
 from mechgraph.pairs.factors import screw_terms, screw_values
 
 Mask = NDArray[np.bool_]

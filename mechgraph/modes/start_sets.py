@@ -54,15 +54,15 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.algebra.se3 import compose, pose_exp
-from mechgraph.closure.configuration import Configuration
 from mechgraph.errors import MechgraphError
 from mechgraph.files import cache_folder, whole_file
 from mechgraph.graph.linkgraph import components_of_edges
+from mechgraph.kinematics.state import Configuration
+from mechgraph.maths.linear import rank_of, singular_values
+from mechgraph.maths.se3 import compose, pose_exp
 from mechgraph.modes.family import GENERIC, MEMBER_CLOSED, SPAN, Array, Family, Labelling, Member, common, span
 from mechgraph.modes.form import RodFamily
 from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, Equations, Leg, Linear, follow
-from mechgraph.numerics.linear import rank_of, singular_values
 
 SIX_TURNS = (
     "Lee, Woernle and Hiller, A complete solution for the inverse kinematic problem of the general 6R robot manipulator, "

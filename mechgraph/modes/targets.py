@@ -24,13 +24,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechgraph.algebra.se3 import compose, identity
-from mechgraph.closure.assembly import CLOSED, close_all
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import Index, System
-from mechgraph.closure.point_rows import PointNumbers
 from mechgraph.determinacy.decomposition import MOST_SPLIT, Constraint, Constraints, rows_of_pair, smallest
 from mechgraph.graph.linkgraph import components_of_edges
+from mechgraph.kinematics.assembly import CLOSED, close_all
+from mechgraph.kinematics.loop_rows import PointNumbers
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
+from mechgraph.maths.linear import complement
+from mechgraph.maths.se3 import Index, compose, identity
+from mechgraph.maths.tolerances import RANKS
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Pair
 from mechgraph.modes.continua import Nearby, irregular, least_value
@@ -38,8 +40,6 @@ from mechgraph.modes.family import SPAN, Array, Family, Member, generated
 from mechgraph.modes.form import RodFamily, RodSystem, Step, behind
 from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, Equations, Leg, follow, rounding
 from mechgraph.modes.start_sets import ONE_ASSEMBLY, StartSet, distinct
-from mechgraph.numerics.linear import complement
-from mechgraph.numerics.tolerances import RANKS
 
 RUNS = 4
 """Runs of all tracks, at most."""

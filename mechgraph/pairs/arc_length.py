@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 import scipy
 
-from mechgraph.algebra.se3 import Array, Library, by_components, cross
 from mechgraph.fields import second_direction
+from mechgraph.maths.se3 import Array, Library, by_components, cross
 from mechgraph.pairs.curves import CLOSED_GAP, ORDERS, Curve, Pieces, hermite
 from mechgraph.quantities import shown
 

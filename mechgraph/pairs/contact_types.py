@@ -18,9 +18,9 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 import scipy
 
-from mechgraph.algebra.se3 import Array, cross
 from mechgraph.errors import ShapeError
 from mechgraph.fields import POSITIVE, TWO, TWO_POSITIVE, Described
+from mechgraph.maths.se3 import Array, cross
 from mechgraph.pairs import kinematics as evaluation
 from mechgraph.pairs.arc_length import Travel, outside, roller_faults, shape_faults
 from mechgraph.pairs.curves import Curve, Line

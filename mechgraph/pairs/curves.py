@@ -16,7 +16,6 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
 from mechgraph.fields import (
     DIRECTION,
     FLAG,
@@ -29,6 +28,7 @@ from mechgraph.fields import (
     filled_second,
     parallel_faults,
 )
+from mechgraph.maths.se3 import Array
 from mechgraph.memo import Once
 from mechgraph.quantities import LENGTH
 

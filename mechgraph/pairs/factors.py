@@ -19,7 +19,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.algebra.se3 import Array, homogeneous, inverse, quaternion_matrix, skew
+from mechgraph.maths.se3 import Array, homogeneous, inverse, quaternion_matrix, skew
 from mechgraph.quantities import is_numeric, items_of, shown, wrong
 
 Six = tuple[float, float, float, float, float, float]

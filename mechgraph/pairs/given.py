@@ -11,9 +11,9 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 import scipy
 
-from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError, ShapeError
 from mechgraph.fields import BREAKS, FLAG, FUNCTION, INTERVAL, NUMBER, POINT_LIST, POSITIVE, SAMPLES, TEXT
+from mechgraph.maths.se3 import Array
 from mechgraph.pairs.curves import (
     CLOSED_GAP,
     INTERVALS,

@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from mechgraph.algebra.se3 import (
+from mechgraph.maths.se3 import (
     Array,
     batch_last,
     compose,

@@ -16,7 +16,6 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import scipy
 
-from mechgraph.algebra.se3 import Array, cross
 from mechgraph.fields import (
     DIRECTION,
     FUNCTION,
@@ -30,6 +29,7 @@ from mechgraph.fields import (
     parallel_faults,
 )
 from mechgraph.fields import TABLE as NESTED
+from mechgraph.maths.se3 import Array, cross
 from mechgraph.pairs.arc_length import far_from
 from mechgraph.pairs.curves import WHOLE_TURN, Circle, Curve, Line, remade_from
 from mechgraph.pairs.given import asked, between, slope_faults

@@ -11,8 +11,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array, Library, by_components, cross
 from mechgraph.errors import ShapeError
+from mechgraph.maths.se3 import Array, Library, by_components, cross
 from mechgraph.pairs.arc_length import COMPLEX_STEP, Place, Travel
 from mechgraph.pairs.curves import ORDERS, Curve, turned
 from mechgraph.pairs.factors import UNIT_TWISTS, Factor, Freedom, PoseStack, Stack, entries

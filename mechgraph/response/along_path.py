@@ -8,8 +8,8 @@ tabulated values, as ``model.load_base.LoadSite`` says, and no loop is closed fo
 
 A path followed one way from a closed state and tabulated: closed states and the terms of its equation of motion, place by place.
 
-Places are distances of the coordinate from the start. Change points are leapt over where that can be proved (see ``numerics.leap``), and
-otherwise passed by the careful march, or the table ends.
+Places are distances of the coordinate from the start. Change points are leapt over where that can be proved (see
+``maths.singular_point``), and otherwise passed by the careful march, or the table ends.
 
 Stages along a path, for mobility 1: what the equation of motion needs is tabulated once along the path, which is then cheap to follow.
 
@@ -41,21 +41,19 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array, cross, rotate
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.driver_path import DriverPath
-from mechgraph.closure.indexing import Index, System
-from mechgraph.closure.rank import closure_rank
-from mechgraph.closure.solver import FactoredClosure, closure_solver
 from mechgraph.errors import DeclarationError
 from mechgraph.force.loads import NOT_FINITE, Site, user_poses, user_twists
+from mechgraph.kinematics.motion_path import DriverPath
+from mechgraph.kinematics.rank import closure_rank
+from mechgraph.kinematics.solver import FactoredClosure, closure_solver
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
+from mechgraph.maths.se3 import Array, Index, cross, rotate
+from mechgraph.maths.singular_point import WINDOW, Crossing, leapt, passed
+from mechgraph.maths.tolerances import PATH
+from mechgraph.maths.track import Interpolation, Nodes, Paths
+from mechgraph.maths.tracker import End, Follower
 from mechgraph.model.loads import Load
-from mechgraph.numerics.continuation import End, Follower
-from mechgraph.numerics.crossings import WINDOW, Crossing, passed
-from mechgraph.numerics.hermite import Interpolation
-from mechgraph.numerics.leap import leapt
-from mechgraph.numerics.tolerances import PATH
-from mechgraph.numerics.tracks import Nodes, Paths
 from mechgraph.response.charts import Task
 from mechgraph.response.motion_equations import MASSLESS, Closed, Loads, Stopped, along_one
 

@@ -22,17 +22,16 @@ from typing import Any, Literal
 import numpy as np
 import scipy
 
-from mechgraph.algebra.se3 import Array
 from mechgraph.by_kernel import COMPILED
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.driver_path import in_blocks
-from mechgraph.closure.indexing import Index, System
-from mechgraph.closure.passive_motion import PassiveMotion
-from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.determinacy.mobility import free_motion
 from mechgraph.errors import DeclarationError
 from mechgraph.force.block import ForceTask, forces_of_block
 from mechgraph.force.loads import Site, kinetic_energy
+from mechgraph.kinematics.motion_path import in_blocks
+from mechgraph.kinematics.rates import PassiveMotion, Rates, Velocities
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
+from mechgraph.maths.se3 import Array, Index
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion

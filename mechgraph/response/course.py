@@ -10,18 +10,17 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechgraph.algebra.se3 import Array
 from mechgraph.by_kernel import COMPILED
-from mechgraph.closure.assembly import CLOSED
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.driver_path import in_blocks
-from mechgraph.closure.indexing import Index
-from mechgraph.closure.rates import Velocities
 from mechgraph.determinacy.snapping import SnappedMechanism, declared_closure
 from mechgraph.document import Bullets, Document, Heading, Paragraph, Shown
 from mechgraph.errors import DeclarationError, ResponseError
 from mechgraph.files import plain
 from mechgraph.force.loads import Site
+from mechgraph.kinematics.assembly import CLOSED
+from mechgraph.kinematics.motion_path import in_blocks
+from mechgraph.kinematics.rates import Velocities
+from mechgraph.kinematics.state import Configuration
+from mechgraph.maths.se3 import Array, Index
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import declared
 from mechgraph.quantities import real_array, wrong

@@ -23,13 +23,13 @@ from typing import Any, Literal
 import numpy as np
 import scipy
 
-from mechgraph.algebra.se3 import Array
-from mechgraph.closure.assembly import assembled_at, named_columns
-from mechgraph.closure.rates import Velocities
-from mechgraph.closure.solver import EngineName, engine_for
 from mechgraph.determinacy.mobility import free_motion
 from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, MechgraphWarning, ResponseError, counted, listed
+from mechgraph.kinematics.assembly import assembled_at, named_columns
+from mechgraph.kinematics.rates import Velocities
+from mechgraph.kinematics.solver import EngineName, engine_for
+from mechgraph.maths.se3 import Array
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import door, unit_of
 from mechgraph.response.charts import OVER_POSITIONS, Prescribed, Task, trajectory_of

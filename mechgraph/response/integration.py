@@ -35,10 +35,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from mechgraph.algebra.se3 import Array
-from mechgraph.closure.indexing import Index
 from mechgraph.errors import MechgraphWarning, counted
 from mechgraph.force.loads import kinetic_energy
+from mechgraph.maths.se3 import Array, Index
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.response_setup import WHATS, Event, Stop
 from mechgraph.quantities import items_of, real_array, shown, wrong

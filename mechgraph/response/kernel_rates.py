@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from mechgraph import by_kernel
-from mechgraph.algebra.se3 import Array
-from mechgraph.closure.indexing import System
 from mechgraph.kernel import build
 from mechgraph.kernel.loads import in_tables
 from mechgraph.kernel.tables import layout, tables, why_not
+from mechgraph.kinematics.system import System
+from mechgraph.maths.se3 import Array
 from mechgraph.response.motion_equations import SPARSE_FROM, Chart, Loads
 
 

@@ -43,19 +43,18 @@ from typing import Literal
 import numpy as np
 import scipy
 
-from mechgraph.algebra.se3 import Array, cross, rotate, rotate_back
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.driver_path import BLOCK
-from mechgraph.closure.indexing import Index, System
-from mechgraph.closure.passive_motion import PassiveMotion, PassiveMotions
-from mechgraph.closure.rank import closure_rank
-from mechgraph.closure.rates import Rates, Velocities
-from mechgraph.closure.solver import ClosureSolver, FactoredClosure, closure_solver
-from mechgraph.closure.tree import Tree
 from mechgraph.force.loads import Site, inertia_wrenches
+from mechgraph.kinematics.batches import Tree
+from mechgraph.kinematics.motion_path import BLOCK
+from mechgraph.kinematics.rank import closure_rank
+from mechgraph.kinematics.rates import PassiveMotion, PassiveMotions, Rates, Velocities
+from mechgraph.kinematics.solver import ClosureSolver, FactoredClosure, closure_solver
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
+from mechgraph.maths.se3 import Array, Index, cross, rotate, rotate_back
+from mechgraph.maths.sparse import Factors
+from mechgraph.maths.tolerances import PATH
 from mechgraph.model.loads import Load
-from mechgraph.numerics.sparse import Factors
-from mechgraph.numerics.tolerances import PATH
 
 STEEPEST = 3.0
 """Largest rate of a freedom for unit rates of the independent ones, against that where the chart was laid out, before a new one is; and

@@ -12,19 +12,21 @@ from typing import Any, Literal, Protocol, get_args
 import numpy as np
 import scipy
 
-from mechgraph.algebra.se3 import Array
-from mechgraph.closure.assembly import assembled_at, named_columns
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import Index, System
-from mechgraph.closure.ranges import BEYOND_END, beyond
-from mechgraph.closure.rank import closure_rank
-from mechgraph.closure.solver import MotionEngineName, engine_for
 from mechgraph.determinacy.finite_motion import branches, branches_text, finite_motion
 from mechgraph.determinacy.mobility import free_motion
 from mechgraph.determinacy.report import hinted
 from mechgraph.determinacy.snapping import meant
 from mechgraph.errors import AssemblyError, DeclarationError, MechgraphWarning, ResponseError
 from mechgraph.force.loads import Site
+from mechgraph.kinematics.assembly import assembled_at, named_columns
+from mechgraph.kinematics.rank import closure_rank
+from mechgraph.kinematics.reach import BEYOND_END, beyond
+from mechgraph.kinematics.solver import MotionEngineName, engine_for
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
+from mechgraph.maths.linear import rank_of, singular_values
+from mechgraph.maths.se3 import Array, Index
+from mechgraph.maths.tolerances import MOTIONS
 from mechgraph.model.declaration import mapping_faults
 from mechgraph.model.loads import Law, Load
 from mechgraph.model.mechanism import Mechanism
@@ -38,8 +40,6 @@ from mechgraph.model.response_setup import (
     read_times,
     tolerance_faults,
 )
-from mechgraph.numerics.linear import rank_of, singular_values
-from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.quantities import Limit, door, is_numeric, items_of, option_faults, without_units, wrong
 from mechgraph.response.along_path import Arc, PathStage
 from mechgraph.response.charts import OVER_POSITIONS, ChartStage, Prescribed, Task, read_motions

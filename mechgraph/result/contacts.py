@@ -19,9 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
 from mechgraph.document import Block, Document, Paragraph, Shown
 from mechgraph.errors import DeclarationError
+from mechgraph.maths.se3 import Array
 from mechgraph.model.pair import Pair
 from mechgraph.pairs.contact_types import (
     CONFORMAL,

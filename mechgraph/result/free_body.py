@@ -11,13 +11,13 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
 from mechgraph.determinacy.report import check
 from mechgraph.document import Bullets, Document, Heading, Paragraph, Shown, Table
 from mechgraph.document.tree import plain
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import NAMED_POINT
 from mechgraph.files import Format, cell, csv_of, format_of, write_whole
+from mechgraph.maths.se3 import Array
 from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.loads import Gravity, Load
 from mechgraph.model.mechanism import Mechanism

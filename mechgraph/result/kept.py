@@ -16,25 +16,23 @@ from typing import Any, Literal, Protocol, Self
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array, cross, rotate, rotate_back, shift_wrench
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.contact_lines import ContactLines
-from mechgraph.closure.driver_path import Status, in_blocks
-from mechgraph.closure.indexing import Index, System
-from mechgraph.closure.passive_motion import PassiveMotion
-from mechgraph.closure.rates import Rates, Velocities
 from mechgraph.determinacy.uniqueness import labels_of
 from mechgraph.equations.terms import MovingState
 from mechgraph.errors import DeclarationError, MechgraphError
 from mechgraph.force.block import BlockForces
 from mechgraph.force.loads import inertia_wrenches, user_poses, user_twists
 from mechgraph.force.reactions import UNIQUE, PairFrames, internal_state
+from mechgraph.kinematics.motion_path import Status, in_blocks
+from mechgraph.kinematics.rates import PassiveMotion, Rates, Velocities
+from mechgraph.kinematics.state import Configuration, ContactLines
+from mechgraph.kinematics.system import System
+from mechgraph.maths.linear import EVERY, Place
+from mechgraph.maths.newton import Work
+from mechgraph.maths.se3 import Array, Index, cross, rotate, rotate_back, shift_wrench
+from mechgraph.maths.tolerances import PATH
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Parameters
-from mechgraph.numerics.linear import EVERY, Place
-from mechgraph.numerics.newton import Work
-from mechgraph.numerics.tolerances import PATH
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.quantities import shown
 from mechgraph.result.values import Mask, PassedCrossing

@@ -16,11 +16,11 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from mechgraph.algebra.se3 import Array
 from mechgraph.document import Block, Document, Heading, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import vector_fault
 from mechgraph.files import plain
+from mechgraph.maths.se3 import Array
 from mechgraph.quantities import ENERGY, FORCE, MOMENT, POWER, TIME, door, unit_of
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import bracket, number, with_unit

@@ -12,15 +12,15 @@ from urllib.parse import quote
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.algebra.se3 import Array
 from mechgraph.document import Document, Shown, to_text
 from mechgraph.equations.terms import State
 from mechgraph.errors import DeclarationError, visible
 from mechgraph.files import Format, csv_of, format_of, json_text, optional, plain, whole_file, write_whole
+from mechgraph.maths.newton import Work
+from mechgraph.maths.se3 import Array
+from mechgraph.maths.tolerances import CHECKS, PATH
 from mechgraph.model.loads import Law
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.numerics.newton import Work
-from mechgraph.numerics.tolerances import CHECKS, PATH
 from mechgraph.quantities import BASE_UNITS, items_of, place_among, unit_of, wrong
 from mechgraph.result.contacts import (
     ContactResult,

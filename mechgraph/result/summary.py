@@ -9,12 +9,11 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
-from mechgraph.closure.indexing import Index
 from mechgraph.determinacy.snapping import SnappedMechanism
 from mechgraph.determinacy.uniqueness import labels_of
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Table
 from mechgraph.errors import counted
+from mechgraph.maths.se3 import Array, Index
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import FORCE, PRESSURE, force_hint, unit_of
 from mechgraph.result.contacts import LiftOff, Overlap, contacts_of, lift_offs, overlaps

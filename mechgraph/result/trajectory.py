@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array, cross, rotate
 from mechgraph.equations.terms import State
 from mechgraph.errors import MechgraphError
 from mechgraph.force.block import hold_names, is_idle
 from mechgraph.force.loads import Site, inertia_wrenches, kinetic_energy, user_poses, user_twists
 from mechgraph.force.reactions import given_effort_loads
+from mechgraph.maths.se3 import Array, cross, rotate
+from mechgraph.maths.tolerances import MOTIONS
 from mechgraph.model.loads import Law
-from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.quantities import unit_of
 from mechgraph.result.kept import BlockMotion, PairForces, flat_place, user_state, user_wrench
 from mechgraph.result.values import Checks, LoadBearing, LoadResult, MaterialPoint, PassedCrossing

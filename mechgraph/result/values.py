@@ -10,15 +10,14 @@ from typing import Any, Literal, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.algebra.se3 import Array
-from mechgraph.closure.indexing import Index
 from mechgraph.document import Document, Shown, Table
 from mechgraph.equations.terms import State
+from mechgraph.maths.newton import Work
+from mechgraph.maths.se3 import Array, Index
+from mechgraph.maths.tolerances import CHECKS, PATH
 from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.numerics.newton import Work
-from mechgraph.numerics.tolerances import CHECKS, PATH
 from mechgraph.quantities import unit_of
 
 SHOWN_AS_ZERO = 1e-11

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
 from mechgraph.document import Block, Document, Paragraph, Shown
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import vector_fault
+from mechgraph.maths.se3 import Array
 from mechgraph.model.couplings import Contact
 from mechgraph.model.pair import Pair
 from mechgraph.pairs.pair_type import PairType

@@ -18,8 +18,8 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from matplotlib.transforms import IdentityTransform
 
-from mechgraph.algebra.se3 import Array
 from mechgraph.errors import MissingExtraError, visible
+from mechgraph.maths.se3 import Array
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import Wanted, is_numeric
 

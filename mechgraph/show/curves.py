@@ -8,14 +8,14 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
-from mechgraph.closure.assembly import scaled_system
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import indexed
-from mechgraph.closure.rank import closure_rank
 from mechgraph.determinacy.facts import nearly_singular
 from mechgraph.errors import DeclarationError
-from mechgraph.numerics.tolerances import RANKS
+from mechgraph.kinematics.assembly import scaled_system
+from mechgraph.kinematics.rank import closure_rank
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import indexed
+from mechgraph.maths.se3 import Array
+from mechgraph.maths.tolerances import RANKS
 from mechgraph.quantities import door, shown, unit_of
 from mechgraph.response.course import Response
 from mechgraph.result.solution import Solution

@@ -9,13 +9,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
-from mechgraph.closure.indexing import Index
 from mechgraph.determinacy.decomposition import Decomposition
 from mechgraph.equations.formulation import Formulation
 from mechgraph.errors import DeclarationError
 from mechgraph.graph.chains import Chain
 from mechgraph.graph.linkgraph import link_graph
+from mechgraph.maths.se3 import Array, Index
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.branches import Branch, Branches
 from mechgraph.modes.result import Assemblies

@@ -11,13 +11,13 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import scipy
 
-from mechgraph.algebra.se3 import Array
-from mechgraph.closure.assembly import assembled
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import System
 from mechgraph.document.tree import plain
 from mechgraph.errors import DeclarationError
 from mechgraph.force.loads import user_poses
+from mechgraph.kinematics.assembly import assembled
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
+from mechgraph.maths.se3 import Array
 from mechgraph.model.loads import Effort, Gravity, Law, Wrench
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
+from mechgraph.maths.se3 import Array
 from mechgraph.pairs.factors import Freedom
 from mechgraph.pairs.pair_type import PairType
 

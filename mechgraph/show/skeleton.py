@@ -12,9 +12,9 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
 from mechgraph.errors import DeclarationError
 from mechgraph.files import Format, format_of, optional, whole_file, writable
+from mechgraph.maths.se3 import Array
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import Positive, door, shown, unit_of, wrong
 from mechgraph.response.course import Response

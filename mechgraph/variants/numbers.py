@@ -21,11 +21,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.algebra.inertia import physical
-from mechgraph.algebra.se3 import Array
 from mechgraph.determinacy.snapping import SnappedMechanism
 from mechgraph.errors import DeclarationError, did_you_mean, near_names
 from mechgraph.fields import POINT, Described, FieldFormat, PerCase
+from mechgraph.maths.inertia import physical
+from mechgraph.maths.se3 import Array
 from mechgraph.model.chain import NUMBERS_OF_CHAIN, chain_numbers, markers_of_chain
 from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.loads import Load

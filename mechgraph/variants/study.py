@@ -16,15 +16,15 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from mechgraph.algebra.se3 import Array
-from mechgraph.closure.driver_motion import Motions, actuators, driven
-from mechgraph.closure.solver import MotionEngineName
 from mechgraph.determinacy.snapping import meant
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, MechgraphError, MechgraphWarning, StudyError, counted
 from mechgraph.files import optional
 from mechgraph.force.reactions import MethodName
+from mechgraph.kinematics.prescribed import Motions, actuators, driven
+from mechgraph.kinematics.solver import MotionEngineName
 from mechgraph.kinetostatics import RedundantName
+from mechgraph.maths.se3 import Array
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.quantities import Count, Index, door, has_quantity, is_numeric, real_array, shown, wrong

@@ -17,23 +17,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph import by_kernel
-from mechgraph.algebra.se3 import Array
 from mechgraph.by_kernel import COMPILED, InKernel, in_kernel
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.driver_motion import DriverMotion, Motions
-from mechgraph.closure.driver_path import DriverPath, Status
-from mechgraph.closure.indexing import Index, System
-from mechgraph.closure.poles import away_from_poles
-from mechgraph.closure.solver import FactoredClosure, MotionEngineName, closure_solver
 from mechgraph.determinacy.snapping import SnappedMechanism, declared_closure, meant, started
 from mechgraph.errors import DeclarationError, MechgraphError, did_you_mean, listed, near_names
 from mechgraph.force.reactions import MethodName
+from mechgraph.kinematics.motion_path import DriverPath, Status
+from mechgraph.kinematics.prescribed import DriverMotion, Motions
+from mechgraph.kinematics.reach import away_from_poles
+from mechgraph.kinematics.solver import FactoredClosure, MotionEngineName, closure_solver
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
 from mechgraph.kinetostatics import Pipeline, RedundantName, solve_quietly
+from mechgraph.maths.se3 import Array, Index
+from mechgraph.maths.track import Paths
+from mechgraph.maths.tracker import End, Follower, Tracks
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.model.parameters import Parameters
-from mechgraph.numerics.continuation import End, Follower, Tracks
-from mechgraph.numerics.tracks import Paths
 from mechgraph.outcome import Options, Starts
 from mechgraph.quantities import items_of, shown, unit_of, wrong
 from mechgraph.result.contacts import LiftOff, Overlap

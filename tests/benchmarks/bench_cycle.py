@@ -20,10 +20,10 @@ from bench_core import best, seven_r
 
 import mechgraph as mg
 from mechgraph import kinetostatics, outcome
-from mechgraph.closure import legs
 from mechgraph.force import block
 from mechgraph.force.reactions import METHODS
-from mechgraph.numerics.continuation import Follower
+from mechgraph.kinematics import motion_path
+from mechgraph.maths.tracker import Follower
 from mechgraph.result.trajectory import Trajectory
 
 TURN = (0.0, 360.0)
@@ -33,8 +33,8 @@ STAGES = (
     ("nodes closed", Follower, "_settled"),
     ("certificate", Follower, "_certified_all"),
     ("careful march", Follower, "_careful"),
-    ("nodes between", legs, "refined"),
-    ("interpolation, Newton", legs.Legs, "_closed"),
+    ("nodes between", motion_path, "refined"),
+    ("interpolation, Newton", motion_path.Legs, "_closed"),
     ("rates", outcome, "rates"),
     ("loads", block.Site, "collect"),
     ("inertia", block, "inertia_wrenches"),

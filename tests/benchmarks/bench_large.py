@@ -25,12 +25,12 @@ import scipy
 from lattices import LATTICES
 
 import mechgraph as mg
-from mechgraph.closure.assembly import assembled
-from mechgraph.closure.bordering import LoopSystem
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import indexed
 from mechgraph.graph.linkgraph import link_graph
-from mechgraph.numerics.sparse import SparseFactors
+from mechgraph.kinematics.assembly import assembled
+from mechgraph.kinematics.sparse_system import LoopSystem
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import indexed
+from mechgraph.maths.sparse import SparseFactors
 
 SIZES = [10, 100, 1_000, 10_000, 100_000]
 

@@ -17,7 +17,7 @@ import mechanisms as known
 import numpy as np
 
 import mechgraph as mg
-from mechgraph.closure.driver_motion import DriverMotion
+from mechgraph.kinematics.prescribed import DriverMotion
 from mechgraph.kinetostatics import Pipeline
 from mechgraph.outcome import Options
 

@@ -19,7 +19,7 @@ from unittest.mock import patch
 import numpy as np
 
 import mechgraph as mg
-from mechgraph.closure.configuration import Configuration
+from mechgraph.kinematics.state import Configuration
 from mechgraph.modes.assemblies import Question
 from mechgraph.modes.continua import searched
 from mechgraph.modes.start_sets import NOT_PASSED

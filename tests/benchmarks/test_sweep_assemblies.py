@@ -9,7 +9,7 @@ import pytest
 from sweep_assemblies import TOGETHER, outside, prints, topology
 
 import mechgraph as mg
-from mechgraph.closure.configuration import Configuration
+from mechgraph.kinematics.state import Configuration
 from mechgraph.modes.assemblies import Question
 from mechgraph.modes.continua import searched
 

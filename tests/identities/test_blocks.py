@@ -6,10 +6,10 @@ import pytest
 from strategies import closed_mechanism, motions, with_drives, with_loads
 
 import mechgraph as mg
-from mechgraph.closure import driver_path
-from mechgraph.closure.assembly import assembled
-from mechgraph.closure.configuration import Configuration
-from mechgraph.numerics.continuation import Follower
+from mechgraph.kinematics import motion_path
+from mechgraph.kinematics.assembly import assembled
+from mechgraph.kinematics.state import Configuration
+from mechgraph.maths.tracker import Follower
 from mechgraph.pairs import kinematics as evaluation
 
 POSITIONS = 29
@@ -65,7 +65,7 @@ def assert_same(a, b, tolerance):
 @pytest.fixture
 def small_blocks(monkeypatch):
     """Blocks of a few positions."""
-    monkeypatch.setattr(driver_path, "BLOCK", 5)
+    monkeypatch.setattr(motion_path, "BLOCK", 5)
 
 
 @pytest.mark.daily(4)
@@ -80,7 +80,7 @@ def test_blocks_agree_with_newton_euler(small_blocks, seed):
 def test_size_of_blocks_changes_nothing(monkeypatch, seed):
     m, given = solvable(seed)
     whole = mg.solve(m, given, redundant="minimum_norm")
-    monkeypatch.setattr(driver_path, "BLOCK", 4)
+    monkeypatch.setattr(motion_path, "BLOCK", 4)
     parts = mg.solve(m, given, redundant="minimum_norm")
     assert_same(parts, whole, 1e-10)
     for name in ("closure", "equilibrium"):
@@ -110,7 +110,7 @@ def test_blocks_of_redundant_loops(monkeypatch, i):
     m, name, span = redundant_cases()[i]
     given = {name: mg.Motion(np.linspace(*span, 700), 3.0, 1.0)}
     whole = mg.solve(m, given, method="newton_euler")
-    monkeypatch.setattr(driver_path, "BLOCK", 100)
+    monkeypatch.setattr(motion_path, "BLOCK", 100)
     assert_same(mg.solve(m, given), whole, 1e-9)
 
 

@@ -13,12 +13,12 @@ import strategies
 from numpy.testing import assert_allclose
 
 import mechgraph as mg
-from mechgraph.algebra import se3
-from mechgraph.closure import tree
-from mechgraph.closure.assembly import close, scaled_system
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import System, indexed
-from mechgraph.closure.one_state import FEW_NODES, OneState
+from mechgraph.kinematics import batches
+from mechgraph.kinematics.assembly import close, scaled_system
+from mechgraph.kinematics.one_state import FEW_NODES, OneState
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System, indexed
+from mechgraph.maths import se3
 from mechgraph.model.toml import library_names, library_path
 from mechgraph.pairs.factors import Factor
 
@@ -325,7 +325,7 @@ def test_a_batch_is_the_evaluation_of_each(seed, monkeypatch):
         return [np.array(part) for part in (*parts, *(X for frames in here.frames for X in frames))]
 
     whole = everything(Configuration(system, states), dq)
-    monkeypatch.setattr(tree, "DEEP", 0)
+    monkeypatch.setattr(batches, "DEEP", 0)
     doubled = everything(Configuration(system, states), dq)
     monkeypatch.undo()
     for t in (0, 17, 69):

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
-from mechgraph.closure import assembly
+from mechgraph.kinematics import assembly
 from mechgraph.kinetostatics import Pipeline
-from mechgraph.numerics import continuation
-from mechgraph.numerics.tolerances import PATH
+from mechgraph.maths import tracker
+from mechgraph.maths.tolerances import PATH
 
 Z = (0, 0, 1)
 
@@ -73,14 +73,14 @@ def test_variants_near_a_dead_point_are_followed_together(monkeypatch):
 )  # the centre of mass does not move with the varied points
 def test_variants_that_differ_by_little_are_led_in_a_step(monkeypatch):
     """The difference over the numbers is taken over a step that shows: rounding of its rates would halve steps a thousand times."""
-    led, follow = [], continuation.Follower.follow
+    led, follow = [], tracker.Follower.follow
 
     def noted(follower, *args, **named):
         tracks = follow(follower, *args, **named)
         led.append((type(follower.problem).__name__, tracks.work.careful))
         return tracks
 
-    monkeypatch.setattr(continuation.Follower, "follow", noted)
+    monkeypatch.setattr(tracker.Follower, "follow", noted)
     m = near_its_dead_point(1e-5)
     mg.study(m, {"B.point.y": [1e-6, 2e-6]}, ["D.effort"], n=2, motions={"D": [m.start["D.Rz"]]})
     assert {careful for problem, careful in led if problem == "NumbersPath"} == {0}
@@ -129,7 +129,7 @@ def test_a_slide_far_away_is_reached_in_steps_that_grow(works):
 
 def test_a_path_of_too_many_steps_is_named(monkeypatch):
     """A screw that goes on and on never repeats itself: after so many steps it is said how far the path was followed."""
-    monkeypatch.setattr(continuation, "PATH", replace(PATH, quick_steps=100, steps_a_point=0))
+    monkeypatch.setattr(tracker, "PATH", replace(PATH, quick_steps=100, steps_a_point=0))
     places = {"A": (0, 0, 0), "B": (1, 0, 0), "C": (3, 1, 0), "D": (3, -1, 0)}
     ends = [("f", "a"), ("a", "b"), ("b", "c"), ("c", "f")]
     how = [("H", {"pitch": 0.3}), ("R", {}), ("R", {}), ("C", {})]
@@ -147,7 +147,7 @@ def test_a_path_of_too_many_steps_is_named(monkeypatch):
 
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 def test_so_is_one_of_too_many_careful_steps(monkeypatch, engine):
-    monkeypatch.setattr(continuation, "PATH", replace(PATH, careful_steps=4, steps_a_point=0))
+    monkeypatch.setattr(tracker, "PATH", replace(PATH, careful_steps=4, steps_a_point=0))
     m = near_its_dead_point(1e-6)
     with pytest.raises(mg.ReachError, match="takes more steps than are made"):
         mg.kinematics(m, {"D": [m.start["D.Rz"], -0.05]}, engine=engine)

@@ -9,12 +9,12 @@ from mechanisms import Z
 from strategies import closed_mechanism, motions, open_chain, with_drives, with_loads, with_loads_on_links
 
 import mechgraph as mg
-from mechgraph.closure.assembly import assembled, named_columns
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.driver_path import DriverPath, Request
-from mechgraph.closure.following import follow
-from mechgraph.closure.solver import closure_solver
-from mechgraph.numerics.tolerances import PATH
+from mechgraph.kinematics.assembly import assembled, named_columns
+from mechgraph.kinematics.motion_path import DriverPath, Request
+from mechgraph.kinematics.reach import follow
+from mechgraph.kinematics.solver import closure_solver
+from mechgraph.kinematics.state import Configuration
+from mechgraph.maths.tolerances import PATH
 
 pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 """Random loads move passive freedoms; ``test_passive_loads`` looks at what is said of it."""

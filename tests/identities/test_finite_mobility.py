@@ -13,10 +13,10 @@ import pytest
 from strategies import closed_mechanism
 
 import mechgraph as mg
-from mechgraph.closure.assembly import close
-from mechgraph.closure.configuration import Configuration
-from mechgraph.closure.indexing import System
 from mechgraph.determinacy.finite_motion import finite_motion
+from mechgraph.kinematics.assembly import close
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
 
 MANY = int(os.environ.get("MECHGRAPH_MANY", "240"))
 STEP = 0.02

@@ -19,7 +19,7 @@ from strategies import (
 )
 
 import mechgraph as mg
-from mechgraph.algebra import se3
+from mechgraph.maths import se3
 
 pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 """Random loads move passive freedoms; ``test_passive_loads`` looks at what is said of it."""

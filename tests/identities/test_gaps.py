@@ -9,9 +9,9 @@ from attack import Bars, anywhere, four_bars, just_out_of_reach, nearly_folded, 
 from mechanisms import Z
 
 import mechgraph as mg
-from mechgraph.closure.driver_motion import DriverMotion
+from mechgraph.kinematics.prescribed import DriverMotion
 from mechgraph.kinetostatics import Pipeline
-from mechgraph.numerics.tolerances import PATH
+from mechgraph.maths.tolerances import PATH
 from mechgraph.outcome import Options
 
 COUNTS = (4, 5, 7, 10, 20, 36, 41, 100, 181)

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mechgraph as mg
-from mechgraph.algebra.se3 import rotation_exp
 from mechgraph.determinacy.report import DeterminacyReport
+from mechgraph.maths.se3 import rotation_exp
 
 pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 """Random loads move passive freedoms; ``test_passive_loads`` looks at what is said of it."""

@@ -5,7 +5,7 @@ import pytest
 from strategies import closed_mechanism, with_drives, with_loads
 
 import mechgraph as mg
-from mechgraph.closure.assembly import closed_start
+from mechgraph.kinematics.assembly import closed_start
 from mechgraph.response.motion_equations import Chart, Columns, accelerations, in_unit_inertias
 
 T = np.linspace(0.0, 0.25, 6)

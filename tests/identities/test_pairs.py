@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mechgraph as mg
-from mechgraph.algebra import se3
+from mechgraph.maths import se3
 from mechgraph.pairs import kinematics as evaluation
 
 PITCH = 0.37

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
-from mechgraph.closure.assembly import closed_start
-from mechgraph.closure.passive_motion import PassiveMotions, are_alone
 from mechgraph.determinacy.mobility import free_motion
+from mechgraph.kinematics.assembly import closed_start
+from mechgraph.kinematics.rates import PassiveMotions, are_alone
 from tests import machines
 from tests import mechanisms as known
 

@@ -10,7 +10,7 @@ from attack import differences
 
 import mechgraph as mg
 import mechgraph.kinetostatics as pipeline
-from mechgraph.closure.driver_motion import DriverMotion
+from mechgraph.kinematics.prescribed import DriverMotion
 from mechgraph.kinetostatics import Pipeline
 from mechgraph.outcome import Options
 from mechgraph.result.solution import Solution

@@ -9,7 +9,7 @@ from mechanisms import Z
 from strategies import chebyshev_rate, chebyshev_times, closed_mechanism, with_drives, with_loads, with_loads_on_links
 
 import mechgraph as mg
-from mechgraph.closure.driver_motion import DriverMotion
+from mechgraph.kinematics.prescribed import DriverMotion
 from mechgraph.kinetostatics import Pipeline
 from mechgraph.outcome import Options
 from mechgraph.result.solution import Solution

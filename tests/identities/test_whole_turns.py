@@ -5,8 +5,8 @@ import pytest
 from mechanisms import Z
 
 import mechgraph as mg
-from mechgraph.closure import following
-from mechgraph.closure.driver_path import DriverPath
+from mechgraph.kinematics import reach
+from mechgraph.kinematics.motion_path import DriverPath
 
 
 def geared():
@@ -35,7 +35,7 @@ def test_far_positions_are_those_followed_all_the_way(name, sense, monkeypatch):
     m = MADE[name]() if MADE[name] else mg.load(name)
     q = {m.drives[0].freedom: mg.Motion(sense * np.array([0.3, 7.0, 60.0, 61.0]), velocity=1.0)}
     s = mg.kinematics(m, q, on_reach="flag", engine="dense")
-    monkeypatch.setattr(following, "WORTH", 1e9)
+    monkeypatch.setattr(reach, "WORTH", 1e9)
     r = mg.kinematics(m, q, on_reach="flag", engine="dense")
     assert s.status.tolist() == r.status.tolist()
     for link in m.link_names():

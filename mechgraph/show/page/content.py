@@ -9,17 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.algebra.se3 import Array
-from mechgraph.closure.assembly import CLOSED, close
-from mechgraph.closure.indexing import Index
 from mechgraph.determinacy.facts import Geometry
 from mechgraph.determinacy.findings import component_words
 from mechgraph.determinacy.report import DeterminacyReport, check
 from mechgraph.determinacy.uniqueness import SelfStress
 from mechgraph.document.tree import plain
+from mechgraph.kinematics.assembly import CLOSED, close
+from mechgraph.maths.se3 import Array, Index
+from mechgraph.maths.tolerances import MOTIONS
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
-from mechgraph.numerics.tolerances import MOTIONS
 from mechgraph.pairs.factors import Component
 from mechgraph.quantities import unit_of
 from mechgraph.result.solution import Solution

@@ -1,1 +1,0 @@
-"""Positions and their rates: evaluation of the graph, closure, continuation, assembly."""

@@ -1,0 +1,380 @@
+"""The closure equations ``J q = b`` with some columns fixed, linear, for a batch of positions: one protocol, two engines behind it.
+
+A *form* is what is decided once and serves many positions: which rows are independent and which columns are held (dense), or the
+borders that make the matrix square (sparse). Positions name their form by its number.
+"""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Sequence
+from typing import Any, Literal, Protocol
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from mechgraph.kinematics.dense_solver import DenseSolver, independent
+from mechgraph.kinematics.loop_rows import ClosureRows
+from mechgraph.kinematics.sparse_system import Factored, LoopSystem
+from mechgraph.kinematics.state import Configuration
+from mechgraph.maths.se3 import Array, Index
+from mechgraph.maths.sparse import BlockFactor, Pattern, SparseFactors
+from mechgraph.maths.tolerances import PATH
+
+PROBES = 6
+"""Random self-stresses that represent all of them at every position: a component in which none has a part is unique but for chance."""
+SEED = 5
+POWERS = 5
+"""Steps of the power iteration that estimates a spectral radius."""
+
+
+Part = tuple[LoopSystem, Index, Factored]
+"""A bordering, the positions in it, and these factored."""
+
+
+class SparseFactored:
+    """Factors of every position in its bordering, all positions of a bordering together."""
+
+    complete = False
+
+    def __init__(self, solver: SparseSolver, here: Configuration, which: Index, parts: list[Part]) -> None:
+        self.solver, self.here, self.which, self._parts = solver, here, which, parts
+        self.groups = max((form.groups.blocks for form, _, f in parts if isinstance(f, BlockFactor)), default=0)
+
+    def _joined(self, values: list[Array], rows: int, width: int = 0) -> Array:
+        """Values ``(rows, k, T)`` of the borderings at all positions, zero where one has fewer columns."""
+        if len(values) == 1:
+            return values[0]
+        out = np.zeros((rows, max([width, *(value.shape[1] for value in values)]), self.here.T))
+        for (_, at, _), value in zip(self._parts, values, strict=True):
+            out[:, : value.shape[1], at] = value
+        return out
+
+    @property
+    def condition(self) -> Array:
+        """An estimate from the smallest pivot against unit rows and columns, ``(T,)``."""
+        smallest = self._joined([factors.smallest_pivot[None, None] for _, _, factors in self._parts], 1, 1)
+        return np.asarray(10.0 / np.maximum(smallest[0, 0], 1e-300))
+
+    def solve(self, b: Array) -> Array:
+        """See ``FactoredClosure``."""
+        found = [form.solve(factors, b[:, :, at]) for form, at, factors in self._parts]
+        return self._joined(found, self.here.system.n_freedoms, b.shape[1])
+
+    def solve_transposed(self, b: Array) -> Array:
+        """See ``FactoredClosure``."""
+        found = [form.solve_transposed(factors, b[:, :, at]) for form, at, factors in self._parts]
+        return self._joined(found, self.here.system.n_rows, b.shape[1])
+
+    def residual_size(self, r: Array) -> Array:
+        """See ``FactoredClosure``."""
+        out = np.zeros(self.here.T)
+        for form, at, _ in self._parts:
+            out[at] = np.abs(form.kept_part(r[:, at])).max(axis=0, initial=0.0)
+        return out
+
+    def sensitivity(self) -> Array:
+        """See ``FactoredClosure``."""
+        fixed = self.solver.fixed
+        F, T = self.here.system.n_freedoms, self.here.T
+        Z = np.zeros((F, len(fixed), T))
+        for i, column in enumerate(fixed):
+            unit = np.zeros((F, T))
+            unit[column] = 1.0
+            Z[:, i] = self.solve(-self.here.closure_rates(unit)[:, None])[:, 0]
+        Z[fixed, np.arange(len(fixed))] = 1.0
+        return Z
+
+    def motions(self) -> Array:
+        """See ``FactoredClosure``."""
+        found = [form.motions(factors, len(at)) for form, at, factors in self._parts]
+        return self._joined(found, self.here.system.n_freedoms)
+
+    def self_stresses(self, every: bool = False) -> Array:
+        """Random ones, of size one in the measure of every loop, as many as there are if ``every``; none where there is no redundancy."""
+        rows, found = self.here.system.n_rows, []
+        for form, at, factors in self._parts:
+            count = form.redundant if every else PROBES if form.redundant else 0
+            some = ClosureRows.of(self.here, at)
+            found.append(
+                form.random_stress(factors, some, np.random.default_rng(SEED), count)
+                if count
+                else np.zeros((rows, 0, len(at)))
+            )
+        return self._joined(found, rows)
+
+    def least(self, R: Sequence[scipy.sparse.csr_array], r0: Array) -> Array:
+        """``[R^T R  J; J^T  0] [x; z] = [-R^T r0; 0]`` in the turned rows of the loops (Golub and Van Loan, section 12.1).
+
+        Rows that hold the motions left free stand below those of J, with unknowns that come out as zero: without them z is not unique.
+        """
+        out = np.zeros((self.here.system.n_rows, self.here.T))
+        for t, number in enumerate(self.which.tolist()):
+            form = self.solver.forms[number]
+            turned = form.turned_rows
+            part = R[t] @ turned
+            H = scipy.sparse.coo_array(part.T @ part)
+            J = scipy.sparse.coo_array(
+                scipy.sparse.vstack([form.turned_matrix(ClosureRows.at(self.here, t)), form.holding])
+            )
+            rows, size = J.shape[0], sum(J.shape)
+            pattern = Pattern(
+                np.concatenate([H.row, J.row, rows + J.col]).astype(np.intp),
+                np.concatenate([H.col, rows + J.col, J.row]).astype(np.intp),
+                size,
+            )
+            right = np.zeros((size, 1))
+            right[: H.shape[0], 0] = -(part.T @ r0[:, t])
+            found = pattern.factor(np.concatenate([H.data, J.data, J.data])).solve(right)[: H.shape[0], 0]
+            out[:, t] = turned @ found
+        return out
+
+    def regular_between(self, ends: Configuration, a: Index, b: Index) -> NDArray[np.bool_]:
+        """Whether the changes ``1 - A^-1 A_a`` and ``1 - A^-1 A_b`` have spectral radii below ``departure``, by power iteration.
+
+        Borders may be singular where the loops are not: those that fail are asked again with borders of the very position.
+        """
+        sides = ends.part(a), ends.part(b)
+        out = self._departures(*sides) <= PATH.departure
+        for t in np.flatnonzero(~out):
+            one = np.array([t])
+            here, beside = self.here.part(one), [side.part(one) for side in sides]
+            alone = SparseSolver(self.solver.fixed, self.solver.keep, self.solver.forms[0])
+            out[t] = alone.factored(here, alone.chosen(here, np.full(1, -1)))._departures(*beside)[0] <= PATH.departure
+        return np.asarray(out)
+
+    def _departures(self, a: Configuration, b: Configuration) -> Array:
+        rng = np.random.default_rng(SEED)
+        out = np.zeros(self.here.T)
+        for other in (a, b):
+            v = rng.normal(size=(self.here.system.n_freedoms, self.here.T))
+            v[self.solver.fixed] = 0.0
+            for _ in range(POWERS):
+                size = np.sqrt((v * v).sum(axis=0))
+                v = v / np.where(size > 0, size, 1.0)
+                v = self.solve((self.here.closure_rates(v) - other.closure_rates(v))[:, None])[:, 0]
+            out = np.maximum(out, np.sqrt((v * v).sum(axis=0)))
+        return out
+
+    def part(self, at: Index, here: Configuration) -> SparseFactored:
+        """See ``FactoredClosure``."""
+        place, parts = np.full(len(self.which), -1), list[Part]()
+        place[at] = np.arange(len(at))
+        for form, mine, factors in self._parts:
+            some = np.flatnonzero(place[mine] >= 0)
+            if some.size:
+                parts.append((form, place[mine[some]], factors.part(some)))
+        return SparseFactored(self.solver, here, self.which[at], parts)
+
+    def by_held(self) -> list[tuple[Index, Index]]:
+        """The freedoms that hold the passive motions, at all positions."""
+        return [(self.solver.keep, np.arange(self.here.T))]
+
+
+class SparseSolver:
+    """Borderings chosen where they are needed; a position whose pivots become small against those of its form gets a new one.
+
+    All are of the rank of the first one, or of one that they are to be ``like``.
+    """
+
+    engine = "sparse"
+
+    def __init__(self, fixed: Index, keep: Index | None = None, like: LoopSystem | None = None) -> None:
+        self.fixed, self.keep = fixed, np.zeros(0, dtype=np.intp) if keep is None else keep
+        self.like = like
+        self.forms: list[LoopSystem] = []
+        self._last: tuple[weakref.ref[Configuration], dict[int, tuple[Index, Factored]]] | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what is kept of the last positions: it refers to them weakly, and is computed again."""
+        return vars(self) | {"_last": None}
+
+    def _factors(self, here: Configuration, number: int, at: Index) -> Factored:
+        """Positions factored in a form; what is known of the last positions is kept for who asks next."""
+        known = self._known(here)
+        before, factors = known.get(number, (at[:0], None))
+        if factors is None or not np.isin(at, before).all():
+            before, factors = known[number] = at, self.forms[number].factors(here, at)
+        return factors if np.array_equal(before, at) else factors.part(np.searchsorted(before, at))
+
+    def _known(self, here: Configuration) -> dict[int, tuple[Index, Factored]]:
+        if self._last is None or self._last[0]() is not here:
+            self._last = weakref.ref(here), {}
+        return self._last[1]
+
+    def leaves_nothing_free(self, here: Configuration) -> bool:
+        """See the protocol in ``kinematics.solver``."""
+        which = self.chosen(here, np.full(here.T, -1))
+        form = self.forms[int(which[0])]
+        return form.regular and not form.held and independent(here, self.factored(here, which).sensitivity())
+
+    def begun(self, here: Configuration) -> SparseSolver:
+        """See ``ClosureSolver``."""
+        out = SparseSolver(self.fixed, self.keep)
+        out.forms = list(self.forms)
+        out._last = self._last and (weakref.ref(here), dict(self._last[1]))
+        return out
+
+    def corrigible(self, dq: Array, which: Index) -> Array:
+        """See ``ClosureSolver``."""
+        for i in np.unique(which):
+            if self.forms[i].held:
+                mine = which == i
+                dq[:, mine] = self.forms[i].unheld(dq[:, mine])
+        return dq
+
+    def factored(self, here: Configuration, which: Index) -> SparseFactored:
+        """See ``ClosureSolver``."""
+        parts = []
+        for number in dict.fromkeys(which.tolist()):
+            at = np.flatnonzero(which == number)
+            parts.append((self.forms[number], at, self._factors(here, number, at)))
+        return SparseFactored(self, here, which, parts)
+
+    def chosen(self, here: Configuration, which: Index) -> Index:
+        """See ``ClosureSolver``."""
+        which = which.copy()
+        poor = np.flatnonzero(which >= 0)
+        for number in dict.fromkeys(which[poor].tolist()):
+            poor = np.setdiff1d(poor, self._fitting(here, number, np.flatnonzero(which == number)))
+        new = np.flatnonzero(which < 0)
+        for number in range(len(self.forms) - 1, -1, -1):
+            fits = self._fitting(here, number, new) if new.size else new
+            which[fits], new = number, np.setdiff1d(new, fits)
+        while new.size:
+            self._make(here, int(new[0]))
+            fits = np.union1d(new[:1], self._fitting(here, len(self.forms) - 1, new)) if new.size > 1 else new
+            which[fits], new = len(self.forms) - 1, np.setdiff1d(new, fits)
+        for t in poor.tolist():
+            before = self.forms[which[t]].factor(ClosureRows.at(here, t)).smallest_pivot
+            self._make(here, t)
+            if self.forms[-1].smallest > 5.0 * before:
+                which[t] = len(self.forms) - 1
+            else:
+                self.forms.pop()
+        return which
+
+    def _fitting(self, here: Configuration, number: int, at: Index) -> Index:
+        """Those of the positions that a form fits."""
+        return at[self.forms[number].fits(self._factors(here, number, at))]
+
+    def _make(self, here: Configuration, t: int) -> None:
+        """A form made at a position."""
+        at = np.array([t])
+        part, like = here if here.T == 1 else here.part(at), self.forms[0] if self.forms else self.like
+        self.forms.append(LoopSystem.like(like, part) if like else LoopSystem.of_rank(part, self.fixed))
+        self._known(here)[len(self.forms) - 1] = at, SparseFactors([self.forms[-1].first])
+
+
+EngineName = Literal["auto", "dense", "sparse"]
+ENGINES: tuple[EngineName, ...] = ("auto", "dense", "sparse")
+MotionEngineName = Literal["auto", "compiled", "dense", "sparse"]
+"""Engines of calls that follow a motion; what is at hand where ``compiled`` serves is the numpy engine that ``auto`` takes."""
+SPARSE_ROWS = {1.0: 120, 20.0: 84, 50.0: 60, 400.0: 42, np.inf: 36}
+"""Closure rows from which on ``auto`` takes the sparse engine, for up to so many positions.
+
+Measured by ``tests/benchmarks/bench_large.py --crossover`` on ladders of four-bars: both engines take the same time at 110 rows (one
+position), 80 (16 positions), 62 (36), 36 (200) and 24 (1000), where the sparse one goes group by group. A platform on six legs (30 rows,
+one group) takes a quarter more with the sparse one at 1000 positions, so that this many rows stay with the dense one.
+"""
+
+
+class FactoredClosure(Protocol):
+    """The closure equations at a batch of positions, factored. ``m`` rows, ``F`` freedoms, ``T`` positions."""
+
+    which: Index
+    complete: bool
+    """Whether ``self_stresses`` is a basis of all self-stresses; otherwise it holds random ones that represent them."""
+    groups: int
+    """Number of groups that are solved one after the other; 0 where all equations are factored as a whole."""
+
+    @property
+    def condition(self) -> Array:
+        """Condition numbers ``(T,)``."""
+
+    def solve(self, b: Array) -> Array:
+        """``q (F, k, T)`` with ``J q = b (m, k, T)``, zero in fixed and held columns."""
+
+    def solve_transposed(self, b: Array) -> Array:
+        """``x (m, k, T)`` with ``J^T x = b (F, k, T)`` in the columns neither fixed nor held."""
+
+    def residual_size(self, r: Array) -> Array:
+        """Largest entry ``(T,)`` of residuals ``(m, T)``, displacements over the sizes of their loops."""
+
+    def sensitivity(self) -> Array:
+        """Rates ``Z (F, d, T)`` of all freedoms for unit rates of the fixed ones."""
+
+    def motions(self) -> Array:
+        """Motions ``(F, p, T)`` with the fixed columns at rest: one a held motion."""
+
+    def self_stresses(self, every: bool = False) -> Array:
+        """Multipliers ``(m, s, T)`` with ``J^T x = 0`` in the columns not fixed: a basis if ``complete`` or ``every``, or random."""
+
+    def regular_between(self, ends: Configuration, a: Index, b: Index) -> NDArray[np.bool_]:
+        """Whether no matrix on the parabola through those at ``ends`` ``a (T,)``, here and at ``b`` is singular or nearly so, ``(T,)``."""
+
+    def part(self, at: Index, here: Configuration) -> FactoredClosure:
+        """Some of the positions, evaluated in ``here``."""
+
+    def least(self, R: Sequence[scipy.sparse.csr_array], r0: Array) -> Array:
+        """Multipliers ``x (m, T)`` with ``J^T x = 0`` that make ``|r0 + R x|`` least; ``R[t] (n, m)``, ``r0 (n, T)``.
+
+        Only asked for where ``self_stresses`` are not complete.
+        """
+
+    def by_held(self) -> list[tuple[Index, Index]]:
+        """Freedoms that are held (beside the fixed ones), and the positions at which they are."""
+
+
+class ClosureSolver(Protocol):
+    """The closure equations of one mechanism with the columns ``fixed``; makes and keeps forms."""
+
+    fixed: Index
+    engine: str
+
+    def chosen(self, here: Configuration, which: Index) -> Index:
+        """Forms ``(T,)`` for positions: ``which`` where these are good enough, new ones where they are not (or are -1)."""
+
+    def factored(self, here: Configuration, which: Index) -> FactoredClosure:
+        """The equations at positions, each in its form."""
+
+    def leaves_nothing_free(self, here: Configuration) -> bool:
+        """Whether the factors at a position prove that the fixed columns determine all others; False proves nothing."""
+
+    def begun(self, here: Configuration) -> ClosureSolver:
+        """A solver that goes on from here with the forms of this one, which was last asked at the same state."""
+
+    def corrigible(self, dq: Array, which: Index) -> Array:
+        """Increments ``(F, T)`` without the motions that are held: no correction can remove what a prediction adds to them."""
+
+
+def engine_for(rows: int, positions: int, engine: str) -> Literal["dense", "sparse"]:
+    """The engine that runs: the one asked for, or the one that is faster for the size."""
+    if engine in ENGINES[1:]:
+        return "dense" if engine == "dense" else "sparse"
+    limit = next(limit for most, limit in SPARSE_ROWS.items() if positions <= most)
+    return "sparse" if rows >= limit else "dense"
+
+
+def solver_at_start(
+    engine: Literal["dense", "sparse"], fixed: Index, start: Configuration
+) -> tuple[ClosureSolver, bool]:
+    """The solver with the columns ``fixed``, and whether it proves at a start that they leave nothing free.
+
+    What was chosen and factored there is kept with the start, for the next call with the same columns.
+    """
+    key = engine, fixed.tobytes()
+    found = start.solvers.get(key)
+    if found is None:
+        solver = closure_solver(engine, fixed)
+        proved = solver.leaves_nothing_free(start)
+        start.solvers.clear()  # other threads may ask for what is kept here
+        found = start.solvers[key] = solver.begun(start), proved
+    solver, proved = found
+    return solver.begun(start), proved
+
+
+def closure_solver(engine: Literal["dense", "sparse"], fixed: Index, keep: Index | None = None) -> ClosureSolver:
+    """The solver with the columns ``fixed``; freedoms ``keep`` are preferably held where motions are left free."""
+    return DenseSolver(fixed, keep) if engine == "dense" else SparseSolver(fixed, keep)

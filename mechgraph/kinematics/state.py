@@ -1,0 +1,511 @@
+"""One batched evaluation: poses, twists, wrenches and closure of a mechanism at given states, and the lines along which gears press.
+
+One batched kernel: poses, twists, wrenches and closure of a mechanism at given states.
+
+Everything here is internal: lengths over L, positions about the internal origin (see ``model.parameters``), component axes
+first and positions last. ``S`` are the twists of all freedoms about the internal origin, one column a freedom. Results have the
+type of the numbers that come in, real or complex.
+
+Forces of gears and belts in a configuration: couplings that act along lines of their own, not as efforts in freedoms.
+
+A coupling with the multiplier m exerts the effort ``c_j m`` in freedom j, as if through that pair. Gears touch each other instead: the
+wrench ``F = G m`` acts on gear b, ``-F`` on gear a, and the pairs j on the way between them, passed in the sense ``s_j``, are relieved of
+``s_j F`` and of the effort that they would carry:
+
+    wrench of the pair = wrench that closes the equilibrium - (s_j G - E_j c_j) m.
+
+``s_j G . S_j = c_j`` (see ``model.contact``), so that what is taken off does no work in any freedom: motion and efforts are those of the
+linear relation, reactions are those of the contact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mechgraph.kinematics.batches import ScrewTable, run_sums
+from mechgraph.kinematics.one_state import OneState
+from mechgraph.kinematics.system import System
+from mechgraph.maths.se3 import Array, Index, compose, cross, cross_twist, finite_twist, move_twist, multiplied
+from mechgraph.memo import kept
+from mechgraph.model.couplings import Axes, Contact, Lines
+from mechgraph.pairs import kinematics as evaluation
+
+ROUNDINGS = 20
+"""Roundings of a position that add up in a closure residual."""
+
+
+class Configuration:
+    """Poses, twists of freedoms and closure of a batch of states; parts are computed when first asked for."""
+
+    def __init__(self, system: System, x: Array, one: OneState | None = None) -> None:
+        """States ``x (nx, T)``; ``one``: the same, evaluated as one state alone."""
+        self.system = system
+        self.x = x
+        self.T = x.shape[1]
+        self._one = one
+
+    @kept
+    def solvers(self) -> dict[Any, Any]:
+        """What ``kinematics.solver`` keeps with a start."""
+        return {}
+
+    def part(self, at: Index) -> Configuration:
+        """Some of the positions; what is evaluated is taken over."""
+        return self._with(self.system.cases(at), lambda values: values[..., at])
+
+    def repeated(self, system: System, count: int) -> Configuration:
+        """The states ``count`` times, one after the other, for a system of which masses alone differ; what is evaluated is taken over."""
+        return self._with(system, lambda values: np.tile(values, count))
+
+    def _with(self, system: System, over: Callable[[Array], Array]) -> Configuration:
+        """The states, and what is evaluated at them, taken ``over`` to a system; the last axis is that of positions."""
+        out = Configuration(system, over(self.x))
+        for name, known in vars(self).items():
+            if isinstance(vars(type(self)).get(name), kept):
+                if isinstance(known, np.ndarray):
+                    out.__dict__[name] = over(known)
+                elif isinstance(known, tuple) and isinstance(known[0], np.ndarray):
+                    out.__dict__[name] = tuple(over(values) for values in known)
+        return out
+
+    def rescaled(self, system: System) -> Configuration:
+        """The same state in a system about another origin, in another unit of length; poses are taken over, not evaluated again."""
+        old, new = self.system.par, system.par
+        out = Configuration(system, self.x.copy())
+        out.x[system.single_rows[np.flatnonzero(system.is_length)]] *= old.L / new.L
+        nodes = self._nodes.copy()
+        nodes[:, 3] *= old.L / new.L
+        nodes[:, 3] += ((old.origin - new.origin) / new.L)[:, None, None]
+        out.__dict__["_nodes"] = nodes
+        return out
+
+    def evaluated(self) -> dict[str, Any]:
+        """All that is known of the configuration beside its system, see ``of``."""
+        return {name: value for name, value in vars(self).items() if name != "system"}
+
+    @classmethod
+    def of(cls, system: System, evaluated: dict[str, Any]) -> Configuration:
+        """The configuration of which that is known."""
+        out = cls.__new__(cls)
+        vars(out).update(evaluated, system=system)
+        return out
+
+    # --- poses -------------------------------------------------------------------------------------------------------
+
+    @kept
+    def _steps(self) -> Array:
+        """Poses of all factors with the markers beside them, in the sense of the walk: homogeneous, ``(4, 4, steps, T)``."""
+        s = self.system
+        dtype = self.x.dtype if s.numbers.is_real else complex
+        out = np.empty((16, len(s.walk.parents), self.T), dtype=dtype)
+        for b, C, beside in s.numbers.parts():
+            values = b.stack.values(self.x.take(b.state_rows, axis=0))
+            if beside is None and isinstance(b.at_steps, slice):
+                np.matmul(C, values.transpose(1, 0, 2), out=out[:, b.at_steps].transpose(1, 0, 2))
+                continue
+            many = C.ndim == 4
+            steps = (
+                np.einsum("cmnt,mnt->cnt", C, values) if many else (C @ values.transpose(1, 0, 2)).transpose(1, 0, 2)
+            )
+            if beside is not None:
+                left, right = beside
+                steps = multiplied(multiplied(left, steps.reshape(4, 4, *steps.shape[1:])), right).reshape(steps.shape)
+            out[:, b.at_steps] = steps
+        return out.reshape(4, 4, *out.shape[1:])
+
+    @kept
+    def _nodes(self) -> Array:
+        """Poses of the frames behind all factors ``(3, 4, nodes, T)``, see ``Walk``."""
+        if self._one is not None:
+            return self._one.nodes
+        return self.system.walk.poses(self._steps, self.system.par.frame)
+
+    @kept
+    def poses(self) -> Array:
+        """Poses of all links ``(3, 4, N, T)``."""
+        return self._nodes.take(self.system.walk.link_node, axis=2)
+
+    @kept
+    def frames(self) -> list[list[Array]]:
+        """For every group the pair frames 0, 1, ... about the internal origin; places inside a factor hold its start."""
+        out = []
+        for g in self.system.groups:
+            starts = [*g.row.frame_before, g.row.f]
+            made = {k: self._frame(*self.system.frame_place(g, k)) for k in dict.fromkeys(starts)}
+            out.append([made[k] for k in starts])
+        return out
+
+    def _frame(self, nodes: Index, const: Index) -> Array:
+        """Frames ``(3, 4, n, T)``: poses of nodes with a constant pose behind them."""
+        X = self._nodes.take(nodes, axis=2)
+        return compose(X, self.system.numbers.constants[:, :, const]) if const.any() else X
+
+    @kept
+    def pair_points(self) -> Array:
+        """Origins of the markers B, ``(3, P, T)``; of a chord, where its link a has it."""
+        s = self.system
+        X = self._nodes.take(s.walk.end_node, axis=2)
+        out = multiplied(X[:, :3], s.numbers.ends)[:, 0]
+        out += X[:, 3]
+        return out
+
+    # --- screws ------------------------------------------------------------------------------------------------------
+
+    def _turned(self, local: Array, nodes: Index) -> tuple[Array, Array]:
+        """Both parts of screws in outer directions ``(2, 3, K, T)`` from those in nodes ``(3, 2, K, B)``, and origins of the nodes."""
+        dtype = self._nodes.dtype if local.dtype == float else np.result_type(local, self._nodes)
+        out = np.empty((2, 3, len(nodes), self.T), dtype=dtype)
+        X = self._nodes.take(nodes, axis=2)
+        multiplied(X[:, :3], local, out=out.swapaxes(0, 1))
+        return out, X[:, 3].copy()
+
+    @kept
+    def _twists(self) -> tuple[Array, Array]:
+        """Turns and displacements of all freedoms ``(2, 3, F, T)`` about the origins of their nodes, and these origins ``(3, F, T)``."""
+        s = self.system
+        return self._turned(self._local_twists if s.moving_batches else s.numbers.twists, s.column_nodes)
+
+    @kept
+    def S(self) -> Array:
+        """Twists of all freedoms ``(6, F, T)``: ``(R line, R free + p x R line)``."""
+        parts, origins = self._twists
+        out = parts.copy()
+        out[1] += cross(origins, parts[0])
+        return out.reshape(6, *out.shape[2:])
+
+    @kept
+    def _local_twists(self) -> Array:
+        """The twists in their nodes ``(3, 2, F, T)`` where those of some factors move."""
+        s = self.system
+        constant = s.numbers.twists
+        shape = (*constant.shape[:3], self.T)
+        out = np.broadcast_to(constant, shape).astype(np.result_type(constant, self.x))
+        for b in s.moving_batches:
+            s.numbers.place_twists(out, b, b.stack.twists(self.x[b.state_rows], s.par.pitch[b.pairs]))
+        return out
+
+    @kept
+    def E(self) -> Array:
+        """Effort wrenches of all freedoms ``(6, F, T)``."""
+        s = self.system
+        out = self._wrenches(s.effort_table, s.effort_numbers)
+        for g in s.groups:
+            if g.row.computed_efforts:
+                p = self.pair_points[:, g.pairs]
+                out[:, g.columns] = evaluation.dual(g.row, out[:, g.columns], self.S[:, g.columns], p)
+        return out
+
+    @kept
+    def W(self) -> list[Array]:
+        """For every group the reaction wrenches ``(6, 6 - f, n, T)``."""
+        s = self.system
+        whole = self._wrenches(s.reaction_table, s.reaction_numbers)
+        out, at = [], 0
+        for number, g in enumerate(s.groups):
+            if g.row.reactions is None:
+                out.append(evaluation.reciprocal(self.S[:, g.columns], self.frames[number][-1]))
+                continue
+            count = len(g.row.reactions) * len(g.pairs)
+            own = whole[:, at : at + count].reshape(6, len(g.row.reactions), len(g.pairs), self.T)
+            if g.row.computed_reactions:
+                own = evaluation.without_work(own, self.E[:, g.columns], self.S[:, g.columns])
+            out.append(own)
+            at += count
+        return out
+
+    def _wrenches(self, table: ScrewTable, local: Array) -> Array:
+        """Wrenches ``(6, K, T)`` of components, moment first."""
+        out, points = self._turned(local, table.nodes)
+        if table.b_places.size:
+            points[:, table.b_places] = self.pair_points.take(table.pairs[table.b_places], axis=1)
+        out[0] += cross(points, out[1])
+        return out.reshape(6, *out.shape[2:])
+
+    @kept
+    def lee_screws(self) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+        """For every pair the axial wrenches ``(6, n, T)`` and condition twists ``(6, n, T)`` of Lee's bookkeeping."""
+        s = self.system
+        along, conditions = ([np.zeros((6, 0, self.T))] * len(s.m.pairs) for _ in range(2))
+        for g, frames in zip(s.groups, self.frames, strict=True):
+            book = g.row.bookkeeping
+            if book is None:
+                continue
+            pitch = s.par.pitch[g.pairs]
+            wrenches = evaluation.components_of(book.along, pitch, frames)
+            twists = evaluation.freedoms_of(book.conditions, pitch, frames[0])
+            for i, k in enumerate(g.pairs):
+                along[k], conditions[k] = wrenches[:, :, i], twists[:, :, i]
+        return tuple(along), tuple(conditions)
+
+    # --- closure -----------------------------------------------------------------------------------------------------
+
+    @kept
+    def chord_errors(self) -> Array:
+        """Closure errors ``(6, chords, T)``: finite twist from marker B reached through b to that reached through a, about the origin."""
+        reached, declared = (self._nodes.take(nodes, axis=2) for nodes in self.system.chord_nodes)
+        R = multiplied(reached[:, :3], declared[:, :3].swapaxes(0, 1))
+        return finite_twist(R, reached[:, 3], declared[:, 3])
+
+    @property
+    def chord_gaps(self) -> Array:
+        """The same at the pair points of the chords, so that an angle does not count with the distance of the internal origin."""
+        e = self.chord_errors
+        return np.concatenate([e[:3], e[3:] + cross(e[:3], self.pair_points[:, self.system.chords])])
+
+    @property
+    def loop_errors(self) -> Array:
+        """Closure errors of the loops about their middles, stacked ``(6 loops, T)``."""
+        s = self.system
+        if self._one is not None:
+            return self._one.loop_errors
+        errors = self.chord_errors
+        if s.many_loops:
+            per_pair = np.zeros((6, len(s.m.pairs), self.T), dtype=errors.dtype)
+            per_pair[:, s.chords] = errors
+            return self.loop_sums(per_pair)
+        return self._about_middles(errors.copy() if s.loops_of_chords is None else s.loops_of_chords @ errors)
+
+    @kept
+    def middles(self) -> Array:
+        """Middle of the pair points of every loop, ``(3, loops, T)``."""
+        s = self.system
+        if s.many_loops:
+            flat = self.pair_points.transpose(1, 0, 2).reshape(len(s.m.pairs), 3 * self.T)
+            return np.asarray(s.graph.loop_averages @ flat).reshape(-1, 3, self.T).transpose(1, 0, 2)
+        if s.numbers.ends.shape[-1] == 1:
+            return np.asarray(s.middle_numbers @ self._nodes.reshape(3, s.middle_numbers.shape[1], self.T))
+        return np.asarray(s.loop_averages @ self.pair_points)
+
+    def _about_middles(self, twists: Array) -> Array:
+        """Twists ``(6, loops, T)`` about the internal origin taken about the middle of their loop, in place; stacked ``(6 loops, T)``.
+
+        So the rows of a loop are as good anywhere: about a fixed point their condition would grow with the square of its distance.
+        """
+        twists[3:] += cross(twists[:3], self.middles)
+        return twists.swapaxes(0, 1).reshape(6 * self.system.graph.n_loops, self.T)
+
+    @kept
+    def closure(self) -> Array:
+        """Closure error ``(T,)``: largest of angle and length / L over all loops, and of the other rows."""
+        errors = [part.error(self) for part in self.system.position_rows]
+        return errors[0] if len(errors) == 1 else np.max(errors, axis=0)
+
+    @kept
+    def residual(self) -> Array:
+        """What the closure rows leave open ``(n_rows, T)``: loops first, then the others."""
+        return _stacked([part.residual(self) for part in self.system.position_rows])
+
+    @property
+    def rounding(self) -> Array:
+        """Rounding of the residual ``(T,)``: that of positions, which grows with their distance from the internal origin."""
+        return np.asarray(ROUNDINGS * np.finfo(float).eps * np.abs(self._nodes[:, 3]).max(axis=(0, 1), initial=1.0))
+
+    @kept
+    def J(self) -> Array:
+        """Closure Jacobian ``(n_rows, F, T)``; of the loops ``J = (C x I6) diag(S_k)``."""
+        return _stacked([part.jacobian(self) for part in self.system.position_rows])
+
+    @property
+    def loop_jacobian(self) -> Array:
+        """Twists of the freedoms about the middles of the loops, with their signs in the rows of every loop, ``(6 loops, F, T)``."""
+        s, e = self.system, self.system.entries
+        if self._one is not None:
+            rows = self._one.entries
+        else:
+            twists, origins = self._twists
+            parts, arms = twists.take(e.column, axis=2), origins.take(e.column, axis=1)
+            parts *= e.signs
+            arms -= self.middles[:, e.loops]
+            parts[1] += cross(arms, parts[0])
+            rows = parts.reshape(6, *parts.shape[2:])
+        if s.entry_places is None:
+            return rows
+        n = 6 * s.graph.n_loops
+        out = np.zeros((n * s.n_freedoms, self.T), dtype=rows.dtype)
+        out[s.entry_places] = rows
+        return out.reshape(n, s.n_freedoms, self.T)
+
+    def closure_rates(self, dq: Array) -> Array:
+        """``J q' (n_rows, T)`` for rates ``dq (F, T)``, without forming ``J``."""
+        return _stacked([part.rates(self, dq) for part in self.system.position_rows])
+
+    def closure_bias(self, pairs: Array) -> Array:
+        """Velocity part ``(n_rows, T)`` of the closure accelerations ``J q'' + bias`` from that of the pairs (``bias``, ``(6, P, T)``)."""
+        return _stacked([part.bias(self, pairs) for part in self.system.rows])
+
+    def row_efforts(self, x: Array) -> Array:
+        """Efforts ``(F, k, T)`` that multipliers ``x (n_rows, k, T)`` of rows other than loops exert in the freedoms."""
+        s = self.system
+        out = np.zeros((s.n_freedoms, *x.shape[1:]), dtype=x.dtype)
+        for part, at in zip(s.rows, s.row_places, strict=True):
+            efforts = part.efforts(self, x[at])
+            if efforts is not None:
+                out += efforts
+        return out
+
+    # --- rates -------------------------------------------------------------------------------------------------------
+
+    def link_twists(self, dq: Array) -> Array:
+        """Twists of all links ``(6, N, T)`` for rates ``dq (F, T)``, along the tree."""
+        return self.system.tree.sums(self.pair_sums(self.S * dq))
+
+    def pair_sums(self, terms: Array) -> Array:
+        """Sum of the columns of every pair: ``(6, F, T)`` -> ``(6, P, T)``."""
+        return run_sums(terms, self.system.pair_ranks, len(self.system.m.pairs))
+
+    def bias(self, dq: Array, V: Array) -> Array:
+        """Velocity part of the relative accelerations ``(6, P, T)``.
+
+        ``sum over the factors of a pair of ad(V of the frame before it) S q' + S' q'``, the second term the factor's own rate of
+        its twists (seen from the frame before it): zero for a constant screw and for a rotation.
+        """
+        s = self.system
+        steps = run_sums(self.S * dq, s.factor_ranks, int(s.n_factors.sum()))
+        carriers = V[:, s.factor_carriers]
+        if len(s.factors_by_pair) > 1:
+            carriers = self._carriers(np.array(carriers), steps)
+        out = cross_twist(carriers, steps)
+        for b in s.moving_batches:
+            rates = b.stack.twist_rates(self.x[b.state_rows], dq[b.columns], s.par.pitch[b.pairs])
+            if rates is not None:
+                const = s.numbers.marker_a_if_first(b)
+                frame = compose(self._nodes.take(s.batch_nodes(b), axis=2), const)
+                out[:, s.factor_numbers(b)] += move_twist(frame, rates)
+        return run_sums(out, s.factors_by_pair, len(s.m.pairs))
+
+    def _carriers(self, carriers: Array, steps: Array) -> Array:
+        """Twists of the frames before every factor: that of link a and the factors before it in its pair."""
+        firsts = self.system.factors_by_pair
+        for r in range(1, len(firsts)):
+            places = np.arange(carriers.shape[1])[firsts[r][1]]
+            carriers[:, places] = carriers[:, places - 1] + steps[:, places - 1]
+        return carriers
+
+    def loop_sums(self, per_pair: Array) -> Array:
+        """Signed sum of pair terms along every loop, about its middle, stacked ``(6 loops, T)``."""
+        s = self.system
+        if s.many_loops:
+            flat = per_pair.transpose(1, 0, 2).reshape(per_pair.shape[1], 6 * per_pair.shape[2])
+            sums = np.asarray(s.graph.sparse_loop_matrix @ flat).reshape(s.graph.n_loops, 6, per_pair.shape[2])
+            return self._about_middles(sums.swapaxes(0, 1))
+        return self._about_middles(s.loop_matrix @ per_pair)
+
+    def pair_wrenches(self, x: Array) -> Array:
+        """Pair wrenches ``(6, P, k, T)`` of the loop rows of ``x (n_rows, k, T)``: ``w = C^T x``, taken about the internal origin."""
+        s = self.system
+        n = s.graph.n_loops
+        loops = x[: 6 * n].reshape(n, 6, *x.shape[1:]).copy()
+        parts = loops.swapaxes(0, 1)
+        parts[:3] += cross(self.middles[:, :, None], parts[3:])
+        if s.many_loops:
+            flat = np.asarray(s.graph.sparse_loop_matrix.T @ loops.reshape(n, loops.size // n))
+            return np.moveaxis(flat.reshape(len(s.m.pairs), 6, *x.shape[1:]), 1, 0)
+        return np.asarray(np.einsum("lp,list->ipst", s.loop_matrix, loops))
+
+    def tree_efforts(self, wrenches: Array) -> Array:
+        """Efforts ``(F, T)`` of wrenches ``(6, N, T)`` on the links in the freedoms along the tree, those of the chords zero."""
+        s = self.system
+        carried = s.tree.wrenches(wrenches, len(s.m.pairs))
+        return np.asarray(-(self.S * carried[:, s.owners]).sum(axis=0))
+
+    def accelerations_with(self, ddq: Array, bias: Array) -> Array:
+        """Accelerations dV/dt of all links ``(6, N, T)``, the velocity part ``bias (6, P, T)`` known."""
+        relative = self.pair_sums(self.S * ddq)
+        relative += bias
+        return self.system.tree.sums(relative)
+
+
+def _stacked(parts: list[Array]) -> Array:
+    """Rows of several contributors, one below the other."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+
+class ContactLines:
+    """Lines of all contacts at the positions of a configuration, internal units about the internal origin."""
+
+    def __init__(self, here: Configuration) -> None:
+        self.here = here
+        self.contacts = [(g, c) for g, c in enumerate(here.system.m.couplings) if isinstance(c, Contact)]
+
+    def __bool__(self) -> bool:
+        return bool(self.contacts)
+
+    def _columns(self, contact: Contact) -> Index:
+        return np.array([self.here.system.first_column[step.pair] for step in contact.steps], dtype=np.intp)
+
+    @cached_property
+    def wrenches(self) -> list[tuple[Array, Array]]:
+        """For every contact the wrench on gear b for a unit multiplier ``(6, 2, T)``, of a positive and of a negative one, and the points
+        ``(3, 2, T)`` at which it acts.
+        """
+        return [self._of(g, contact) for g, contact in self.contacts]
+
+    def _of(self, g: int, contact: Contact) -> tuple[Array, Array]:
+        here, columns = self.here, self._columns(contact)
+        first, last = contact.steps[0].pair, contact.steps[-1].pair
+        S = [here.S[:, columns[i]] for i in (0, -1)]
+        along = S[1][3:] if contact.slides else S[1][:3]
+        axes = Axes(here.pair_points[:, first], S[0][:3], here.pair_points[:, last], along, here.system.par.L)
+        P, n = self._lines(g, axes)
+        line = np.concatenate([cross(P, n), n])
+        power = contact.steps[0].sense * (line * S[0][:, None]).sum(axis=0)
+        size = here.system.coupling_matrix[g, columns[0]] / power
+        # the first line serves the multipliers that make its force push, the second the others
+        turned = size[0] < 0.0
+        pick = np.where(turned, [[1], [0]], [[0], [1]])
+        places = np.arange(here.T)
+        G = np.stack([(line * size)[:, pick[i], places] for i in range(2)], axis=1)
+        return G, np.stack([P[:, pick[i], places] for i in range(2)], axis=1)
+
+    def _lines(self, g: int, axes: Axes) -> Lines:
+        """Points and directions of the force; of variants with gears of their own those of each."""
+        own = self.here.system.par.items[g]
+        if len(own) == 1:
+            return own[0].lines(axes)
+        P, n = np.empty((3, 2, self.here.T)), np.empty((3, 2, self.here.T))
+        first, same = np.unique([id(gears) for gears in own], return_index=True, return_inverse=True)[1:]
+        for i, gears in enumerate(own[first]):
+            at = np.flatnonzero(same == i)
+            P[..., at], n[..., at] = gears.lines(axes.at(at))
+        return P, n
+
+    def on_gear(self, multipliers: Array, flank: Array) -> list[Array]:
+        """For every contact the wrench on gear b ``(6, ..., T)`` for multipliers ``(n, ..., T)`` of all couplings.
+
+        ``flank (n, T)``: the sign of the multiplier that says which line acts.
+        """
+        out = []
+        for (g, _), (G, _) in zip(self.contacts, self.wrenches, strict=True):
+            acting = np.where(flank[g] < 0.0, G[:, 1], G[:, 0])
+            value = multipliers[g]
+            out.append(acting.reshape(6, *(1,) * (value.ndim - 1), self.here.T) * value)
+        return out
+
+    def through(self, multipliers: Array, flank: Array) -> Array:
+        """What would pass through the pairs on the way between gears that do not touch each other, ``s_j F``, ``(6, P, ..., T)``."""
+        out = np.zeros((6, len(self.here.system.m.pairs), *multipliers.shape[1:]))
+        for (_, contact), F in zip(self.contacts, self.on_gear(multipliers, flank), strict=True):
+            for step in contact.steps:
+                out[:, step.pair] += step.sense * F
+        return out
+
+    def relief(self, multipliers: Array, flank: Array) -> Array:
+        """What is taken off the wrenches of all pairs ``(6, P, ..., T)`` for multipliers ``(n, ..., T)`` of all couplings."""
+        here, out = self.here, self.through(multipliers, flank)
+        for g, contact in self.contacts:
+            for step, column in zip(contact.steps, self._columns(contact).tolist(), strict=True):
+                E = here.E[:, column] * here.system.coupling_matrix[g, column]
+                out[:, step.pair] -= E.reshape(6, *(1,) * (multipliers.ndim - 2), here.T) * multipliers[g]
+        return out
+
+    def unit(self, flank: Array) -> list[Array]:
+        """For every coupling the wrench on gear b for a unit multiplier, ``(6, 1, T)``; none for one that acts in freedoms."""
+        n = len(self.here.system.m.couplings)
+        out = [np.zeros((6, 0, self.here.T))] * n
+        for (g, _), F in zip(self.contacts, self.on_gear(np.ones((n, self.here.T)), flank), strict=True):
+            out[g] = F[:, None]
+        return out

@@ -1,0 +1,1 @@
+"""Mathematics that knows no mechanism: rigid-body algebra, linear systems, Newton's method, tracks of solutions."""
