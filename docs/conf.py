@@ -11,6 +11,10 @@ from latex2mathml.converter import convert
 DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent), str(DOCS)]
 
+import generate  # noqa: E402
+
+generate.write(DOCS / "reference" / "generated")
+
 project = "mechgraph"
 author = "the mechgraph authors"
 release = tomllib.loads((DOCS.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]

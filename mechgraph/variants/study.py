@@ -382,7 +382,7 @@ class Study(Shown):
 
         Returns
         -------
-        (*shape of q, ...) array
+        array (shape of q, ...)
             NaN if no variant was solved.
 
         Examples
