@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
+from mechgraph.kernel import build
 from mechgraph.kinematics.assembly import assembled_at
 from mechgraph.response.along_path import POINTS, Arc, Way, _coarse
 from mechgraph.response.charts import Prescribed, Task
+from mechgraph.response.kernel_rates import KernelPath
 from mechgraph.response.motion_equations import Loads
 
 Z = np.eye(3)[2]
@@ -23,16 +25,20 @@ def way(lower, engine="dense", bars=1, narrower=0.0):
         pairs.append(mg.Pair(f"C{i}", "R", f"r{i}", f"c{i + 1}", point=(i + 1, 1, 0), axis=Z))
     m = mg.Mechanism("parallelograms", links, pairs)
     system, x = assembled_at(m, {})
-    task = Task(system, Loads((), ()), Prescribed({}), np.zeros(0, dtype=np.intp), engine)
+    loads, numpy = Loads((), ()), "dense" if engine == "compiled" else engine
+    task = Task(system, loads, Prescribed({}), np.zeros(0, dtype=np.intp), numpy)
     arc = Arc(task, x, np.zeros(system.n_freedoms))
-    out = Way(arc.path, arc.terms, x, -1.0)
+    kernel = KernelPath(build.built(), system, arc.column, x, loads) if engine == "compiled" else None
+    out = Way(arc.path, arc.terms, x, -1.0, kernel)
     out.extend(2.0)
     out.extend(2.5)
     return out
 
 
+@pytest.mark.usefixtures("compiled")
 @pytest.mark.parametrize(
-    ("engine", "bars"), [("dense", 1), ("dense", 3), ("sparse", 1), ("sparse", 3), ("sparse", 100)]
+    ("engine", "bars"),
+    [("dense", 1), ("dense", 3), ("sparse", 1), ("sparse", 3), ("sparse", 100), ("compiled", 1), ("compiled", 3)],
 )
 def test_a_change_point_is_leapt_over(engine, bars):
     """The cranks stay parallel behind it, and no step was taken with care."""
@@ -46,13 +52,15 @@ def test_a_change_point_is_leapt_over(engine, bars):
     np.testing.assert_allclose(np.abs(cranks), np.broadcast_to(at, (bars + 1, 5)), atol=1e-12)
 
 
+@pytest.mark.usefixtures("compiled")
+@pytest.mark.parametrize("engine", ["dense", "compiled"])
 @pytest.mark.parametrize("lower", [1e-3, 1e-6, 1e-9, 1e-10])
-def test_what_is_no_change_point_is_not_leapt_over(lower):
+def test_what_is_no_change_point_is_not_leapt_over(lower, engine):
     """One foot off the line by a little opens the crossing: the branches turn back before it, at a distance of the root of that.
 
     A foot that is off by 1e-11, as the digits of a declaration leave it, counts as on the line: with and without a leap.
     """
-    w = way(lower)
+    w = way(lower, engine)
     assert not w.crossings
     assert w.follower.work.careful > 0 or lower == 1e-3  # branches a thirtieth of a step apart need no care
     assert w.closed
@@ -72,8 +80,10 @@ def test_pieces_are_halved_for_what_they_leave_out_and_not_for_rounding():
     assert _coarse(smooth + 1e6 * rounding, 0.0)
 
 
-def test_noise_beside_a_crossing_that_is_open_makes_no_more_pieces():
+@pytest.mark.usefixtures("compiled")
+@pytest.mark.parametrize("engine", ["dense", "compiled"])
+def test_noise_beside_a_crossing_that_is_open_makes_no_more_pieces(engine):
     """Rounding grows with the square of the condition: where the branches pass each other no shorter series is free of it."""
-    w = way(0.0, narrower=3e-8)
+    w = way(0.0, engine, narrower=3e-8)
     assert w.length > 2.0
     assert len(w._pieces) < 90

@@ -48,6 +48,19 @@ def five_bar() -> mg.Mechanism:
     )
 
 
+def parallelogram() -> mg.Mechanism:
+    """Three cranks side by side, which pass their change points, on springs with dampers."""
+    links = [mg.Link("frame"), *(mg.Link(f"c{i}", 1.0, (i, 0.5, 0), np.eye(3) / 12) for i in range(3))]
+    links += [mg.Link(f"r{i}", 1.0, (i + 0.5, 1, 0), np.eye(3) / 12) for i in range(2)]
+    pairs = [mg.Pair(f"A{i}", "R", "frame", f"c{i}", point=(i, 0, 0), axis=(0, 0, 1)) for i in range(3)]
+    for i in range(2):
+        pairs.append(mg.Pair(f"B{i}", "R", f"c{i}", f"r{i}", point=(i, 1, 0), axis=(0, 0, 1)))
+        pairs.append(mg.Pair(f"C{i}", "R", f"r{i}", f"c{i + 1}", point=(i + 1, 1, 0), axis=(0, 0, 1)))
+    spring = mg.Spring("frame", "r1", (0.5, 2, 0), (1.5, 1, 0), 3.0, 0.5, 0.2)
+    wound = mg.TorsionSpring("A1", 0.4, damping=0.1)
+    return mg.Mechanism("parallelograms", links, pairs, loads=[mg.Gravity((0, -9.81, 0)), spring, wound])
+
+
 def agree(r: mg.Response, s: mg.Response, within: float) -> None:
     """The same at all output times, all reactions included."""
     for pair in r.mechanism.pairs:
@@ -68,6 +81,8 @@ MOTIONS = {
     "rotations": (chain, {"rates": {"S.Rx": 3.0, "S.Rz": 0.5, "A": 1.0}}, 0.15),
     "loop": (five_bar, {"rates": {"J0": 1.0, "J4": -0.5}}, 0.2),
     "prescribed": (five_bar, {"motions": {"J0": lambda t: (np.sin(t), np.cos(t), -np.sin(t))}}, 0.2),
+    "change points": (parallelogram, {"rates": {"A0": -2.0}}, 1.5),
+    "one path": (lambda: mg.load("bricard-cube").replace(drives=[]), {}, 1.0),
     "event": (chain, {"events": [mg.Event("B", 0.02)], "rates": {"A": 1.0}}, 0.27),
     "stop": (chain, {"stops": [mg.Stop("B", upper=0.01, restitution=0.5)]}, 0.3),
 }
@@ -80,7 +95,8 @@ def test_it_is_the_motion_of_the_dense_engine(name):
     m, t = made(), np.linspace(0.0, end, 7)
     r, s = (mg.respond(m, t, engine=engine, **{"rtol": 1e-9, "atol": 1e-11, **how}) for engine in ("compiled", "dense"))
     assert (r.engine, s.engine) == ("compiled", "dense")
-    assert r.work.coordinates == "in independent freedoms"
+    paths = ("change points", "one path")
+    assert r.work.coordinates == ("along the path" if name in paths else "in independent freedoms")
     agree(r, s, 1e-6)
     assert [str(one.event) for one in r.events] == [str(one.event) for one in s.events]
     np.testing.assert_allclose([one.t for one in r.events], [one.t for one in s.events], atol=1e-7)
@@ -106,8 +122,9 @@ def test_the_command_line_takes_the_engine():
     assert '"engine": "compiled"' in done.output
 
 
-def test_what_the_kernel_integrated_can_be_copied_and_sent(compiled: None) -> None:
-    r = mg.respond(chain(), (0, 0.5), engine="compiled")
+@pytest.mark.parametrize("made", [chain, parallelogram])
+def test_what_the_kernel_integrated_can_be_copied_and_sent(made, compiled: None) -> None:
+    r = mg.respond(made(), (0, 0.5), engine="compiled")
     for other in (copy.deepcopy(r), pickle.loads(pickle.dumps(r))):
         assert other.engine == "compiled"
         agree(other.at([0.1, 0.33]), r.at([0.1, 0.33]), 1e-12)

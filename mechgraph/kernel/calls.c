@@ -63,6 +63,58 @@ int mgk_motion(const int *I, const double *P, void *memory, int n, int stored, c
   return MGK_OK;
 }
 
+/* Nodes of certified steps of one drive from a closed state x to where it is at `end`: of each its distance and state in node[most][1 + states].
+ * How many there are; fewer than lead there where a step is refused. */
+int mgk_nodes(const int *I, const double *P, void *memory, const double *x, double end, int most, double *node) {
+  Model m;
+  Work w;
+  int places[MGK_PARTS + 1];
+  double largest[2] = {0.0, 0.0}, v = 0.0;
+  opened(I, P, memory, &m, &w);
+  mgk_record(I, places);
+  m.start = x;
+  begin(&m, &w);
+  Asked asked = {1, 0, 0, NULL, places, &end, &v, &v, w.record, largest, 0, node, 0, most};
+  along(&m, &w, &asked);
+  return asked.nodes;
+}
+
+/* The equation of motion of mobility 1 (response/along_path.py) at states x[count][states] near closed ones, which are closed in place, with
+ * the one drive at u[count]; `stored` of the loads have a potential energy. out[count][6]: mass, forces of the stored loads, and of the
+ * others at rest and for a unit rate, steepness, condition. */
+int mgk_along(const int *I, const double *P, void *memory, int count, int stored, const double *u, double *x, double *out) {
+  Model m;
+  Work w;
+  Motion at;
+  opened_motion(I, P, memory, &m, &w, &at);
+  const int links = 6 * m.links;
+  FOR(i, count) {
+    double *own = x + (size_t)i * m.states, *term = out + 6 * (size_t)i, force[3];
+    set_drives(&m, own, u + i);
+    const int status = closed(&m, &w, own, w.a.matrix);
+    if (status) return status;
+    term[5] = made_inverse(&m, &w, w.a.matrix);
+    if (!(term[5] <= FAIR)) return MGK_SINGULAR;
+    if (sensitivity(&m, &w, &at) > INDEPENDENT) return MGK_CONTRADICTION;
+    carried_along(&m, &w, at.Z, at.V, at.momentum);
+    term[0] = dot(at.V, at.momentum, links);
+    if (!(term[0] > 0.0)) return MGK_NOT_FINITE;
+    FOR(k, 3) { /* stored loads at rest, the others for unit rates to and fro */
+      Model some = m;
+      if (k) some.loads -= stored, some.load += 4 * stored;
+      else some.loads = stored;
+      const double rate = k == 0 ? 0.0 : k == 1 ? 1.0 : -1.0;
+      FOR(j, links) w.V[j] = rate * at.V[j];
+      FOR(c, m.columns) w.dq[c] = rate * at.Z[c];
+      loads(&some, &w, own);
+      force[k] = dot(at.V, w.applied, links) + dot(at.Z, w.given, m.columns);
+    }
+    term[1] = force[0], term[2] = 0.5 * (force[1] + force[2]), term[3] = 0.5 * (force[1] - force[2]), term[4] = 0.0;
+    FOR(c, m.columns) if (m.column_state[c] >= 0) term[4] = raised(term[4], fabs(at.Z[c]));
+  }
+  return MGK_OK;
+}
+
 /* One step from a mechanism of tables m[0], closed in node a, by m[1] at `part` of it to m[2]: whether node b there is on the same regular
  * branch.
  *

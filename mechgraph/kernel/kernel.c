@@ -1419,6 +1419,9 @@ typedef struct {
   const double *q, *v, *a;
   double *out, *largest;
   size_t length;
+  /* places and states of the nodes that lead there, unless NULL */
+  double *node;
+  int nodes, most_nodes;
 } Asked;
 
 static int at_place(const Asked *asked, int i) { return asked->order ? asked->order[i] : i; }
@@ -1474,6 +1477,12 @@ static int follow(const Model *m, Work *w, Asked *asked, const double *begin, co
       FOR(i, m->drives) at += w->direction[i] * (q[i] - begin[i]);
       if (at > *w->b.at && step != left) break;
       if ((status = read_off(m, w, asked, at))) return status;
+    }
+    if (asked->node) {
+      if (asked->nodes == asked->most_nodes) return MGK_TOO_FAR;
+      double *node = asked->node + asked->nodes++ * (1 + m->states);
+      *node = *w->b.at;
+      memcpy(node + 1, w->b.x, m->states * sizeof(double));
     }
     continued(m, w, *w->b.at);
     coordinates(m, w, w->b.x, w->dq);
@@ -1572,7 +1581,7 @@ int mgk_path(const int *I, const double *P, void *state, int count, const int *o
   if (status) return status;
   opened(I, P, state, &m, &w);
   mgk_record(I, places);
-  Asked asked = {count, with_forces, 0, order, places, q, v, a, out, largest, places[with_forces ? MGK_PARTS : MGK_POINTS]};
+  Asked asked = {count, with_forces, 0, order, places, q, v, a, out, largest, places[with_forces ? MGK_PARTS : MGK_POINTS], NULL, 0, 0};
   status = along(&m, &w, &asked);
   *done = asked.done;
   work[0] += w.steps, work[1] += w.evaluations, work[2] += w.factorizations;
@@ -1596,7 +1605,7 @@ int mgk_solve(const int *I, const double *P, void *state, const double *q, const
     const double unit = m.is_length[m.drive[i]] ? L : 1.0;
     asked_of[i] = q[i] / unit, asked_of[d + i] = v[i] / unit, asked_of[2 * d + i] = a[i] / unit;
   }
-  Asked asked = {1, 1, 0, NULL, places, asked_of, asked_of + d, asked_of + 2 * d, record, largest, 0};
+  Asked asked = {1, 1, 0, NULL, places, asked_of, asked_of + d, asked_of + 2 * d, record, largest, 0, NULL, 0, 0};
   memcpy(w.kept, w.x, w.n_kept * sizeof(double));
   const int status = along(&m, &w, &asked);
   if (status) {

@@ -9,7 +9,8 @@ tabulated values, as ``model.load_base.LoadSite`` says, and no loop is closed fo
 A path followed one way from a closed state and tabulated: closed states and the terms of its equation of motion, place by place.
 
 Places are distances of the coordinate from the start. Change points are leapt over where that can be proved (see
-``maths.singular_point``), and otherwise passed by the careful march, or the table ends.
+``maths.singular_point``), and otherwise passed by the careful march, or the table ends. Where the compiled kernel serves, it follows the
+path between them and evaluates the terms.
 
 Stages along a path, for mobility 1: what the equation of motion needs is tabulated once along the path, which is then cheap to follow.
 
@@ -41,6 +42,7 @@ from typing import Any
 
 import numpy as np
 
+from mechgraph.by_kernel import COMPILED
 from mechgraph.errors import DeclarationError
 from mechgraph.force.loads import NOT_FINITE, Site, user_poses, user_twists
 from mechgraph.kinematics.motion_path import DriverPath
@@ -55,6 +57,7 @@ from mechgraph.maths.track import Interpolation, Nodes, Paths
 from mechgraph.maths.tracker import End, Follower
 from mechgraph.model.loads import Load
 from mechgraph.response.charts import Task
+from mechgraph.response.kernel_rates import KernelPath
 from mechgraph.response.motion_equations import MASSLESS, Closed, Loads, Stopped, along_one
 
 OF_LOADS = 4
@@ -231,8 +234,10 @@ class Piece:
 class Way:
     """The path from a closed state ``x (nx,)`` on; tabulated up to ``length``, and no further where it is ``closed``."""
 
-    def __init__(self, path: DriverPath, terms: AlongTerms, x: Array, sense: float) -> None:
-        self.path, self.terms, self.sense = path, terms, sense
+    def __init__(
+        self, path: DriverPath, terms: AlongTerms, x: Array, sense: float, kernel: KernelPath | None = None
+    ) -> None:
+        self.path, self.terms, self.sense, self.kernel = path, terms, sense, kernel
         self.begin = float(x[path.rows[0]])
         path.variant_of = np.zeros(1, dtype=np.intp)
         self.follower = Follower(path)
@@ -243,6 +248,10 @@ class Way:
         self._starts: list[float] = []
         here = Paths([self._drives(np.zeros(2))])
         self._nodes = self.follower.follow(x[:, None], here).nodes
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the kernel, a thing of this process: numpy tabulates what is asked for later."""
+        return vars(self) | {"kernel": None}
 
     def piece(self, at: float) -> Piece:
         """The piece in which a place lies."""
@@ -273,9 +282,12 @@ class Way:
         """Follow the path to a place, or to where it cannot be followed on."""
         there = goal - PATH.shortest  # by rounding the last node may lie before the goal
         while not self._ended and self._reached < there:
-            self._take(self._march(goal, careful=False), [])
+            begin = self._reached
+            self._take(self._march(goal, careful=False) if self.kernel is None else self._led(self.kernel, goal), [])
             if self._reached >= there or self._known() < self._reached:
                 return
+            if self.kernel is not None and self._reached > begin:
+                continue
             self.follower.paths = Paths([self._drives(np.array([0.0, goal]))])
             found = leapt(self.follower, self._nodes)
             if found is not None:
@@ -297,6 +309,22 @@ class Way:
         paths = Paths([self._drives(np.array([start, goal]))])
         found = self.follower.follow(last.x, paths, first, last.which, careful).nodes
         return replace(found, place=start + found.place)
+
+    def _led(self, kernel: KernelPath, goal: float) -> Nodes:
+        """Nodes from the last one on by the kernel, up to where the form of the equations there serves no more."""
+        last = self._nodes.take(np.array([-1]))
+        at, x = kernel.nodes(last.x[:, 0], float(self._drives(np.array([goal]))[0, 0]))
+        if not at.size:
+            return last.take(np.zeros(0, dtype=np.intp))
+        at += last.place
+        track, drive = np.zeros(len(at), dtype=np.intp), self._drives(at)
+        found = self.follower.newton.nodes(x, drive, track, np.repeat(last.which, len(at)), PATH.node)
+        same = found.done & (found.which == last.which) & (found.correction <= PATH.node)
+        poor = ~(found.condition <= PATH.fair)
+        serves = np.cumsum(np.concatenate([[False], poor])[:-1] | ~same) == 0
+        nodes = Nodes.closed(found, drive, track, at, sure=True).take(serves)
+        renewed = self.follower.renewed(nodes)
+        return Nodes.join([nodes, renewed.take(renewed.which != nodes.which)])
 
     def _take(self, nodes: Nodes, crossings: list[Crossing]) -> None:
         """Add nodes, without another one of the form and place of the last, and crossings."""
@@ -324,15 +352,23 @@ class Way:
 
     def states(self, at: Array) -> tuple[Array, Index]:
         """Closed states ``(nx, T)`` at places ``(T,)``, and their forms."""
-        u, track = self._drives(at), np.zeros(len(at), dtype=np.intp)
-        step = self._interpolation.find(track, at)
-        x = self._interpolation(step, at, u)
-        found = self.follower.newton.close(x, u, track, self._nodes.which[self._interpolation.left[step]])
+        x, u, step = self._predicted(at)
+        which = self._nodes.which[self._interpolation.left[step]]
+        found = self.follower.newton.close(x, u, np.zeros(len(at), dtype=np.intp), which)
         x = found.x.copy()
         for c in self.crossings:
             near = np.abs(at - c.place) < WINDOW
             x[:, near] = c.states(at[near])
         return x, found.which
+
+    def _predicted(self, at: Array) -> tuple[Array, Array, Index]:
+        """States ``(nx, T)`` interpolated at places ``(T,)``, path values ``(1, T)`` there and the steps in which they lie."""
+        u, step = self._drives(at), self._interpolation.find(np.zeros(len(at), dtype=np.intp), at)
+        return self._interpolation(step, at, u), u, step
+
+    def _beside_crossings(self, at: Array) -> bool:
+        """Whether a place ``(T,)`` is so near to a change point that its state is interpolated."""
+        return any((np.abs(at - c.place) < WINDOW).any() for c in self.crossings)
 
     def _tabulated(self, begin: float, end: float) -> list[Piece]:
         """Pieces between two places with their series, halved until these have converged."""
@@ -377,17 +413,28 @@ class Way:
         """Series ``(spans, POINTS, 4 + m)`` over spans of places, how steep the path is in each, and the noise of the series."""
         nodes = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
         at = np.concatenate([0.5 * (a + b) + 0.5 * (b - a) * nodes for a, b in spans])
+        values, steepness, condition = self._tabulated_at(at)
+        values, steepness, condition = (
+            part.T.reshape(len(spans), POINTS, *part.shape[:-1]) for part in (values, steepness, condition)
+        )
+        T = np.polynomial.chebyshev.chebvander(nodes, POINTS - 1) * (2.0 / POINTS)
+        T[:, 0] *= 0.5
+        # rounding over the square of the distance from a singular position, which the condition measures
+        noise = COEFFICIENT_NOISE * condition.max(axis=1) ** 2
+        return np.einsum("pk,spq->skq", T, values), steepness.max(axis=1), noise
+
+    def _tabulated_at(self, at: Array) -> tuple[Array, Array, Array]:
+        """Terms ``(4 + m, T)`` at places ``(T,)``, how steep the path is there and the condition ``(T,)``."""
+        x, u, _ = self._predicted(at)
+        if self.kernel is not None and not len(self.terms.sizes) and not self._beside_crossings(at):
+            found = self.kernel.terms(x, u[0])
+            if found is not None:
+                return found
         x, which = self.states(at)
         here = Configuration(self.path.system, x)
         f = self.path.solver.factored(here, which)
-        values = self.terms.tabulated(here, f).T.reshape(len(spans), POINTS, -1)
-        T = np.polynomial.chebyshev.chebvander(nodes, POINTS - 1) * (2.0 / POINTS)
-        T[:, 0] *= 0.5
         singles = self.path.system.single_rows >= 0
-        steepness = np.abs(f.sensitivity()[singles, 0]).max(axis=0).reshape(len(spans), POINTS).max(axis=1)
-        # rounding over the square of the distance from a singular position, which the condition measures
-        noise = COEFFICIENT_NOISE * (f.condition**2).reshape(len(spans), POINTS).max(axis=1)
-        return np.einsum("pk,spq->skq", T, values), steepness, noise
+        return self.terms.tabulated(here, f), np.abs(f.sensitivity()[singles, 0]).max(axis=0), f.condition
 
 
 def _coarse(c: Array, noise: float) -> bool:
@@ -436,14 +483,15 @@ class Arc:
         self.begin, self.rate = float(x[s.single_rows[self.column]]), float(dq[self.column])
         self._first_way = 1 if self.rate >= 0.0 else -1
         self.terms = AlongTerms(s, task.loads)
-        self._ways = {sense: Way(self.path, self.terms, x, float(sense)) for sense in (1, -1)}
+        kernel = None if task.library is None else KernelPath(task.library, s, self.column, x, self.terms.smooth)
+        self._ways = {sense: Way(self.path, self.terms, x, float(sense), kernel) for sense in (1, -1)}
         self.advance: Array | None = None
         """What a turn adds to the state where it comes back then; None while it does not."""
         self._sense = 1.0
 
     def piece(self, u: float) -> tuple[Piece, float] | None:
         """The piece in which a place lies, and the whole turns by which the place is further on; None where the table ends before."""
-        turns = float(self._turns(np.array([u]))[0])
+        turns = 0.0 if self.advance is None else self._sense * math.floor(self._sense * (u - self.begin) / self.turn)
         u -= self.turn * turns
         way = self._ways[(u > self.begin) - (u < self.begin) or self._first_way]
         at = way.sense * (u - self.begin)
@@ -510,6 +558,7 @@ class PathStage:
 
     def __init__(self, arc: Arc, t: float, u: float, v: float) -> None:
         self.arc, self.task, self._first = arc, arc.task, np.array([u, v, 0.0])
+        self.engine = self.task.engine if self.task.library is None else COMPILED
         self._piece: Piece | None = None
         self._turns = 0.0
         self._mass, smooth, *_ = (terms := self._terms(u)).tolist()
@@ -517,11 +566,6 @@ class PathStage:
             raise Stopped(AT_DEAD_POINT)
         stored, rest = self._forces(terms, v, np.array([t]))
         self.energy = 0.5 * self._mass * v * v + abs(smooth + float(stored[0] + rest[0])) or 1.0
-
-    @property
-    def engine(self) -> str:
-        """See ``Stage``."""
-        return self.task.engine
 
     def begin(self) -> Array:
         """See ``Stage``."""
@@ -539,7 +583,7 @@ class PathStage:
             w = u - self.arc.turn * turns
         z = (2.0 * w - piece.begin - piece.end) / (piece.end - piece.begin)
         # Chebyshev polynomials by their angles: one cosine each
-        angle = np.arccos(min(1.0, max(-1.0, z)))
+        angle = math.acos(min(1.0, max(-1.0, z)))
         return np.cos(_ORDERS * angle) @ piece.series
 
     def _forces(self, terms: Array, v: float, t: Array) -> tuple[Array, Array]:

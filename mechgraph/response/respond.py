@@ -284,7 +284,7 @@ def respond(
         Longest step. Steps end at the ``breaks`` of loads. A look at 2,000 times between begin and end finds loads that steps missed; a
         shorter pulse needs its ``breaks``, or ``max_step``.
     engine : {"auto", "dense", "sparse", "compiled"}
-        As in ``solve``; the kernel finds the accelerations of several independent freedoms.
+        As in ``solve``; the kernel finds the accelerations of independent freedoms, and tabulates the path of a single one.
     events : Event or iterable of Event, optional
         Watched quantities; a terminal event ends the motion.
     stops : Stop or iterable of Stop, optional
