@@ -1,5 +1,7 @@
 """A mechanism that stays hot: what a call gives beside ``solve``, its state, parameters, derivatives and refusals."""
 
+import copy
+import pickle
 import threading
 from dataclasses import replace
 
@@ -251,6 +253,23 @@ def test_copies_run_in_threads():
     copies[1].parameters["link3.mass"] = 2 * c.parameters["link3.mass"]
     assert copies[1](q)[0] != c(q)[0]
     assert "link3.mass" not in c.parameters.wanted
+
+
+@pytest.mark.parametrize("other", [copy.copy, copy.deepcopy, lambda c: pickle.loads(pickle.dumps(c))])
+def test_what_is_copied_or_sent_has_a_state_of_its_own(other):
+    c = mg.compile(mg.load("four-bar"))
+    c.parameters["crank.mass"] = 2.0
+    for q in (0.3, c.tables.home + np.linspace(0.0, 0.3, 4)[:, None]):
+        c(q, 1.0)
+        d = other(c)
+        assert np.array_equal(d.reaction("C"), c.reaction("C"), equal_nan=True)
+        assert (d.link("rocker") == c.link("rocker")).all()
+        here = c.position("A")
+        assert (d(q, 1.0) == c(q, 1.0)).all()
+        d(0.5)
+        assert (c.position("A") == here).all()
+        assert d.parameters.wanted == {"crank.mass": 2.0}
+        assert np.shape(d.status) == ()
 
 
 def test_what_is_not_carried_is_named():

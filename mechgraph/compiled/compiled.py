@@ -124,6 +124,7 @@ class _Room:
     def __init__(self, of: Compiled, n: int, state: Array) -> None:
         t, self.of, self.n, self.state = of.tables, of, n, state
         self.motion, self.effort = np.zeros((3, n, len(t.drives))), np.zeros((n, len(t.drives)))
+        self.numbers = memoryview(self.motion.reshape(-1))  # numbers are put in faster than by numpy
         self.reaction, self.position = np.zeros((n, len(t.m.pairs), 6)), np.zeros((n, t.system.n_freedoms))
         self.poses, self.status = np.zeros((n, len(t.m.links), 3, 4)), np.zeros(n, dtype=np.intc)
         self.library = _functions()
@@ -143,12 +144,9 @@ class _Room:
         for values in (self.effort, self.reaction, self.position):
             values[:] = np.nan
 
-    def copied(self, of: Compiled) -> _Room:
-        """The same of another mechanism."""
-        out = _Room(of, self.n, of.state)
-        for name in ("motion", "effort", "reaction", "position", "poses", "status"):
-            getattr(out, name)[:] = getattr(self, name)
-        return out
+    def values(self) -> tuple[Array, ...]:
+        """The motion and the results."""
+        return self.motion, self.effort, self.reaction, self.position, self.poses, self.status
 
 
 class Compiled:
@@ -174,7 +172,7 @@ class Compiled:
     (('O1.Rz',), (6,))
     """
 
-    def __init__(self, tables: Tabled, like: Compiled | None = None) -> None:
+    def __init__(self, tables: Tabled, kept: Mapping[str, Any] | None = None) -> None:
         self.tables, self.drives, self.I = tables, tables.drives, tables.I
         size = _functions().mgk_state_size(self.I.ctypes.data) // 8 + 1
         self.P, self.home, self.state = tables.P.copy(), np.zeros(size), np.zeros(size)
@@ -182,16 +180,17 @@ class Compiled:
         self._parameters = Parameters(tables)
         self._one, self._single = _Room(self, 1, self.state), True
         self._last = self._one
-        if like is None:
+        if kept is None:
             _functions().mgk_start(*(part.ctypes.data for part in (self.I, self.P, self.home)))
             self.start()
             return
-        for mine, theirs in ((self.P, like.P), (self.home, like.home), (self.state, like.state)):
-            mine[:] = theirs
-        self._values, self._parameters = dict(like._values), Parameters(tables, like.parameters.wanted)
-        self._single, self._last = like._single, like._last.copied(self)
-        if self._single:
-            self._one = self._last
+        self._values, self._parameters = dict(kept["set"]), Parameters(tables, kept["wanted"])
+        self._single = kept["single"]
+        if not self._single:
+            self._last = _Room(self, len(kept["results"][-1]), self.state)
+        mine = self.P, self.home, self.state, *self._last.values()
+        for array, value in zip(mine, (*kept["numbers"], *kept["results"]), strict=True):
+            array[:] = value
 
     def copy(self) -> Compiled:
         """Return an independent copy with its own state, parameters and results.
@@ -200,7 +199,19 @@ class Compiled:
         -------
         Compiled
         """
-        return Compiled(self.tables.copy(), self)
+        return Compiled(self.tables.copy(), self._kept())
+
+    __copy__ = copy
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Compiled, (self.tables, self._kept())
+
+    def _kept(self) -> dict[str, Any]:
+        """What is its own: numbers that were set and are wanted, states, and the last results."""
+        return {
+            "set": self._values, "wanted": self._parameters.wanted, "single": self._single,
+            "numbers": (self.P, self.home, self.state), "results": self._last.values(),
+        }  # fmt: skip
 
     @property
     def parameters(self) -> Parameters:
@@ -242,11 +253,11 @@ class Compiled:
         """
         room = self._one
         if type(q) is type(velocity) is type(acceleration) is float and len(self.tables.drives) == 1:
-            single, motion = True, room.motion
-            motion[0], motion[1], motion[2] = q, velocity, acceleration
+            single, numbers = True, room.numbers
+            numbers[0], numbers[1], numbers[2] = q, velocity, acceleration
         else:
             room, single = self._read(q, velocity, acceleration)
-        status = self._led() if self._values != self.parameters.wanted else 0
+        status = self._led() if self._values != self._parameters.wanted else 0
         if status:
             room.refuse(status)
         elif room.run():
