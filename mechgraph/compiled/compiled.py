@@ -124,7 +124,7 @@ class _Room:
     def __init__(self, of: Compiled, n: int, state: Array) -> None:
         t, self.of, self.n, self.state = of.tables, of, n, state
         self.motion, self.effort = np.zeros((3, n, len(t.drives))), np.zeros((n, len(t.drives)))
-        self.numbers = memoryview(self.motion.reshape(-1))  # numbers are put in faster than by numpy
+        self.numbers: Any = self.motion.reshape(-1).data  # numbers are put in faster than by numpy
         self.reaction, self.position = np.zeros((n, len(t.m.pairs), 6)), np.zeros((n, t.system.n_freedoms))
         self.poses, self.status = np.zeros((n, len(t.m.links), 3, 4)), np.zeros(n, dtype=np.intc)
         self.library = _functions()
@@ -144,7 +144,7 @@ class _Room:
         for values in (self.effort, self.reaction, self.position):
             values[:] = np.nan
 
-    def values(self) -> tuple[Array, ...]:
+    def values(self) -> tuple[Any, ...]:
         """The motion and the results."""
         return self.motion, self.effort, self.reaction, self.position, self.poses, self.status
 
