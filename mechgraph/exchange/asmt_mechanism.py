@@ -438,7 +438,7 @@ class Builder(Standing):
         for link, X in zip(links, (A, B), strict=True):
             own = self.own(link, X)
             markers.append(Marker(tuple(own[:, 3]), tuple(own[:, 2]), tuple(own[:, 0])))
-        return Pair(name, kind, *links, on_a=markers[0], on_b=markers[1], pitch=pitch)  # type: ignore[arg-type]
+        return Pair(name, kind, *links, on_a=markers[0], on_b=markers[1], pitch=pitch)
 
     # --- motions ---------------------------------------------------------------------------------------------------
 

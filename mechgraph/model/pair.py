@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from functools import partial
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Protocol
@@ -26,7 +26,6 @@ from mechgraph.fields import (
     cosine,
     filled_second,
     parallel_faults,
-    plain,
 )
 from mechgraph.fields import TABLE as NESTED
 from mechgraph.fields import second_direction as second_direction
@@ -288,9 +287,10 @@ class Pair(Described):
     """
 
     name: Annotated[str, TEXT("freedoms are named NAME.Rz and so on")]
-    type: Annotated[PairType, TEXT("R P H C U S E Sc Sg Cp Sp Tc Fr W, with a curve Ps Kc, or a `[[pair_type]]`")]
+    type: Annotated[Any, TEXT("R P H C U S E Sc Sg Cp Sp Tc Fr W, with a curve Ps Kc, or a `[[pair_type]]`")]
     a: Annotated[str, LINK_NAME("first link; groove, plane and slot belong to it; the reaction is that of `a` on `b`")]
     b: Annotated[str, LINK_NAME("second link")]
+    _: KW_ONLY
     point: Annotated[Any, POINT("a point of the pair, global, at the declared configuration", LENGTH)] = None
     axis: Annotated[
         Any,
@@ -341,82 +341,50 @@ class Pair(Described):
     asked_point: ClassVar[Any] = None
     """The point as it was given, where the pair travels on a curve or surface and ``point`` is the nearest place on it."""
 
-    def __init__(
-        self,
-        name: str,
-        type: str | PairType,
-        a: str,
-        b: str,
-        *,
-        point: Any = None,
-        axis: Any = None,
-        second: Any = None,
-        pitch: float | None = None,
-        lead: float | None = None,
-        on_a: Marker | None = None,
-        on_b: Marker | None = None,
-        closed: str = "",
-        radius: float | None = None,
-        hertz: Hertz | None = None,
-        curve: Curve | None = None,
-        curve_b: Curve | None = None,
-        roller: float | None = None,
-        surface: Surface | None = None,
-    ) -> None:
-        row = row_of(type, curve, surface)
-        point, axis, second, roller = plain(point), plain(axis), plain(second), plain(roller)
-        if (curve is not None or surface is not None) and point is None and isinstance(on_a, Marker):
-            point, axis = on_a.point, on_a.axis
-        apart = on_b.pose() if isinstance(on_b, Marker) and not on_b.faults("", 1.0) else None
-        contact = None
-        if curve is not None or surface is not None:
+    def __post_init__(self) -> None:
+        self.read_numbers()
+        put = partial(object.__setattr__, self)
+        put("type", row_of(self.type, self.curve, self.surface))
+        if self.curve is not None or self.surface is not None:
             try:
-                contact = self._placed(name, row, curve, curve_b, roller, surface, point, axis, apart)
+                contact = self._on_its_shape()
             except ShapeError as error:
-                raise error.of(name) from error.__cause__
-        if contact is not None:
-            object.__setattr__(self, "contact", contact)
-            object.__setattr__(self, "asked_point", point if on_b is None else None)
-            row, (second, _, axis, point) = contact.row, map(tuple, contact.marker.T.tolist())
-            if on_b is not None:
-                on_a, point, axis, second = Marker(point, axis, second), None, None, None
-            if contact.marker_b is not None:
-                x, _, z, at = contact.marker_b.T.tolist()
-                on_b = Marker(at, z, x)
-        if axis is None and point is not None and isinstance(row, PairType) and not row.directed:
-            axis = (0.0, 0.0, 1.0)
-        if second is None:
-            second = filled_second(axis)
-        placed = (point, axis, second, plain(pitch), plain(lead), on_a, on_b)
-        values: tuple[Any, ...] = (
-            name,
-            row,
-            a,
-            b,
-            *placed,
-            closed,
-            plain(radius),
-            hertz,
-            curve,
-            curve_b,
-            roller,
-            surface,
-        )
-        for key, value, default in zip(self.formats, values, self._defaults, strict=True):
-            if value is not default:  # what a pair does not say stands in the class
-                object.__setattr__(self, key, value)
+                raise error.of(self.name) from error.__cause__
+            if contact is not None:
+                self._place(contact)
+        if self.axis is None and self.point is not None and isinstance(self.type, PairType) and not self.type.directed:
+            put("axis", (0.0, 0.0, 1.0))
+        if self.second is None:
+            put("second", filled_second(self.axis))
 
-    @staticmethod
-    def _placed(
-        name: str, row: Any, curve: Any, curve_b: Any, roller: Any, surface: Any, point: Any, axis: Any, on_b: Any
-    ) -> Contact | None:
-        """The row with the curves or the surface that are given; None without, or with faults."""
+    def _on_its_shape(self) -> Contact | None:
+        """The row with the curves or the surface that are given; None where they have faults."""
+        row, point, axis, on_a, on_b = self.type, self.point, self.axis, self.on_a, self.on_b
+        if point is None and isinstance(on_a, Marker):
+            point, axis = on_a.point, on_a.axis
         towards = axis if point is not None else None
+        apart = on_b.pose() if isinstance(on_b, Marker) and not on_b.faults("", 1.0) else None
+        curve, surface, curve_b, roller = self.curve, self.surface, self.curve_b, self.roller
         if isinstance(curve, Curve) and not curve_faults(row, curve, curve_b, roller, point, ""):
-            return in_contact(row, curve, curve_b, roller, point, towards, name, on_b)
+            return in_contact(row, curve, curve_b, roller, point, towards, self.name, apart)
         if curve is None and isinstance(surface, Surface) and not surface_faults(row, surface, point, "", roller):
-            return on_surface(row, surface, point, towards, name, on_b, roller)
+            return on_surface(row, surface, point, towards, self.name, apart, roller)
         return None
+
+    def _place(self, contact: Contact) -> None:
+        """Put the pair where its curve or surface is nearest to the place that was asked for."""
+        on_a, on_b = self.on_a, self.on_b
+        point = on_a.point if self.point is None and isinstance(on_a, Marker) else self.point
+        second, _, axis, at = map(tuple, contact.marker.T.tolist())
+        placed = {"contact": contact, "asked_point": point if on_b is None else None, "type": contact.row}
+        if on_b is None:
+            placed |= {"point": at, "axis": axis, "second": second}
+        else:
+            placed |= {"point": None, "axis": None, "second": None, "on_a": Marker(at, axis, second)}
+        if contact.marker_b is not None:
+            x, _, z, at = contact.marker_b.T.tolist()
+            placed["on_b"] = Marker(at, z, x)
+        vars(self).update(placed)
 
     def replace(self, **changes: Any) -> Pair:
         """A copy with fields changed; a point that is off its curve or surface stays so, to be refused by the mechanism."""
@@ -442,17 +410,8 @@ class Pair(Described):
     @property
     def says_more(self) -> bool:
         """Whether it says more than its type and where it sits."""
-        return not (
-            self.pitch is None
-            and self.lead is None
-            and self.radius is None
-            and self.hertz is None
-            and self.curve is None
-            and self.curve_b is None
-            and self.roller is None
-            and self.surface is None
-            and self.closed is Pair.closed
-        )
+        said = (self.pitch, self.lead, self.radius, self.hertz, self.curve, self.curve_b, self.roller, self.surface)
+        return any(one is not None for one in said) or self.closed is not Pair.closed
 
     @property
     def curves(self) -> dict[str, Any]:
