@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from mechgraph.errors import DeclarationError
 from mechgraph.maths.se3 import Array
+from mechgraph.maths.tolerances import SHAPES
 from mechgraph.quantities import (
     LENGTH,
     PURE,
@@ -35,11 +36,6 @@ from mechgraph.quantities import (
     without_units,
     wrong,
 )
-
-PARALLEL_COSINE = 1 - 1e-12
-"""Cosine above which a second direction is parallel to the axis."""
-MOST_TOL = 0.1
-"""Largest tolerance: beyond, a change is no rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +105,7 @@ def cosine(one: Sequence[float], other: Sequence[float]) -> float:
 
 def parallel_faults(axis: Sequence[float], second: Sequence[float], where: str) -> list[str]:
     """A second direction that has no part at right angles to its axis, one line or none."""
-    if abs(cosine(axis, second)) <= PARALLEL_COSINE:
+    if abs(cosine(axis, second)) <= 1 - SHAPES.parallel:
         return []
     return [f"{where}second = {second!r}: parallel to the axis {axis!r}; give another direction"]
 
@@ -130,8 +126,8 @@ def sound_tol(tol: Any) -> float:
 
 def tolerance_fault(tol: Any) -> str | None:
     """The fault of a tolerance of a whole mechanism, or None."""
-    good = is_numeric(tol, ()) and 0 < tol <= MOST_TOL
-    return None if good else wrong(tol, "tol", f"radians and lengths / L, above 0 and at most {MOST_TOL:g}")
+    good = is_numeric(tol, ()) and 0 < tol <= 0.1  # beyond, a change is no rounding
+    return None if good else wrong(tol, "tol", "radians and lengths / L, above 0 and at most 0.1")
 
 
 def same(a: Any, b: Any) -> bool:

@@ -339,10 +339,6 @@ def _groups(contours: int, most: int | None) -> Iterator[SystemGroup]:
                 yield SystemGroup(family, contours, (c1, c2, c3, c4, c5), links)
 
 
-FIELDS = ("links", "joints", "types", "family")
-"""What a saved chain holds."""
-
-
 @door
 def atlas(
     links: Annotated[int, at_least(2)],
@@ -448,7 +444,7 @@ def save_chains(chains: Iterable[Chain], path: str | PathLike[str]) -> int:
     for c in chains:
         if not isinstance(c, Chain):
             raise DeclarationError("save_chains", [wrong(c, f"chains[{len(lines)}]", "a Chain")])
-        lines.append(json.dumps({name: getattr(c, name) for name in FIELDS}))
+        lines.append(json.dumps({name: getattr(c, name) for name in ("links", "joints", "types", "family")}))
     write_whole(path, (f"{line}\n" for line in lines))
     return len(lines)
 

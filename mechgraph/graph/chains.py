@@ -144,13 +144,11 @@ def symmetries(orders: Sequence[Order]) -> list[Order]:
 
 Code = tuple[Any, ...]
 Edge = tuple[int, int, Hashable]
-FAMILIES = range(6)
-"""Freedoms that no link may have, of the six in space."""
 
 
 def family_faults(family: Any) -> list[str]:
     """What is wrong with a family, one line or none."""
-    return [] if type(family) is int and family in FAMILIES else [wrong(family, "family", "a whole number from 0 to 5")]
+    return [] if type(family) is int and family in range(6) else [wrong(family, "family", "a whole number from 0 to 5")]
 
 
 def data_faults(data: Any) -> list[str]:
@@ -529,8 +527,6 @@ def _contractions(level: list[Contracted], one_block: bool) -> Iterator[Contract
 
 Rows = NDArray[np.int64]
 Word = tuple[int, ...]
-PLANAR = 3
-"""The family of planar chains."""
 
 
 @dataclass(frozen=True)
@@ -712,7 +708,7 @@ def _is_greatest(graph: Contracted, words: Sequence[Word], images: Sequence[Orde
 
 def _turns_in_loops(graph: Contracted, joint_nodes: frozenset[int], words: Sequence[Word], kind: ChainKind) -> bool:
     """Whether a planar chain turns: with fewer than two turns a loop only slides, and is of family 4."""
-    if kind.family != PLANAR:
+    if kind.family != 3:  # planar
         return True
     turns = np.array([sum(any(f.turns for f in kind.types[i].freedoms) for i in word) for word in words])
     sets, loops, touched = graph.rings

@@ -199,3 +199,25 @@ class PathTolerances:
 
 
 PATH = PathTolerances()
+
+
+@dataclass(frozen=True)
+class ShapeTolerances:
+    """When what is declared of shapes and places counts as met. Lengths over the extent of the shape, angles in radians."""
+
+    met: float = 1e-6
+    """Distance of a pair from its curve or surface, of gears from where their teeth ask for, of a second direction from the right angle;
+    more where the mechanism is declared with a larger ``tol``."""
+    even: float = 1e-9
+    """Spread of tangents up to which a curve is straight or plane, gap at which it is closed, angle by which its frame comes back turned,
+    and difference of two curvatures: seven digits above rounding."""
+    standstill: float = 1e-7
+    """Part of its greatest speed below which a curve stands still, as at a cusp."""
+    place: float = 1e-14
+    """Part of the greatest length to which a place found on a shape is rounded, so that the place of that place is the same: some fifty
+    roundings."""
+    parallel: float = 1e-12
+    """What the cosine between axis and second direction lacks of one where they are parallel."""
+
+
+SHAPES = ShapeTolerances()

@@ -21,6 +21,7 @@ import numpy as np
 
 from mechgraph.fields import COEFFICIENTS, FREEDOM_NAME, NUMBER, TEXT, Described, number_fault, plain, sound_tol
 from mechgraph.maths.se3 import Array, cross
+from mechgraph.maths.tolerances import SHAPES
 from mechgraph.model.pair import Marker, Nameable, Pair
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.quantities import LENGTH, PURE, is_numeric, shown, without_units, wrong
@@ -195,10 +196,6 @@ def _read_terms(given: Any) -> Any:
 
 def _is_terms(terms: Any) -> bool:
     return isinstance(terms, tuple) and all(isinstance(term, tuple) and len(term) == 2 for term in terms)
-
-
-FITTING = 1e-6
-"""Part of a length, or angle, by which gears may miss the place that their teeth ask for; twice the tolerance of the mechanism if more."""
 
 
 class Axes(NamedTuple):
@@ -427,7 +424,7 @@ def _turned_about(m: Any, steps: tuple[Step, ...], fitting: float) -> tuple[Arra
 
 def fitting_of(m: Any) -> float:
     """Part of a length, or angle, by which gears may miss their place in a mechanism."""
-    return max(FITTING, 2.0 * sound_tol(m.tol))
+    return max(SHAPES.met, 2.0 * sound_tol(m.tol))
 
 
 def _are_placed(m: Any) -> bool:

@@ -24,7 +24,6 @@ from mechgraph.fields import (
     BY_FREEDOM,
     FACTS,
     NUMBER,
-    PARALLEL_COSINE,
     TABLE,
     TABLES,
     TEXT,
@@ -34,6 +33,7 @@ from mechgraph.fields import (
 )
 from mechgraph.maths.inertia import physical
 from mechgraph.maths.se3 import Array
+from mechgraph.maths.tolerances import SHAPES
 from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.gears import rim_faults
 from mechgraph.model.loads import LOADS, Load
@@ -407,7 +407,7 @@ def _pairs_are_sound(pairs: Sequence[Pair], tol: float) -> bool:
         return False
     markers = [*by_point, *(p.on_a for p in by_markers), *(p.on_b for p in by_markers)]
     square = np.array([p.type.square_second for p in (*by_point, *by_markers, *by_markers)], dtype=bool)
-    return _markers_are_sound(markers, np.where(square, largest_cosine(tol), PARALLEL_COSINE))
+    return _markers_are_sound(markers, np.where(square, largest_cosine(tol), 1 - SHAPES.parallel))
 
 
 def _markers_are_sound(markers: Sequence[Any], most: Array) -> bool:

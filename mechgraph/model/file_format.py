@@ -224,8 +224,6 @@ SHARED = {
     **_series_of("vector_series", "Three numbers, or an array of such, one a position.", _array(3)),
 }
 """Values that many fields share."""
-SCHEMA_WIDTH = 130
-"""Longest line of the stored schema that is not broken."""
 MARK = re.compile(r"(<!-- fields: ([\w, ]+) -->\n)(?:\|[^\n]*\n)*")
 """Where the Markdown of the library takes a table of fields: a comment, and the table below it."""
 
@@ -250,7 +248,8 @@ def schema_text() -> str:
 def laid_out(value: Any, depth: int = 0) -> str:
     """JSON in which what fits in a line stands in one."""
     line = json.dumps(value, ensure_ascii=False)
-    if (depth + len(line) <= SCHEMA_WIDTH and depth > 0) or not isinstance(value, dict | list):
+    # longest line of the stored schema that is not broken
+    if (depth + len(line) <= 130 and depth > 0) or not isinstance(value, dict | list):
         return line
     inner, outer = "\n" + "  " * (depth + 1), "\n" + "  " * depth
     if isinstance(value, list):

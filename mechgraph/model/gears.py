@@ -19,8 +19,6 @@ from mechgraph.quantities import LENGTH, PURE, wrong
 _TEETH = TWO_WHOLE("numbers of teeth of both gears")
 _PRESSURE = NUMBER("of the flanks, in the normal section", PURE, degrees=True, minimum=0.0)
 _FULL = float(np.deg2rad(20.0))
-ONE_HELIX = 0.02
-"""Radians by which the helix angles of one gear in two meshes may differ: more than tolerances, less than another hand."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +134,9 @@ def rim_faults(couplings: Iterable[BaseCoupling], m: Any) -> Iterator[str]:
             if i == first:
                 continue
             (one, q, helix), (two, _, other) = (meshes[k] for k in sorted((i, first)))
-            if abs(helix - other) > ONE_HELIX:
+            # radians by which the helix angles of one gear in two meshes may differ: more than
+            # tolerances, less than another hand
+            if abs(helix - other) > 0.02:
                 yield (
                     f"couplings {one.name!r} and {two.name!r}: the {teeth:g} teeth on {q!r} would have the helix angle {helix:.7g} "
                     f"in one and {other:.7g} in the other (gear b has the opposite of helix_angle, in an internal pair the same); "

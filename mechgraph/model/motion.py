@@ -7,6 +7,7 @@ gives the position alone it is differentiated by Chebyshev interpolation, to a s
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Protocol
@@ -24,12 +25,6 @@ from mechgraph.quantities import LENGTH, PURE, TIME, has_quantity, real_array, s
 
 Rates = tuple[Array, Array, Array]
 """Position, velocity, acceleration."""
-
-RANGE_TOLERANCE = 1e-12
-"""Times may leave the range of the samples by this part of its length (rounding) and count as its end."""
-
-SINGLE_TIME_RANGES = 7
-"""How many ranges, each a tenth of the one before, are tried about one single time."""
 
 
 def read_series(value: Any, what: str, faults: list[str]) -> Array:
@@ -135,7 +130,8 @@ class Sampled:
             raise LawFault(
                 f"degree must be 3 (from 4 samples) or 5 (from 6), got {shown(degree)} with {times.size} samples"
             )
-        margin = RANGE_TOLERANCE * (times[-1] - times[0])
+        # times may leave the range of the samples by this part of its length (rounding) and count as its end
+        margin = 1e-12 * (times[-1] - times[0])
         outside = t[(t < times[0] - margin) | (t > times[-1] + margin)]
         if outside.size:
             span = f"{times[0]:g} to {times[-1]:g}"
@@ -227,7 +223,8 @@ class Smooth:
                 return position, *derivatives(self.position, t, position, low, high)
             except NotSmooth as found:
                 raise _not_smooth(found.t) from None
-        halves = [max(1.0, abs(low)) / 2.0 / 10.0**k for k in range(SINGLE_TIME_RANGES)]
+        # ranges that are tried about one single time, each a tenth of the one before
+        halves = [max(1.0, abs(low)) / 2.0 / 10.0**k for k in range(7)]
         for half in halves:
             try:
                 with np.errstate(all="ignore"):
@@ -276,13 +273,11 @@ def _not_smooth(t: float) -> LawFault:
     )
 
 
-TURN = 2.0 * np.pi
-
 LAWS: Mapping[str, Law] = {
     "cycloidal": DwellRise(
-        lambda tau: tau - np.sin(TURN * tau) / TURN,
-        lambda tau: 1.0 - np.cos(TURN * tau),
-        lambda tau: TURN * np.sin(TURN * tau),
+        lambda tau: tau - np.sin(math.tau * tau) / math.tau,
+        lambda tau: 1.0 - np.cos(math.tau * tau),
+        lambda tau: math.tau * np.sin(math.tau * tau),
     ),
     "harmonic": DwellRise(
         lambda tau: (1.0 - np.cos(np.pi * tau)) / 2.0,

@@ -16,7 +16,6 @@ from mechgraph.fields import (
     FLAG,
     LINK_NAME,
     NUMBER,
-    PARALLEL_COSINE,
     POINT,
     POINTS,
     POSITIVE,
@@ -31,6 +30,7 @@ from mechgraph.fields import TABLE as NESTED
 from mechgraph.fields import second_direction as second_direction
 from mechgraph.maths.inertia import physical_faults
 from mechgraph.maths.se3 import Array
+from mechgraph.maths.tolerances import SHAPES
 from mechgraph.pairs.contact_types import (
     ROWS,
     Contact,
@@ -175,13 +175,9 @@ class Nameable(Protocol):
         """The full spelling ``"B.Tz"`` of a freedom."""
 
 
-PERPENDICULAR = 1e-6
-"""Largest cosine between axis and second direction that counts as perpendicular where a pair type needs it."""
-
-
 def largest_cosine(tol: float) -> float:
-    """The same in a mechanism whose directions are meant to ``tol``: both directions may be off by so much."""
-    return max(PERPENDICULAR, 2.0 * tol)
+    """Of axis and second direction that count as perpendicular where directions are meant to ``tol``: both may be off by so much."""
+    return max(SHAPES.met, 2.0 * tol)
 
 
 @dataclass(frozen=True)
@@ -468,7 +464,7 @@ class Pair(Described):
             found.append(f"{where}joins link {self.a!r} to itself; a pair joins two links")
         curved = [*shape_faults_of(self, where, tol)]
         found += [*self._pitch_faults(where), *contact_faults(self, where), *curved]
-        most = largest_cosine(tol) if self.type.square_second else PARALLEL_COSINE
+        most = largest_cosine(tol) if self.type.square_second else 1 - SHAPES.parallel
         if self.contact is not None or not curved:  # a curve or surface that is at fault says no markers
             found += self._form_faults(where)
         if self.on_a is not None and self.on_b is not None:

@@ -176,8 +176,6 @@ def _of_sides(m: Mechanism, fields: tuple[str, ...]) -> list[Array]:
 
 
 NOWHERE = (0.0, 0.0, 0.0)
-WEIGHTLESS = (NOWHERE,) * 3
-"""What stands for a center and an inertia that are not declared."""
 
 
 def declared(m: Mechanism) -> Declared:
@@ -185,7 +183,7 @@ def declared(m: Mechanism) -> Declared:
     point, axis, second = _of_sides(m, ("point", "axis", "second"))
     n = len(m.links)
     center = _rows((NOWHERE if link.center is None else link.center for link in m.links), n).T
-    tensors = (WEIGHTLESS if link.inertia is None else link.inertia for link in m.links)
+    tensors = ((NOWHERE,) * 3 if link.inertia is None else link.inertia for link in m.links)
     inertia = _rows(chain.from_iterable(tensors), 3 * n).reshape(n, 3, 3).transpose(1, 2, 0)
     return Declared(
         point[..., None],

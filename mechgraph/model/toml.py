@@ -102,8 +102,6 @@ def _stems(folder: Path) -> tuple[str, ...]:
 
 LONGEST_SWEEP = 1_000_000
 """Longest sweep that a file or the command line may ask for."""
-LATE_END = 1e-9
-"""Part of a step by which the end may come late through rounding and still be excluded."""
 
 
 DIGITS = 12
@@ -133,7 +131,8 @@ def swept(first: float, end: float, step: float) -> Array | str:
         return "no positions: the step leads away from the end; change its sign, or exchange first and end"
     if count > LONGEST_SWEEP:
         return f"{count:.3g} positions, at most {LONGEST_SWEEP} are taken; take a larger step"
-    return np.asarray(first + step * np.arange(max(int(np.ceil(count - LATE_END)), 1)), dtype=float)
+    # part of a step by which the end may come late through rounding and still be excluded
+    return np.asarray(first + step * np.arange(max(int(np.ceil(count - 1e-9)), 1)), dtype=float)
 
 
 LINE_OF_FILE = 120

@@ -10,6 +10,7 @@ Parameter and turn of a minimizing frame are integrals, kept as polynomials (Her
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -20,23 +21,14 @@ import scipy
 
 from mechgraph.fields import second_direction
 from mechgraph.maths.se3 import Array, Library, by_components, cross
-from mechgraph.pairs.curves import CLOSED_GAP, ORDERS, Curve, Pieces, hermite
+from mechgraph.maths.tolerances import SHAPES
+from mechgraph.pairs.curves import ORDERS, Curve, Pieces, hermite
 from mechgraph.quantities import shown
 
-STRAIGHT, IN_PLANE = 1e-9, 1e-9
-"""Spread of the tangents across a direction, and across a plane, up to which a curve is straight or plane."""
-STANDSTILL = 1e-7
-"""Part of its greatest speed below which a curve stands still."""
-GUIDES_TRIED = 200
-"""Directions that are tried as guide of a minimizing frame, or as axis of a sphere."""
 COMPLEX_STEP = 1e-30
 """Imaginary step of a derivative."""
-INTEGRAL_ERROR, INTEGRAL_HALVINGS = 1e-15, 8
-"""Error of an integral over its range that is rounding, and times that an interval is halved for it."""
 GAUSS_NODES, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(6)
 """Rule of an integral over an interval that is short enough for a polynomial of degree 7."""
-NEAREST_STEPS = 40
-"""Steps of Newton's method to the nearest point, at most."""
 
 
 @dataclass(frozen=True)
@@ -89,22 +81,23 @@ class Travel:
     def _guide(self) -> tuple[Array, bool]:
         """The direction near which the third axis of the frame stays, and whether the curve lies in a plane at right angles to it."""
         t = self._rates(self._parameter_at(self.s))[1]
-        axes = np.linalg.svd(t @ t.T)[0]
-        self.is_straight = bool(np.abs(t - t[:, :1]).max() < STRAIGHT)
+
+        def across(normal: Array) -> bool:
+            return bool(np.abs(normal @ t).max() < SHAPES.even)
+
+        self.is_straight = bool(np.abs(t - t[:, :1]).max() < SHAPES.even)
         given = self.curve.guide if self.curve.frame == "guided" else None
         if given is not None:
             d = np.asarray(given, dtype=float) / np.linalg.norm(given)
-            return d, bool(np.abs(d @ t).max() < IN_PLANE)
+            return d, across(d)
         if self.is_straight:
             return np.cross(t[:, 0], second_direction(tuple(t[:, 0].tolist()))), True
         axis = self.curve.normal
-        if axis is not None and (self.curve.frame == "guided" or np.abs(axis @ t).max() < IN_PLANE):
-            return axis, bool(np.abs(axis @ t).max() < IN_PLANE)
-        normal = axes[:, 2]
-        if np.abs(normal @ t).max() < IN_PLANE:
-            return _right_handed(normal, self.curve.at(self.curve.grid)[0]), True
-        if self.curve.frame == "guided":
-            return _right_handed(normal, self.curve.at(self.curve.grid)[0]), False
+        if axis is not None and (self.curve.frame == "guided" or across(axis)):
+            return axis, across(axis)
+        normal = np.linalg.svd(t @ t.T)[0][:, 2]
+        if across(normal) or self.curve.frame == "guided":
+            return _right_handed(normal, self.curve.at(self.curve.grid)[0]), across(normal)
         return far_from(t), False
 
     # --- by arc length -----------------------------------------------------------------------------------------------
@@ -172,7 +165,7 @@ class Travel:
         def strays(begin: Array, end: Array) -> Array:
             half, whole = _integrals(rate, begin, 0.5 * (begin + end)), _integrals(rate, begin, end)
             made = hermite(end - begin, [0 * whole, *rates(begin)], [whole, *rates(end)])
-            return np.asarray(np.abs(_value(made, 0.5 * (end - begin)) - half) > INTEGRAL_ERROR * 2 * np.pi)
+            return np.asarray(np.abs(_value(made, 0.5 * (end - begin)) - half) > 1e-15 * math.tau)
 
         s = _refined(self.s, strays)
         a = np.concatenate([[0.0], np.cumsum(_integrals(rate, s[:-1], s[1:]))])
@@ -198,7 +191,8 @@ class Travel:
     def nearest(self, p: Array) -> tuple[float, float]:
         """Arc length of the point of the curve that is nearest to ``p (3,)``, and its distance."""
         s: Any = self._first(p)
-        for _ in range(NEAREST_STEPS):
+        # steps of Newton's method to the nearest point, at most
+        for _ in range(40):
             x, t, dt, _ = self._rates(self._parameter_at(np.array([s])))
             off = (x - p[:, None])[:, 0]
             slope = 1.0 + off @ dt[:, 0]
@@ -295,9 +289,9 @@ def _integrals(f: Callable[[Array], Array], begin: Array, end: Array) -> Array:
 
 
 def _refined(grid: Array, strays: Callable[[Array, Array], Array]) -> Array:
-    """The grid with intervals halved as long as ``strays(begin, end)`` says so of them."""
+    """The grid with intervals halved, up to eight times, as long as ``strays(begin, end)`` says so of them."""
     begin, end, cuts = grid[:-1], grid[1:], [grid]
-    for _ in range(INTEGRAL_HALVINGS):
+    for _ in range(8):
         bad = strays(begin, end)
         begin, end = begin[bad], end[bad]
         cuts.append(middle := 0.5 * (begin + end))
@@ -326,7 +320,7 @@ def _by_arc_length(curve: Curve) -> tuple[Array, Pieces]:
         made = hermite(half + _integrals(speed, middle, end), [0 * half, *rates[0]], [end - begin, *rates[1]])
         return np.asarray(np.abs(_value(made, half) - (middle - begin)) > most)
 
-    most = INTEGRAL_ERROR * (curve.grid[-1] - curve.grid[0])
+    most = 1e-15 * (curve.grid[-1] - curve.grid[0])  # rounding
     u = _refined(curve.grid, strays)
     s = np.concatenate([[0.0], np.cumsum(_integrals(speed, u[:-1], u[1:]))])
     return s, Pieces.meeting(s, [u, *_parameter_rates(curve.at(u))], orders=1)
@@ -341,9 +335,9 @@ def _right_handed(normal: Array, x: Array) -> Array:
 
 
 def far_from(t: Array) -> Array:
-    """The direction that keeps farthest from all directions ``(3, n)`` and their opposites, of many on a spiral over the sphere."""
-    i = np.arange(GUIDES_TRIED) + 0.5
-    z, angle = 1 - i / GUIDES_TRIED, np.pi * (1 + np.sqrt(5.0)) * i
+    """The direction that keeps farthest from all directions ``(3, n)`` and their opposites, of 200 on a spiral over the sphere."""
+    i = np.arange(200) + 0.5
+    z, angle = 1 - i / 200, np.pi * (1 + np.sqrt(5.0)) * i
     tried = np.stack([np.sqrt(1 - z * z) * np.cos(angle), np.sqrt(1 - z * z) * np.sin(angle), z])
     return np.asarray(tried[:, np.argmin(np.abs(tried.T @ t).max(axis=1))])
 
@@ -353,10 +347,10 @@ def shape_faults(curve: Curve, where: str) -> list[str]:
     x, name = curve.at(curve.grid), where.removesuffix(".")
     v = np.sqrt(_dot(x[1], x[1]))
     turns = _dot(x[1][:, 1:], x[1][:, :-1]) <= 0
-    slow = np.flatnonzero((v < STANDSTILL * v.max()) | np.append(turns, False))
+    slow = np.flatnonzero((v < SHAPES.standstill * v.max()) | np.append(turns, False))
     if slow.size:
         return [
-            f"{name} has a cusp at {_point(x[0][:, slow[0]])} (parameter {curve.grid[slow[0]]:.6g}); end it before that"
+            f"{name} has a cusp at {point_text(x[0][:, slow[0]])} (parameter {curve.grid[slow[0]]:.6g}); end it before that"
         ]
     if curve.roller:
         found = roller_faults(curve, curve.roller, "undercut: ", where)
@@ -365,7 +359,7 @@ def shape_faults(curve: Curve, where: str) -> list[str]:
     if not curve.is_closed:
         return _guide_faults(curve, x[1] / v, x[0], where)
     gap, turn = np.linalg.norm(x[0][:, -1] - x[0][:, 0]), np.linalg.norm(x[1][:, -1] / v[-1] - x[1][:, 0] / v[0])
-    if gap > 1e3 * CLOSED_GAP * np.ptp(x[0], axis=1).max() or turn > 1e-6:
+    if gap > SHAPES.met * np.ptp(x[0], axis=1).max() or turn > SHAPES.met:
         return [
             f"{name} is not closed: its ends are {gap:.3g} apart, their tangents differ by {turn:.3g} rad; let it end where it begins, "
             "or declare it open"
@@ -392,11 +386,11 @@ def roller_faults(curve: Curve, radius: float, what: str, where: str, side: floa
     towards = -outside(curve) if side is None else side
     bend = towards * travel.curvature(travel.s)
     worst = int(np.argmax(bend))
-    if radius * bend[worst] < 1 - STANDSTILL:
+    if radius * bend[worst] < 1 - SHAPES.standstill:
         return []
     return [
         f"{where}{what}the roller of radius {radius:.6g} is larger than the radius of curvature {1 / bend[worst]:.6g} at "
-        f"{_point(travel.at(travel.s[worst : worst + 1]).x[:, 0])}; make it smaller, or the curve rounder"
+        f"{point_text(travel.at(travel.s[worst : worst + 1]).x[:, 0])}; make it smaller, or the curve rounder"
     ]
 
 
@@ -406,12 +400,14 @@ def _guide_faults(curve: Curve, t: Array, x: Array, where: str) -> list[str]:
     d = np.asarray(curve.guide) / np.linalg.norm(curve.guide)
     along = np.abs(d @ t)
     worst = int(np.argmax(along))
-    if along[worst] < 1 - 1e-6:
+    if along[worst] < 1 - SHAPES.met:
         return []
     return [
-        f"{where}guide = {shown(curve.guide)}: is the direction of the curve at {_point(x[:, worst])}; give another, or frame='minimizing'"
+        f"{where}guide = {shown(curve.guide)}: is the direction of the curve at {point_text(x[:, worst])}; give another, or "
+        "frame='minimizing'"
     ]
 
 
-def _point(x: Array) -> str:
+def point_text(x: Array) -> str:
+    """A point ``(3,)`` in a message."""
     return "(" + ", ".join(f"{v:.6g}" for v in x) + ")"

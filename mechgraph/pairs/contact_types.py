@@ -21,39 +21,15 @@ import scipy
 from mechgraph.errors import ShapeError
 from mechgraph.fields import POSITIVE, TWO, TWO_POSITIVE, Described
 from mechgraph.maths.se3 import Array, cross
+from mechgraph.maths.tolerances import SHAPES
 from mechgraph.pairs import kinematics as evaluation
-from mechgraph.pairs.arc_length import Travel, outside, roller_faults, shape_faults
+from mechgraph.pairs.arc_length import Travel, outside, point_text, roller_faults, shape_faults
 from mechgraph.pairs.curves import Curve, Line
 from mechgraph.pairs.factors import Touching
-from mechgraph.pairs.pair_type import TABLE, PairType, fill_row
+from mechgraph.pairs.pair_type import TABLE, PairType, table_row
 from mechgraph.pairs.surfaces import Surface
 from mechgraph.pairs.travelling import AlongCurve, Beside, OnSurface, X, Z
 from mechgraph.quantities import LENGTH, PRESSURE, PURE, is_numeric, wrong
-
-OFF_CURVE = 1e-6
-"""Part of the extent of a curve, or angle, by which the contact may miss it."""
-UNIT_ROUNDING = 1e-12
-"""Miss (in the unit of length) that is rounding at any size of a mechanism, as of a point in a plane through the origin."""
-PLACE_STEP = 1e-14
-"""Part of the greatest length by which a place on a curve or surface is found to which it is rounded, so that the place of that place is
-the same: some fifty roundings."""
-TRIED_PLACES = 16
-"""Places at which it is tried whether components do work."""
-
-
-def pair_row(
-    symbol: str,
-    name: str,
-    freedoms: Sequence[object],
-    reactions: Sequence[str],
-    efforts: Sequence[str],
-    touching: Touching | None = None,
-) -> PairType:
-    """A row of which efforts are combined to be dual to the freedoms; it has places for curves or surfaces."""
-    row = object.__new__(PairType)
-    fill_row(row, symbol, name, freedoms, reactions, efforts, touching=touching)
-    object.__setattr__(row, "computed_efforts", True)
-    return row
 
 
 @dataclass(frozen=True)
@@ -76,8 +52,8 @@ def extent(shape: Curve | Surface, x: Array) -> float:
 
 
 def rounded(at: float, size: float) -> float:
-    """A place to ``PLACE_STEP`` of the ``size`` of the numbers behind it; steps are powers of two, so that sizes near by have the same."""
-    step = math.ldexp(1.0, math.frexp(PLACE_STEP * size)[1])
+    """A place to ``SHAPES.place`` of the ``size`` of the numbers behind it; steps are powers of two: sizes near by have the same."""
+    step = math.ldexp(1.0, math.frexp(SHAPES.place * size)[1])
     return step * round(at / step)
 
 
@@ -103,11 +79,11 @@ def filled(row: PairType, factors: Sequence[AlongCurve | OnSurface], pair: str) 
         object.__setattr__(out, "pushed", held)
         object.__setattr__(out, "reactions", None)
         return out
-    x = evaluation.random_coordinates(out, np.random.default_rng(12345), 1, TRIED_PLACES)
+    x = evaluation.random_coordinates(out, np.random.default_rng(12345), 1, 16)
     for step, (_, numbers) in zip(steps, evaluation.places(out), strict=True):
         if isinstance(step, AlongCurve):
             low, high = (end if np.isfinite(end) else np.copysign(step.travel.length, end) for end in step.ranges[0])
-            x[numbers] = np.linspace(low, high, TRIED_PLACES)
+            x[numbers] = np.linspace(low, high, x.shape[-1])
         elif isinstance(step, OnSurface):
             x[numbers] = 0.0
     pitch = np.zeros((1, 1))
@@ -134,42 +110,53 @@ BESIDE = AlongCurve("Tsb", X, back=True)
 """A place for a curve on link b."""
 HELD = ("P", "C")
 """Types whose marker may keep its orientation on the way."""
-PLACE_DIGITS = 12
-"""Digits to which the direction of a plane is rounded, for the same reason."""
-CONFORMAL = 1e-9
-"""Part of the curvatures of two elements below which their difference is rounding: they bend alike."""
-CLOSING_ANGLE = 1e-9
-"""Closing angle of a frame that counts."""
 
 
 ROWS = {
     row.symbol: row
     for row in (
-        pair_row("P", "rail and carriage", [ALONG], ["Fx@1", "Fy@1", "Mx@1", "My@1", "Mz@1"], ["Fz@1"]),
-        pair_row("C", "round rail and carriage", [ALONG, "Rz"], ["Fx@1", "Fy@1", "Mx@1", "My@1"], ["Fz@1", "Mz@1"]),
-        pair_row(
+        table_row(
+            "P",
+            "rail and carriage",
+            [ALONG],
+            ["Fx@1", "Fy@1", "Mx@1", "My@1", "Mz@1"],
+            efforts=["Fz@1"],
+            dual=False,
+        ),
+        table_row(
+            "C",
+            "round rail and carriage",
+            [ALONG, "Rz"],
+            ["Fx@1", "Fy@1", "Mx@1", "My@1"],
+            efforts=["Fz@1", "Mz@1"],
+            dual=False,
+        ),
+        table_row(
             "Sg",
             "sphere in curved groove",
             [ALONG, "rotation"],
             ["Fx@1", "Fy@1"],
-            ["Fz@1", "Mx@1", "My@1", "Mz@1"],
-            Touching(("Fx", "Fy"), a=(0.0, -1.0), b=(1.0, 1.0), curved=True),
+            efforts=["Fz@1", "Mx@1", "My@1", "Mz@1"],
+            dual=False,
+            touching=Touching(("Fx", "Fy"), a=(0.0, -1.0), b=(1.0, 1.0), curved=True),
         ),
-        pair_row(
+        table_row(
             "Ps",
             "pin in curved slot",
             [FOLLOWING, "Rz"],
             ["Fy@1", "Fz@1", "Mx@1", "My@1"],
-            ["Fx@1", "Mz@1"],
-            Touching(("Fy",), a=(0.0, 0.0), b=(0.0, 1.0), curved=True),
+            efforts=["Fx@1", "Mz@1"],
+            dual=False,
+            touching=Touching(("Fy",), a=(0.0, 0.0), b=(0.0, 1.0), curved=True),
         ),
-        pair_row(
+        table_row(
             "Kc",
             "curves in contact",
             [FOLLOWING, BESIDE],
             ["Fy@1", "Fz@1", "Mx@1", "My@1"],
-            ["Fx@1", "Mz@1"],
-            Touching(("Fy",), a=(0.0, 0.0), b=(0.0, 0.0), curved=True),
+            efforts=["Fx@1", "Mz@1"],
+            dual=False,
+            touching=Touching(("Fy",), a=(0.0, 0.0), b=(0.0, 0.0), curved=True),
         ),
     )
 }
@@ -251,9 +238,9 @@ def _across(curve: Curve, place: AlongCurve, z: Sequence[float] | Array | None) 
     if place.tangent != X or z is None or not travel.is_straight or curve.guide is not None:
         return curve
     here = travel.at(np.zeros(1))
+    # digits to which the direction of a plane is rounded, for the same reason
     along = [
-        round(v / float(np.linalg.norm(z)), PLACE_DIGITS)
-        for v in (here.k[:, 0] @ np.asarray(z), here.y[:, 0] @ np.asarray(z))
+        round(v / float(np.linalg.norm(z)), 12) for v in (here.k[:, 0] @ np.asarray(z), here.y[:, 0] @ np.asarray(z))
     ]
     if along[1] == 0:
         return curve
@@ -291,7 +278,7 @@ def _placed(place: AlongCurve, curve: Curve, point: Sequence[float] | Array | No
     home = (travel.begin if ends else 0.0) if point is None else travel.nearest(np.asarray(point))[0]
     size = max(extent(curve, travel.at(np.array(home)).x), travel.length if ends else 0.0)
     again = (
-        travel.is_closed and travel.length - home < PLACE_STEP * size
+        travel.is_closed and travel.length - home < SHAPES.place * size
     )  # the end of a closed curve is where it begins
     return replace(place, curve=curve, home=0.0 if again else rounded(home, size))
 
@@ -337,7 +324,7 @@ def curve_faults(row: Any, curve: Curve, curve_b: Any, roller: Any, point: Any, 
         found += roller_faults(curve, roller, "roller: ", where, _side(curve, point))
     holds_roll = places[0].tangent == Z and not any(freedom.turns for freedom in row.freedoms)
     closing = curve.once(Travel).closing
-    if holds_roll and abs(np.sin(closing / 2)) > CLOSING_ANGLE:
+    if holds_roll and abs(np.sin(closing / 2)) > SHAPES.even:
         found.append(
             f"{where}curve: its frame comes back turned by {np.rad2deg(closing):.6g} degrees about the tangent after one round, and this "
             "pair holds roll; guide the frame, frame='guided' with a guide, or take a C or Sg"
@@ -355,10 +342,10 @@ def cut_faults(contact: Contact, where: str) -> Iterator[str]:
     if len(places) < 2 or contact.marker_b is not None or not places[0].travel.is_closed:
         return
     one, two = (pressing(contact.row) * place.curvatures(np.zeros(1))[1, 0] for place in places)
-    if two - one < -CONFORMAL * (abs(one) + abs(two)):
-        at = ", ".join(f"{v:.6g}" for v in contact.marker[:, 3])
+    if two - one < -SHAPES.even * (abs(one) + abs(two)):
+        at = point_text(contact.marker[:, 3])
         yield (
-            f"{where}curve_b: cuts into the curve beside ({at}), where they touch: it is hollow there with the radius {-1 / two:.6g}, and "
+            f"{where}curve_b: cuts into the curve beside {at}, where they touch: it is hollow there with the radius {-1 / two:.6g}, and "
             f"the curve, inside which link a is, bends with the radius {-1 / one:.6g}; make the hollow wider or the curve smaller (a disc "
             "in a ring: name the link of the disc as a, that of the ring as b)"
         )
@@ -369,14 +356,13 @@ def miss_faults(contact: Contact, curves: Sequence[Curve | None], tol: float, wh
     names = iter(("curve", "curve_b", ""))
     for miss, name, i in zip(contact.misses, names, count()):
         size = curves[i].once(Travel).length if i < len(curves) and curves[i] is not None else 1.0  # type: ignore[union-attr]
-        if not miss > max(OFF_CURVE, tol) * size:
+        if not miss > max(SHAPES.met, tol) * size:
             continue
         if name:
             marker = contact.marker_b if contact.marker_b is not None and i else contact.marker
-            at = ", ".join(f"{v:.6g}" for v in marker[:, 3])
-            rolls = i == 0 and isinstance(takes_curves(contact.row)[0].curve, Beside)
+            rolls, at = i == 0 and isinstance(takes_curves(contact.row)[0].curve, Beside), point_text(marker[:, 3])
             yield (
-                f"{where}point: is {miss:.6g} off its {name}{' at the radius of the roller' * rolls}, which is nearest at ({at}); "
+                f"{where}point: is {miss:.6g} off its {name}{' at the radius of the roller' * rolls}, which is nearest at {at}; "
                 "give that point, or the marker on link b (on_b=mg.Marker(...), and no point) to have the mechanism assembled"
             )
         else:
@@ -384,13 +370,14 @@ def miss_faults(contact: Contact, curves: Sequence[Curve | None], tol: float, wh
 
 
 SURFACE_ROWS = {
-    "Sp": pair_row(
+    "Sp": table_row(
         "Sp",
         "sphere on surface",
         [OnSurface(), "rotation"],
         ["Fz@2"],
-        ["Fx@2", "Fy@2", "Mx@2", "My@2", "Mz@2"],
-        Touching(("Fz",), a=(0.0, 0.0), b=(1.0, 1.0), curved=True),
+        efforts=["Fx@2", "Fy@2", "Mx@2", "My@2", "Mz@2"],
+        dual=False,
+        touching=Touching(("Fz",), a=(0.0, 0.0), b=(1.0, 1.0), curved=True),
     )
 }
 """The same of those that take a surface."""
@@ -491,9 +478,7 @@ def surface_faults(row: Any, surface: Surface, point: Any, where: str, roller: A
     x = surface.at(*np.array(surface.nearest(np.asarray(point)))[:, None])[:, :, 0]
     normal, sizes = np.linalg.norm(np.cross(x[1], x[2])), np.linalg.norm(x[1:3], axis=1)
     if normal <= 1e-9 * sizes.max() ** 2 + 1e-300:
-        return [
-            f"{where}surface: has no normal at ({', '.join(f'{v:.6g}' for v in x[0])}), as at a pole or an apex; take another point"
-        ]
+        return [f"{where}surface: has no normal at {point_text(x[0])}, as at a pole or an apex; take another point"]
     return []
 
 
@@ -502,19 +487,14 @@ def surface_miss(contact: Contact, tol: float, where: str) -> Iterator[str]:
     surface = next(
         step.surface for step in contact.row.steps if isinstance(step, OnSurface) and step.surface is not None
     )
-    size = max(extent(surface, contact.marker[:, 3]), UNIT_ROUNDING / OFF_CURVE)
-    if contact.misses[0] > max(OFF_CURVE, tol) * size:
-        at = ", ".join(f"{v:.6g}" for v in contact.marker[:, 3])
+    # a miss of 1e-12 is rounding at any size of a mechanism, as of a point in a plane through the origin
+    size = max(extent(surface, contact.marker[:, 3]), 1e-12 / SHAPES.met)
+    if contact.misses[0] > max(SHAPES.met, tol) * size:
+        at = point_text(contact.marker[:, 3])
         yield (
-            f"{where}point: is {contact.misses[0]:.6g} off its surface, which is nearest at ({at}); give that point, or the marker on "
+            f"{where}point: is {contact.misses[0]:.6g} off its surface, which is nearest at {at}; give that point, or the marker on "
             "link b (on_b=mg.Marker(...), and no point) to have the mechanism assembled"
         )
-
-
-HALVINGS = 60
-"""Halvings of the ratio of the axes of an ellipse, on a logarithmic scale."""
-SLENDER = 1e-6
-"""Least ratio of the axes of an ellipse."""
 
 
 class Pressed(NamedTuple):
@@ -581,8 +561,10 @@ def pressed(force: Array, curvatures: tuple[Array, Array], modulus: float) -> Pr
     """
     one, two = (0.5 * np.asarray(c, dtype=float) for c in curvatures)
     A, B = np.minimum(one, two), np.maximum(one, two)
-    low, high = np.full(A.shape, np.log(SLENDER)), np.zeros(A.shape)
-    for _ in range(HALVINGS):  # the ratio falls from infinity at k = 0 to 1 at k = 1
+    # least ratio of the axes of an ellipse
+    low, high = np.full(A.shape, np.log(1e-6)), np.zeros(A.shape)
+    # halvings of the ratio of the axes of an ellipse, on a logarithmic scale
+    for _ in range(60):  # the ratio falls from infinity at k = 0 to 1 at k = 1
         middle = 0.5 * (low + high)
         k = np.exp(middle)
         K, D = scipy.special.ellipkm1(k * k), scipy.special.elliprd(0.0, k * k, 1.0) / 3

@@ -32,9 +32,6 @@ from mechgraph.maths.se3 import Array
 from mechgraph.memo import Once
 from mechgraph.quantities import LENGTH
 
-DERIVATIVES = 4
-"""The highest derivative that is asked for."""
-
 
 @dataclass(frozen=True)
 class Pieces:
@@ -45,7 +42,7 @@ class Pieces:
 
     breaks: Array
     coefficients: Array
-    orders: int = DERIVATIVES + 1
+    orders: int
 
     @cached_property
     def _terms(self) -> Array:
@@ -66,7 +63,7 @@ class Pieces:
         return np.asarray(out.reshape(self.orders, *self.coefficients.shape[2:], *u.shape))
 
     @classmethod
-    def meeting(cls, breaks: Array, values: Sequence[Array], orders: int = DERIVATIVES + 1) -> Pieces:
+    def meeting(cls, breaks: Array, values: Sequence[Array], orders: int) -> Pieces:
         """The polynomials that meet values and derivatives ``(n, ...)`` at the breaks."""
         ends = [y[:-1] for y in values], [y[1:] for y in values]
         return cls(np.asarray(breaks), hermite(np.diff(breaks), *ends)[::-1], orders)
@@ -101,13 +98,8 @@ def parted(breaks: Array, parts: int) -> Array:
 
 ORDERS = 4
 """Position and derivatives that a curve gives: to the third."""
-CLOSED_GAP = 1e-9
-"""Gap over its extent up to which a curve is closed."""
 INTERVALS = 360
 """Intervals into which a curve is parted before its shape is known."""
-MOST_TURN, GRID_HALVINGS = 0.5, 8
-"""Radians by which the tangent turns between two places at which a curve is looked at, and times that an interval is halved for it."""
-WHOLE_TURN = 2.0 * np.pi
 FRAMES = ("minimizing", "guided", "held")
 
 
@@ -162,7 +154,7 @@ class Curve(Described, Once):
     @property
     def ends(self) -> tuple[float, float]:
         """Least and greatest parameter; infinite where the curve does not end."""
-        return 0.0, WHOLE_TURN
+        return 0.0, math.tau
 
     @property
     def is_closed(self) -> bool:
@@ -183,17 +175,17 @@ class Curve(Described, Once):
     def nodes(self) -> Array:
         """Parameters between which the curve is smooth; a few of an endless one."""
         begin, end = self.ends
-        return np.linspace(*((begin, end) if np.isfinite(begin) else (-WHOLE_TURN, WHOLE_TURN)), INTERVALS + 1)
+        return np.linspace(*((begin, end) if np.isfinite(begin) else (-math.tau, math.tau)), INTERVALS + 1)
 
     @cached_property
     def grid(self) -> Array:
-        """The same, fine enough for its shape: intervals halved in which the tangent turns by more than ``MOST_TURN``."""
+        """The same, fine enough for its shape: intervals halved, up to eight times, in which the tangent turns by more than 0.5."""
         u = self.nodes
-        for _ in range(GRID_HALVINGS):
+        for _ in range(8):
             _, x1, x2, _ = self.at(u)
             square = (x1 * x1).sum(axis=0)
             turning = np.sqrt(np.maximum(square * (x2 * x2).sum(axis=0) - (x1 * x2).sum(axis=0) ** 2, 0.0))
-            wide = np.maximum(turning[:-1], turning[1:]) * np.diff(u) > MOST_TURN * np.minimum(square[:-1], square[1:])
+            wide = np.maximum(turning[:-1], turning[1:]) * np.diff(u) > 0.5 * np.minimum(square[:-1], square[1:])
             if not wide.any():
                 break
             u = np.insert(u, np.flatnonzero(wide) + 1, (0.5 * (u[:-1] + u[1:]))[wide])
@@ -336,7 +328,7 @@ class Circle(Centred):
     @property
     def ends(self) -> tuple[float, float]:
         """A turn, or as declared."""
-        return self.angles or (0.0, WHOLE_TURN)
+        return self.angles or (0.0, math.tau)
 
     @property
     def is_closed(self) -> bool:

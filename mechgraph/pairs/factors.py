@@ -11,10 +11,11 @@ enter those coefficients once, and a batch of poses is one product of matrices.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -261,8 +262,6 @@ def bookkeeping_faults(given: object) -> list[str]:
 
 
 Flags = NDArray[np.bool_]
-TURN = 2.0 * np.pi
-"""A turn."""
 
 
 class Factor(ABC):
@@ -286,7 +285,7 @@ class Factor(ABC):
     @property
     def periods(self) -> tuple[float, ...]:
         """By how much every coordinate grows until the motion is back; infinite where it goes on. Turns do so round by round."""
-        return tuple(TURN if freedom.turns else np.inf for freedom in self.freedoms)
+        return tuple(math.tau if freedom.turns else np.inf for freedom in self.freedoms)
 
     @property
     def outline(self) -> tuple[Array, ...]:
@@ -327,23 +326,30 @@ class Factor(ABC):
         return PoseStack(self)
 
 
-class Stack(Protocol):
+class Stack(ABC):
     """``n`` factors of one kind, for fast evaluation: poses ``sum_i coefficients_i values_i``."""
 
+    @abstractmethod
     def values(self, x: Array) -> Array:
         """Values ``(m, n, T)`` of the states ``(n_state, n, T)``."""
 
+    @abstractmethod
     def coefficients(self, pitch: Array, back: Flags) -> Array:
         """Coefficients ``(4, 4, m, n, B)`` of the poses, of the inverse poses where ``back (n,)``."""
 
+    @abstractmethod
     def constant_twists(self, pitch: Array) -> Array | None:
         """Twists ``(6, f, n, B)`` in the frames before the factors; None where they move with the coordinates."""
 
     def twists(self, x: Array, pitch: Array) -> Array:
-        """The same ``(6, f, n, T)`` of twists that move."""
+        """The same ``(6, f, n, T)``, also of twists that move."""
+        constant = self.constant_twists(pitch)
+        assert constant is not None
+        return constant
 
     def twist_rates(self, x: Array, dq: Array, pitch: Array) -> Array | None:
         """See ``Factor.twist_rates``."""
+        return None
 
 
 @dataclass(frozen=True)
@@ -417,7 +423,7 @@ def screw_terms(twist: Array) -> Array:
     return out
 
 
-class ScrewStack:
+class ScrewStack(Stack):
     """Constant screws together: every pose is linear in ``1, sin q, 1 - cos q, q``."""
 
     def __init__(self, factors: Sequence[ConstantScrew], counts: Sequence[int]) -> None:
@@ -443,13 +449,6 @@ class ScrewStack:
     def constant_twists(self, pitch: Array) -> Array:
         """The unit twists."""
         return _unit_twists(self.factors, self.counts, pitch)
-
-    def twists(self, x: Array, pitch: Array) -> Array:
-        """The unit twists."""
-        return self.constant_twists(pitch)
-
-    def twist_rates(self, x: Array, dq: Array, pitch: Array) -> None:
-        """None: they are constant."""
 
 
 @dataclass(frozen=True)
@@ -509,7 +508,7 @@ def _rotation_terms() -> Array:
     return out
 
 
-class RotationStack:
+class RotationStack(Stack):
     """Rotations together: the entries of their matrices are linear in the products of quaternion components."""
 
     def __init__(self, n: int) -> None:
@@ -532,20 +531,13 @@ class RotationStack:
         """Unit turns."""
         return np.repeat(np.eye(6, 3)[:, :, None, None], self.n, axis=2)
 
-    def twists(self, x: Array, pitch: Array) -> Array:
-        """Unit turns."""
-        return self.constant_twists(pitch)
-
-    def twist_rates(self, x: Array, dq: Array, pitch: Array) -> None:
-        """None: the turns are constant."""
-
 
 def entries(X: Array) -> Array:
     """Entries of homogeneous poses and of their inverses, ``(32, n, T)``."""
     return np.concatenate([homogeneous(Y).reshape(16, *X.shape[2:]) for Y in (X, inverse(X))])
 
 
-class PoseStack:
+class PoseStack(Stack):
     """Copies of one factor of any kind, by its pose: the values are the entries of the pose and of its inverse.
 
     Only constant screws take the pitch of a pair; the pose of any other factor is asked for with pitch zero.
@@ -577,7 +569,7 @@ class PoseStack:
         return self.factor.twist_rates(x, dq, pitch)
 
 
-class FixedStack:
+class FixedStack(Stack):
     """No motion: what stands between the markers of pairs without a freedom."""
 
     def __init__(self, n: int) -> None:
@@ -594,10 +586,3 @@ class FixedStack:
     def constant_twists(self, pitch: Array) -> Array:
         """None of them."""
         return np.zeros((6, 0, self.n, 1))
-
-    def twists(self, x: Array, pitch: Array) -> Array:
-        """None of them."""
-        return self.constant_twists(pitch)
-
-    def twist_rates(self, x: Array, dq: Array, pitch: Array) -> None:
-        """None."""

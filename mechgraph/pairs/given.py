@@ -14,11 +14,10 @@ import scipy
 from mechgraph.errors import DeclarationError, ShapeError
 from mechgraph.fields import BREAKS, FLAG, FUNCTION, INTERVAL, NUMBER, POINT_LIST, POSITIVE, SAMPLES, TEXT
 from mechgraph.maths.se3 import Array
+from mechgraph.maths.tolerances import SHAPES
 from mechgraph.pairs.curves import (
-    CLOSED_GAP,
     INTERVALS,
     ORDERS,
-    WHOLE_TURN,
     Centred,
     Circle,
     Curve,
@@ -32,12 +31,8 @@ from mechgraph.pairs.curves import (
 )
 from mechgraph.quantities import LENGTH, wrong
 
-PARAMETERS = "uv"
-"""What the parameters are called in messages."""
 BESIDE = 0.5 * (3.0 - np.sqrt(5.0))
 """Where in an interval slopes are taken, a part of it that is no ratio of whole numbers, as places where a shape changes are."""
-SLOPE_STEPS, SLOPE_ERROR = (1e-4, 1e-5, 1e-6), 1e-3
-"""Parts of the range over which a slope is taken, and part of the size by which a derivative may differ from it."""
 
 
 def asked(function: Callable[..., Any], at: Sequence[Array], least: int, most: int) -> Array:
@@ -84,7 +79,7 @@ def _fits(function: Callable[..., Any], at: Sequence[Array], least: int, most: i
 
 
 def _named(values: Sequence[float]) -> str:
-    return ", ".join(f"{name} = {value:.6g}" for name, value in zip(PARAMETERS, values, strict=False))
+    return ", ".join(f"{name} = {value:.6g}" for name, value in zip("uv", values, strict=False))
 
 
 def inner(ends: tuple[float, float]) -> Array:
@@ -114,9 +109,9 @@ def slope_faults(
     found, known = [], ask(*at)
     for high, low, by in steps:
         extent = float(np.ptp(at[by]))
-        most = SLOPE_ERROR * np.abs(known[[low, high]]).max() / min(1.0, extent)
+        most = 1e-3 * np.abs(known[[low, high]]).max() / min(1.0, extent)
         miss = np.full(at[by].shape, np.inf)
-        for part in SLOPE_STEPS:
+        for part in (1e-4, 1e-5, 1e-6):
             h = np.minimum(part * extent, room)
             ahead, back = (ask(*(u + sign * h * (i == by) for i, u in enumerate(at)))[low] for sign in (1.0, -1.0))
             miss = np.minimum(miss, np.abs((ahead - back) / (2 * h) - known[high]).max(axis=0))
@@ -129,10 +124,6 @@ def slope_faults(
                 f"{where}position: {words[high]} differs from the slope of {words[low]} by {miss[worst]:.3g} at {at_worst}"
             )
     return found
-
-
-FEW_DIGITS = 2e-3
-"""Part of its range by which a law may stray from its rates: samples are rounded to few digits."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -196,7 +187,7 @@ class OfLaw(Centred):
         angle, *values = (np.atleast_1d(getattr(self, name)) for name in names)
         if any(v.shape != angle.shape or v.ndim != 1 for v in values) or len(angle) < 8:
             return [f"{where}{', '.join(names)}: give as many of each, 8 or more"]
-        if abs(angle[0]) > 1e-9 or abs(angle[-1] - WHOLE_TURN) > 1e-9 or (np.diff(angle) <= 0).any():
+        if abs(angle[0]) > 1e-9 or abs(angle[-1] - math.tau) > 1e-9 or (np.diff(angle) <= 0).any():
             return [
                 f"{where}angle: must increase from 0 to 2 pi, both included; runs from {angle[0]:.6g} to {angle[-1]:.6g}"
             ]
@@ -227,7 +218,8 @@ class OfLaw(Centred):
             told = np.append(0.0, np.cumsum(led))
             stray = given - told
             i, j = sorted((int(np.argmin(stray)), int(np.argmax(stray))))
-            if np.ptp(stray) - error.sum() > FEW_DIGITS * max(np.ptp(given), np.ptp(told)):
+            # part of its range by which a law may stray from its rates: samples are rounded to few digits
+            if np.ptp(stray) - error.sum() > 2e-3 * max(np.ptp(given), np.ptp(told)):
                 yield (
                     f"{where}{rate}: is not the derivative of {what} by the angle in radians; from angle {u[i]:.6g} to {u[j]:.6g} {what} "
                     f"changes by {given[j] - given[i]:.6g}, by the {rate}s given it would by {told[j] - told[i]:.6g}"
@@ -368,7 +360,7 @@ class Through(Curve):
     @cached_property
     def _spline(self) -> Pieces:
         given = np.array(self.points)
-        if self.closed and np.linalg.norm(given[-1] - given[0]) > CLOSED_GAP * np.ptp(given, axis=0).max():
+        if self.closed and np.linalg.norm(given[-1] - given[0]) > SHAPES.even * np.ptp(given, axis=0).max():
             given = np.concatenate([given, given[:1]])
         elif self.closed:
             given[-1] = given[0]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass, field
 from functools import cached_property
 from itertools import accumulate
 from typing import Any
@@ -54,7 +54,7 @@ def _factors(given: Sequence[object], faults: list[str]) -> tuple[Factor, ...]:
     return tuple(out)
 
 
-@dataclass(frozen=True, init=False)
+@dataclass(frozen=True)
 class PairType:
     """Declare a row of the pair table: freedoms, reaction components, efforts.
 
@@ -95,49 +95,56 @@ class PairType:
     """
 
     symbol: str
-    name: str
-    freedoms: tuple[Freedom, ...]
-    reactions: tuple[Component, ...] | None
-    efforts: tuple[Component, ...]
-    bookkeeping: Bookkeeping | None
-    directed: bool
-    square_second: bool
-    steps: tuple[Factor, ...]
-    frame_before: tuple[int, ...]
-    computed_efforts: bool
-    touching: Touching | None
-    computed_reactions: bool
-    pushed: tuple[int, ...]
+    name: str = ""
+    _: KW_ONLY
+    freedoms: Any
+    reactions: Any = None
+    efforts: Any = None
+    bookkeeping: Bookkeeping | None = None
+    directed: bool = True
+    square_second: bool = False
+    steps: tuple[Factor, ...] = field(init=False)
+    frame_before: tuple[int, ...] = field(init=False)
+    computed_efforts: bool = field(init=False, default=False)
+    touching: Touching | None = field(init=False, default=None)
+    computed_reactions: bool = field(init=False, default=False)
+    pushed: tuple[int, ...] = field(init=False, default=())
 
-    def __init__(
-        self,
-        symbol: str,
-        name: str = "",
-        *,
-        freedoms: Sequence[object],
-        reactions: Sequence[object] | None = None,
-        efforts: Sequence[object] | None = None,
-        bookkeeping: Bookkeeping | None = None,
-        directed: bool = True,
-        square_second: bool = False,
-    ) -> None:
-        faults = fill_row(
-            self,
-            symbol,
-            name,
-            freedoms,
-            reactions,
-            efforts,
-            bookkeeping,
-            directed=directed,
-            square_second=square_second,
-        )
-        if not faults and efforts is None:
+    def __post_init__(self) -> None:
+        tried = self.efforts is None
+        faults = self.read()
+        if not faults and tried:
             object.__setattr__(self, "computed_efforts", not _dual_at_random(self))
         if not faults:
             faults += _row_faults(self)
         if faults:
-            raise DeclarationError(f"pair type {shown(symbol)}", faults)
+            raise DeclarationError(f"pair type {shown(self.symbol)}", faults)
+
+    def read(self) -> list[str]:
+        """Read what is given as texts and numbers; its faults, before any number is tried."""
+        faults: list[str] = []
+        if not isinstance(self.symbol, str) or not self.symbol.isidentifier():
+            faults.append(wrong(self.symbol, "symbol", "letters and digits, starting with a letter"))
+        if not isinstance(self.name, str):
+            faults.append(wrong(self.name, "name", "a text"))
+        if self.bookkeeping is not None:
+            faults += bookkeeping_faults(self.bookkeeping)
+        flags = (("directed", self.directed), ("square_second", self.square_second))
+        faults += [wrong(flag, what, "true or false") for what, flag in flags if not isinstance(flag, bool)]
+        steps = _factors(items_of(self.freedoms, "freedoms", faults), faults)
+        freedoms = tuple(freedom for step in steps for freedom in step.freedoms)
+        starts = accumulate((len(step.freedoms) for step in steps), initial=0)
+        before = tuple(start for step, start in zip(steps, starts, strict=False) for _ in step.freedoms)
+        parts = {}
+        for what in ("reactions", "efforts"):
+            if (given := getattr(self, what)) is not None:
+                items = items_of(given, what, faults)
+                parts[what] = tuple(c for item in items if (c := read_component(item, faults, what[:-1])) is not None)
+        if self.efforts is None:
+            parts["efforts"] = tuple(_dual_effort(f, k) for f, k in zip(freedoms, before, strict=True))
+        named = {"name": self.symbol} if self.name == "" else {}
+        vars(self).update(freedoms=freedoms, steps=steps, frame_before=before, **parts, **named)
+        return faults
 
     def scaled(self, L: float) -> PairType:
         """The row with its lengths divided by ``L``: pitches of turns given as numbers, arms of forces; itself where it has none."""
@@ -152,8 +159,7 @@ class PairType:
             "bookkeeping": self.bookkeeping and self.bookkeeping.scaled(L),
         }
         out = copy(self)
-        for key, value in scaled.items():
-            object.__setattr__(out, key, value)
+        vars(out).update(scaled)
         return out
 
     @cached_property
@@ -215,69 +221,6 @@ class PairType:
 
     def __repr__(self) -> str:
         return f"PairType({self.symbol!r}, {self.name!r}, f={self.f})"
-
-
-def fill_row(
-    row: PairType,
-    symbol: str,
-    name: str,
-    freedoms: Sequence[object],
-    reactions: Sequence[object] | None,
-    efforts: Sequence[object] | None = None,
-    bookkeeping: Bookkeeping | None = None,
-    *,
-    directed: bool = True,
-    square_second: bool = False,
-    touching: Touching | None = None,
-) -> list[str]:
-    """Set the fields of a new row; the faults of what is given, before any number is tried."""
-    faults: list[str] = []
-    if not isinstance(symbol, str) or not symbol.isidentifier():
-        faults.append(wrong(symbol, "symbol", "letters and digits, starting with a letter"))
-    if not isinstance(name, str):
-        faults.append(wrong(name, "name", "a text"))
-    if bookkeeping is not None:
-        faults += bookkeeping_faults(bookkeeping)
-    flags = (("directed", directed), ("square_second", square_second))
-    faults += [wrong(flag, what, "true or false") for what, flag in flags if not isinstance(flag, bool)]
-    steps = _factors(items_of(freedoms, "freedoms", faults), faults)
-    rows = tuple(freedom for step in steps for freedom in step.freedoms)
-    starts = accumulate((len(step.freedoms) for step in steps), initial=0)
-    before = tuple(start for step, start in zip(steps, starts, strict=False) for _ in step.freedoms)
-    parts = None
-    if reactions is not None:
-        parts = tuple(
-            c
-            for c in (read_component(r, faults, "reaction") for r in items_of(reactions, "reactions", faults))
-            if c is not None
-        )
-    if efforts is None:
-        work = tuple(_dual_effort(f, k) for f, k in zip(rows, before, strict=True))
-    else:
-        work = tuple(
-            c
-            for c in (read_component(e, faults, "effort") for e in items_of(efforts, "efforts", faults))
-            if c is not None
-        )
-    fields = {
-        "symbol": symbol,
-        "name": symbol if isinstance(name, str) and not name else name,
-        "freedoms": rows,
-        "reactions": parts,
-        "efforts": work,
-        "bookkeeping": bookkeeping,
-        "directed": directed,
-        "square_second": square_second,
-        "steps": steps,
-        "frame_before": before,
-        "computed_efforts": False,
-        "touching": touching,
-        "computed_reactions": False,
-        "pushed": (),
-    }
-    for key, value in fields.items():
-        object.__setattr__(row, key, value)
-    return faults
 
 
 def _dual_effort(freedom: Freedom, frame: int) -> Component:
@@ -397,59 +340,60 @@ class PairTable(Mapping[str, PairType], Shown):
         return Document("Pair types", (Table(header, tuple(rows)),))
 
 
-def _row(
+def table_row(
     symbol: str, name: str, freedoms: Sequence[object], reactions: Sequence[object], *, dual: bool = True, **rest: Any
 ) -> PairType:
     """A row of the table, not tried at random positions: a test does that for all of them, once and not at every start.
 
-    ``dual``: whether unit couples about the turns and unit forces along the slides are dual to the freedoms.
+    ``dual``: whether the efforts, unit couples about the turns and unit forces along the slides, are dual to the freedoms.
     """
     row = object.__new__(PairType)
-    fill_row(row, symbol, name, freedoms, reactions, **rest)
-    object.__setattr__(row, "computed_efforts", not dual)
+    given = {"freedoms": freedoms, "reactions": reactions, "computed_efforts": not dual}
+    vars(row).update(symbol=symbol, name=name, **given, **rest)
+    row.read()
     return row
 
 
 TABLE = PairTable(
     [
-        _row(
+        table_row(
             "R",
             "revolute",
             freedoms=["Rz"],
             reactions=["Fx", "Fy", "Fz", "Mx", "My"],
             bookkeeping=Bookkeeping(_AXIS, (_FZ,)),
         ),
-        _row(
+        table_row(
             "P",
             "prismatic",
             freedoms=["Tz"],
             reactions=["Fx", "Fy", "Mx", "My", "Mz"],
             bookkeeping=Bookkeeping(_AXIS, (_MZ,)),
         ),
-        _row(
+        table_row(
             "H",
             "helical",
             freedoms=["Rz + pitch Tz"],
             reactions=["Fx", "Fy", "Mx", "My", _SCREW_FZ],
             bookkeeping=Bookkeeping(_AXIS, (_SCREW_FZ,)),
         ),
-        _row(
+        table_row(
             "C",
             "cylindrical",
             freedoms=["Rz", "Tz"],
             reactions=["Fx", "Fy", "Mx", "My"],
             bookkeeping=Bookkeeping(_AXIS, ()),
         ),
-        _row(
+        table_row(
             "U",
             "universal (slotted sphere)",
             freedoms=["Rz", "Rx"],
             reactions=["Fx", "Fy", "Fz", "My@1"],
             square_second=True,
         ),
-        _row("S", "spherical", freedoms=["rotation"], reactions=["Fx", "Fy", "Fz"], directed=False),
-        _row("E", "planar", freedoms=["Tx", "Ty", "Rz"], reactions=["Fz", "Mx", "My"]),
-        _row(
+        table_row("S", "spherical", freedoms=["rotation"], reactions=["Fx", "Fy", "Fz"], directed=False),
+        table_row("E", "planar", freedoms=["Tx", "Ty", "Rz"], reactions=["Fz", "Mx", "My"]),
+        table_row(
             "Sc",
             "sphere in slotted cylinder",
             freedoms=["Tz", "Ry", "Rx"],
@@ -457,14 +401,14 @@ TABLE = PairTable(
             square_second=True,
             touching=_IN_GROOVE,
         ),
-        _row(
+        table_row(
             "Sg",
             "sphere in groove",
             freedoms=["Tz", "rotation"],
             reactions=["Fx@1", "Fy@1"],
             touching=_IN_GROOVE,
         ),
-        _row(
+        table_row(
             "Cp",
             "cylinder on plane",
             freedoms=["Tx", "Ty", "Rz", "Rx"],
@@ -472,16 +416,16 @@ TABLE = PairTable(
             square_second=True,
             touching=Touching(("Fz",), a=(0.0, 0.0), b=(0.0, 1.0), tilting="My"),
         ),
-        _row(
+        table_row(
             "Sp",
             "sphere on plane",
             freedoms=["Tx", "Ty", "rotation"],
             reactions=["Fz@2"],
             touching=Touching(("Fz",), a=(0.0, 0.0), b=(1.0, 1.0)),
         ),
-        _row("Tc", "torque coupling", freedoms=["Tx", "Ty", "Tz", "Rx", "Ry"], reactions=["Mz@4"]),
-        _row("Fr", "free, all six", freedoms=["Tx", "Ty", "Tz", "Rx", "Ry", "Rz"], reactions=[], dual=False),
-        _row("W", "weld", freedoms=[], reactions=["Fx", "Fy", "Fz", "Mx", "My", "Mz"], directed=False),
+        table_row("Tc", "torque coupling", freedoms=["Tx", "Ty", "Tz", "Rx", "Ry"], reactions=["Mz@4"]),
+        table_row("Fr", "free, all six", freedoms=["Tx", "Ty", "Tz", "Rx", "Ry", "Rz"], reactions=[], dual=False),
+        table_row("W", "weld", freedoms=[], reactions=["Fx", "Fy", "Fz", "Mx", "My", "Mz"], directed=False),
     ]
 )
 

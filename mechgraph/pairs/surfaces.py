@@ -31,15 +31,11 @@ from mechgraph.fields import (
 from mechgraph.fields import TABLE as NESTED
 from mechgraph.maths.se3 import Array, cross
 from mechgraph.pairs.arc_length import far_from
-from mechgraph.pairs.curves import WHOLE_TURN, Circle, Curve, Line, remade_from
+from mechgraph.pairs.curves import Circle, Curve, Line, remade_from
 from mechgraph.pairs.given import asked, between, slope_faults
 from mechgraph.quantities import LENGTH, PURE, wrong
 
-NEAREST_GRID = 33
-"""Values of each parameter from which the nearest point of a surface is sought."""
 NO_ENDS = (-np.inf, np.inf)
-BESIDE_POLE = 0.25
-"""Angle from a pole of a sphere up to which a place of it has its coordinates about another axis."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -149,7 +145,7 @@ class Surface(Described):
         u, v = self.grid(p)
         best = int(np.argmin(((self.at(u, v)[0] - p[:, None]) ** 2).sum(axis=0)))
         at = np.array([u[best], v[best]])
-        for _ in range(NEAREST_GRID):
+        for _ in range(33):
             x, xu, xv, xuu, xuv, xvv = self.at(at[:1], at[1:])[:, :, 0]
             first, off = np.stack([xu, xv]), x - p
             metric = first @ first.T
@@ -167,9 +163,9 @@ class Surface(Described):
 
 
 def _between(ends: tuple[float, float], size: float) -> Array:
-    """Middles of equal parts between two ends, of which infinite ones count as ``size``: at the ends there may be no normal."""
+    """Middles of 33 equal parts between two ends, of which infinite ones count as ``size``: at the ends there may be no normal."""
     low, high = (end if np.isfinite(end) else np.copysign(size, end) for end in ends)
-    return low + (high - low) * (np.arange(NEAREST_GRID) + 0.5) / NEAREST_GRID
+    return low + (high - low) * (np.arange(33) + 0.5) / 33
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -257,13 +253,13 @@ class Turned(AboutAxis):
     def periods(self) -> tuple[float, float]:
         """A turn, and the range of a closed meridian."""
         begin, end = self._curve.ends
-        return WHOLE_TURN, end - begin if self._curve.is_closed else np.inf
+        return math.tau, end - begin if self._curve.is_closed else np.inf
 
     def grid(self, p: Array) -> tuple[Array, Array]:
         """A whole turn, and the meridian; of an endless one no farther from where it begins than the point."""
         center, begin = np.asarray(self.center), self._curve.at(np.zeros(1))[0][:, 0]
         size = float(np.linalg.norm(p - center) + np.linalg.norm(begin - center))
-        u, v = np.meshgrid(_between((0.0, WHOLE_TURN), size), _between(self._curve.ends, size))
+        u, v = np.meshgrid(_between((0.0, math.tau), size), _between(self._curve.ends, size))
         return u.ravel(), v.ravel()
 
     @property
@@ -287,7 +283,7 @@ class Sphere(Turned):
     @property
     def meridian(self) -> Curve:
         """Half a circle."""
-        return self._circle(self.radius, angles=(-0.25 * WHOLE_TURN, 0.25 * WHOLE_TURN))
+        return self._circle(self.radius, angles=(-0.25 * math.tau, 0.25 * math.tau))
 
     @property
     def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -297,12 +293,13 @@ class Sphere(Turned):
     @property
     def periods(self) -> tuple[float, float]:
         """A turn each."""
-        return WHOLE_TURN, WHOLE_TURN
+        return math.tau, math.tau
 
     def away_from_pole(self, p: Array) -> Surface:
         """Within ``BESIDE_POLE`` of a pole by longitude and latitude about ``second``."""
         off = p - np.asarray(self.center)
-        near = np.linalg.norm(np.cross(self._basis[2], off)) < np.sin(BESIDE_POLE) * np.linalg.norm(off)
+        # angle from a pole of a sphere up to which a place of it has its coordinates about another axis
+        near = np.linalg.norm(np.cross(self._basis[2], off)) < np.sin(0.25) * np.linalg.norm(off)
         return self.replace(axis=self._basis[0], second=self._basis[1]) if near else self
 
     def to_pole(self, u: Array, v: Array) -> Array:
@@ -371,7 +368,7 @@ class Cone(Turned):
         """An angle that makes no cone."""
         found = super().faults(where)
         return found or (
-            [] if self.half_angle < WHOLE_TURN / 4 else [wrong(self.half_angle, where + "half_angle", "below pi/2")]
+            [] if self.half_angle < math.pi / 2 else [wrong(self.half_angle, where + "half_angle", "below pi/2")]
         )
 
 

@@ -135,10 +135,6 @@ X, Z = 0, 2
 """Axes of the frame that may be the tangent."""
 
 
-CURVE_POINTS = 181
-"""Points by which a curve is drawn."""
-
-
 @dataclass(frozen=True)
 class AlongCurve(Travelling):
     """A frame that travels along a curve by the arc length ``q``, from where it is the frame before the factor.
@@ -192,7 +188,8 @@ class AlongCurve(Travelling):
         """
         if self.curve is None or ((endless := np.isinf(self.travel.begin)) and self.travel.is_plane):
             return ()
-        s = np.linspace(self.travel.s[0], self.travel.s[-1], CURVE_POINTS) + (self.home if endless else 0.0)
+        # points by which a curve is drawn
+        s = np.linspace(self.travel.s[0], self.travel.s[-1], 181) + (self.home if endless else 0.0)
         x = self.travel.at(s).x
         return (((x.T - self.start[:, 3]) / self.unit) @ self.start[:, :3],)
 
@@ -356,10 +353,6 @@ def _beside(d: float, lib: Library, *parts: Any) -> tuple[Any, ...]:
     )
 
 
-SURFACE_LINES = 9
-"""Lines each way by which a surface is drawn."""
-
-
 @dataclass(frozen=True)
 class OnSurface(Travelling):
     """A frame that lies on a surface: z its normal, x along u; coordinates are lengths along u and v where they are zero.
@@ -405,7 +398,8 @@ class OnSurface(Travelling):
         if self.surface is None:
             return ()
         ranges = [(max(low, -size), min(high, size)) for (low, high), size in zip(self.ranges, self.sizes, strict=True)]
-        u, v = (np.linspace(*ends, SURFACE_LINES) for ends in ranges)
+        # lines each way by which a surface is drawn
+        u, v = (np.linspace(*ends, 9) for ends in ranges)
         x = np.stack(np.meshgrid(u, v))
         p = self.here(x)[0] - self.start[:, 3].reshape(3, 1, 1)
         grid = np.tensordot(p, self.start[:, :3], (0, 0)) / self.unit

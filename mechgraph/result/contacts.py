@@ -22,9 +22,9 @@ import numpy as np
 from mechgraph.document import Block, Document, Paragraph, Shown
 from mechgraph.errors import DeclarationError
 from mechgraph.maths.se3 import Array
+from mechgraph.maths.tolerances import SHAPES
 from mechgraph.model.pair import Pair
 from mechgraph.pairs.contact_types import (
-    CONFORMAL,
     Pressed,
     is_open,
     placed_surface,
@@ -390,7 +390,7 @@ class ContactResult(ContactGeometry, Shown):
     def overlap(self) -> tuple[Overlap, ...]:
         """The ranges of positions in which the elements cut into each other beside the contact: their relative curvature is below zero."""
         room, scale = self._room
-        below = room < -CONFORMAL * scale
+        below = room < -SHAPES.even * scale
         if not below.any():
             return ()
         pair, unit = self._pair, unit_of(self._values.mechanism.units, (-1, 0, 0))
