@@ -38,8 +38,10 @@ class Once:
 Value = TypeVar("Value")
 
 
-class kept(Generic[Value]):
-    """A ``cached_property`` without its lock, which takes longer than the arithmetic of one position."""
+class graph_cached(Generic[Value]):
+    """A cached property that follows from names, ends and types alone, made once for all objects that share the dictionary ``store``."""
+
+    store = "_shared"
 
     def __init__(self, make: Callable[[Any], Value]) -> None:
         self.make, self.__doc__ = make, make.__doc__
@@ -48,5 +50,14 @@ class kept(Generic[Value]):
         self.name = name
 
     def __get__(self, instance: Any, owner: type) -> Value:
-        value = instance.__dict__[self.name] = self.make(instance)
+        known = vars(instance)[self.store]
+        if self.name not in known:
+            known[self.name] = self.make(instance)
+        instance.__dict__[self.name] = value = known[self.name]
         return value
+
+
+class unit_cached(graph_cached[Value]):
+    """The same of what also follows from the unit of length, where a pair type has lengths of its own."""
+
+    store = "_sized"

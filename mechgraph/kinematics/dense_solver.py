@@ -5,6 +5,7 @@ from __future__ import annotations
 import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,6 @@ from mechgraph.maths.linear import (
 )
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import PATH
-from mechgraph.memo import kept
 
 OWN_SIZE = 2.0
 """Factor by which a loop is smaller or larger than L from which on its rows are taken over its own size."""
@@ -118,7 +118,7 @@ class DenseFactored:
         self._sensitivity: Array | None = None
         self._motions: Array | None = None
 
-    @kept
+    @cached_property
     def _parts(self) -> list[tuple[Form, Index, ChosenSystem]]:
         """The positions by form, and their equations."""
         forms, J, which = self._forms, self.J, self.which
@@ -233,7 +233,7 @@ class OneFactored(DenseFactored):
         rows, cols = form.choice.places
         self._lu = Lu(form.matrix(J)[rows][:, cols, 0])
 
-    @kept
+    @cached_property
     def condition(self) -> Array:
         """See the protocol in ``kinematics.solver``."""
         return np.array([self._lu.condition])

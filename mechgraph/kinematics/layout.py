@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ from mechgraph.kinematics.batches import (
 )
 from mechgraph.maths.linear import Place, compact
 from mechgraph.maths.se3 import Array, Index
-from mechgraph.memo import of_graph
+from mechgraph.memo import graph_cached, of_graph, unit_cached
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Parameters
 from mechgraph.pairs.factors import Component
@@ -39,33 +39,6 @@ from mechgraph.pairs.travelling import Travelling
 
 MANY_LOOPS = 16
 """Loops above which the loop matrix is applied as a sparse one (measured: from here on it is the faster one)."""
-
-Value = TypeVar("Value")
-
-
-class shared(Generic[Value]):
-    """A cached property that follows from links, pairs and frame alone: made once for all systems of a mechanism."""
-
-    store = "_shared"
-
-    def __init__(self, make: Callable[[Any], Value]) -> None:
-        self.make, self.__doc__ = make, make.__doc__
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self.name = name
-
-    def __get__(self, instance: Any, owner: type) -> Value:
-        known = vars(instance)[self.store]
-        if self.name not in known:
-            known[self.name] = self.make(instance)
-        instance.__dict__[self.name] = value = known[self.name]
-        return value
-
-
-class sized(shared[Value]):
-    """The same of what also follows from the unit of length, where a pair type has lengths of its own."""
-
-    store = "_sized"
 
 
 @of_graph
@@ -134,7 +107,7 @@ class Places:
         """For every pair the number of its type among ``types``."""
         return self._types[1]
 
-    @shared
+    @graph_cached
     def _types(self) -> tuple[list[PairType], Index]:
         """The pair types, and for every pair the number of its own."""
         each = [pair.type for pair in self.m.pairs]
@@ -151,49 +124,49 @@ class Places:
         types, number = self._types
         return np.array([of(row) for row in types], dtype=np.intp)[number]
 
-    @shared
+    @graph_cached
     def has_lengths(self) -> bool:
         """Whether a pair type has lengths of its own."""
         return any(row.has_lengths for row in self._types[0])
 
     # --- index arrays ------------------------------------------------------------------------------------------------
 
-    @shared
+    @graph_cached
     def first_column(self) -> Index:
         """For every pair its first freedom, and the number of all behind the last."""
         return np.concatenate([[0], np.cumsum(self._by_type(lambda row: row.f))]).astype(np.intp)
 
-    @shared
+    @graph_cached
     def first_row(self) -> Index:
         """For every pair its first number in the state, and the number of all behind the last."""
         return np.concatenate([[0], np.cumsum(self._by_type(lambda row: row.nx))]).astype(np.intp)
 
-    @shared
+    @graph_cached
     def n_freedoms(self) -> int:
         """Number ``F`` of freedoms."""
         return int(self.first_column[-1])
 
-    @shared
+    @graph_cached
     def n_state(self) -> int:
         """Length ``nx`` of the state."""
         return int(self.first_row[-1])
 
-    @shared
+    @graph_cached
     def n_factors(self) -> Index:
         """For every pair the number of its factors."""
         return self._by_type(lambda row: len(row.steps))
 
-    @shared
+    @graph_cached
     def tree(self) -> Tree:
         """The spanning tree."""
         return Tree(self.graph)
 
-    @shared
+    @graph_cached
     def walk(self) -> Walk:
         """The way through every factor of the pairs."""
         return Walk(self.tree, (self.a, self.b), self.chords, np.maximum(self.n_factors, 1))
 
-    @sized
+    @unit_cached
     def groups(self) -> list[Group]:
         """The pairs by type."""
         out = []
@@ -204,12 +177,12 @@ class Places:
             out.append(Group(row.scaled(self.par.L), index, columns, state))
         return out
 
-    @sized
+    @unit_cached
     def batches(self) -> list[FactorBatch]:
         """The factors by kind."""
         return factor_batches(self.groups, self.walk, self.n_factors)
 
-    @shared
+    @graph_cached
     def is_length(self) -> NDArray[np.bool_]:
         """Which freedoms are slides."""
         out = np.zeros(self.n_freedoms, dtype=bool)
@@ -217,7 +190,7 @@ class Places:
             out[g.columns] = np.array([not f.turns for f in g.row.freedoms], dtype=bool)[:, None]
         return out
 
-    @sized
+    @unit_cached
     def limits(self) -> tuple[Index, Array, Array]:
         """The single freedoms whose coordinates have a range, and least and greatest values."""
         ranges = np.full((self.n_freedoms, 2), (-np.inf, np.inf))
@@ -228,7 +201,7 @@ class Places:
         columns = np.flatnonzero(np.isfinite(ranges).any(axis=1))
         return columns, ranges[columns, 0], ranges[columns, 1]
 
-    @sized
+    @unit_cached
     def periods(self) -> Array:
         """By how much every freedom ``(F,)`` grows until it is back: a turn, the length of a closed curve; infinite where it goes on."""
         out = np.full(self.n_freedoms, np.inf)
@@ -247,7 +220,7 @@ class Places:
         number = int(self._types[1][pair])
         return number, int(np.searchsorted(self.groups[number].pairs, pair))
 
-    @shared
+    @graph_cached
     def pair_of_freedom(self) -> Index:
         """For every freedom its pair, as numbers."""
         return np.repeat(np.arange(len(self.m.pairs)), np.diff(self.first_column))
@@ -258,17 +231,17 @@ class Places:
         places = columns - self.first_column[pairs]
         return tuple(self.m.pairs[k].freedom_names[i] for k, i in zip(pairs.tolist(), places.tolist(), strict=True))
 
-    @shared
+    @graph_cached
     def owners(self) -> Place:
         """For every freedom its pair."""
         return compact(self.pair_of_freedom)
 
-    @shared
+    @graph_cached
     def pair_ranks(self) -> Ranks:
         """Freedoms as runs by pair."""
         return ranked(np.diff(self.first_column))
 
-    @shared
+    @graph_cached
     def factor_ranks(self) -> Ranks:
         """Freedoms as runs by factor, factors pair by pair."""
         widths = [[len(step.freedoms) for step in row.steps] for row in self._types[0]]
@@ -276,12 +249,12 @@ class Places:
         used = np.arange(table.shape[1]) < self.n_factors[:, None]
         return ranked(table[self._types[1]][used])
 
-    @shared
+    @graph_cached
     def factors_by_pair(self) -> Ranks:
         """Factors as runs by pair."""
         return ranked(self.n_factors)
 
-    @shared
+    @graph_cached
     def factor_carriers(self) -> Place:
         """For every factor the link a of its pair."""
         return compact(np.repeat(self.a, self.n_factors))
@@ -290,23 +263,23 @@ class Places:
         """Numbers of the factors of a batch, counted pair by pair."""
         return np.asarray((np.cumsum(self.n_factors) - self.n_factors)[batch.pairs] + batch.ranks)
 
-    @sized
+    @unit_cached
     def moving_batches(self) -> list[FactorBatch]:
         """The factors whose twists move with their coordinates."""
         return [b for b in self.batches if b.stack.constant_twists(self.par.pitch[b.pairs]) is None]
 
-    @sized
+    @unit_cached
     def bend(self) -> float:
         """Greatest curvature of curves and surfaces, over one of the length of the mechanism; 0 where there are none."""
         factors = [factor for b in self.moving_batches for factor in b.factors]
         return max((factor.bend for factor in factors if isinstance(factor, Travelling)), default=0.0)
 
-    @shared
+    @graph_cached
     def chord_nodes(self) -> tuple[Index, Index]:
         """For every chord the node in which it ends, and that of its link b."""
         return self.walk.end_node[self.chords], self.walk.link_node[self.b[self.chords]]
 
-    @shared
+    @graph_cached
     def column_nodes(self) -> Index:
         """For every freedom the node of the frame before its factor."""
         out = np.empty(self.n_freedoms, dtype=np.intp)
@@ -330,7 +303,7 @@ class Places:
 
     # --- screws of components ----------------------------------------------------------------------------------------
 
-    @sized
+    @unit_cached
     def effort_table(self) -> ScrewTable:
         """Efforts of all freedoms, in the order of the freedoms."""
         parts = [(g, c) for g in self.groups for c in g.row.efforts]
@@ -339,7 +312,7 @@ class Places:
         order = np.argsort(np.concatenate(columns)) if columns else np.zeros(0, dtype=np.intp)
         return table.taken(order)
 
-    @sized
+    @unit_cached
     def reaction_table(self) -> ScrewTable:
         """Constant reaction components, group by group, component by component."""
         return self._screw_table([(g, c) for g in self.groups for c in g.row.reactions or ()])
@@ -361,7 +334,7 @@ class Places:
 
     # --- loops -------------------------------------------------------------------------------------------------------
 
-    @shared
+    @graph_cached
     def loop_columns(self) -> list[tuple[Index, Array]]:
         """Columns of the freedoms along every loop, and their signs."""
         return [self._columns_of_loop(loop) for loop in self.graph.loops]
@@ -371,32 +344,32 @@ class Places:
         signs = [np.full(len(c), float(sign)) for c, (_, sign) in zip(columns, loop, strict=True)]
         return np.concatenate(columns), np.concatenate(signs)
 
-    @shared
+    @graph_cached
     def many_loops(self) -> bool:
         """Whether sums along loops are taken with the sparse loop matrix."""
         return self.graph.n_loops > MANY_LOOPS
 
-    @shared
+    @graph_cached
     def loop_matrix(self) -> Array:
         """The loop matrix, loops x pairs."""
         return self.graph.loop_matrix
 
-    @shared
+    @graph_cached
     def loop_averages(self) -> Array:
         """Means over the pairs of every loop, loops x pairs."""
         return np.asarray(self.graph.loop_averages.toarray())
 
-    @shared
+    @graph_cached
     def entries(self) -> Entries:
         """The freedoms along the loops."""
         return entries_of(self.graph, self.first_column)
 
-    @shared
+    @graph_cached
     def entry_places(self) -> Index | None:
         """Where they stand in the Jacobian of the loops, see ``Entries.places``."""
         return self.entries.places(self.n_freedoms)
 
-    @shared
+    @graph_cached
     def loops_of_chords(self) -> Array | None:
         """Which chord closures make up a loop, ``(loops, chords)`` with signs; None where each loop has one of its own, in order."""
         found = self.graph.loop_matrix[:, self.chords]

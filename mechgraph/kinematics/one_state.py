@@ -7,12 +7,13 @@ the poses of the nodes, which is linear in them, is another. These matrices grow
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from mechgraph.kinematics.batches import FactorBatch, Numbers
 from mechgraph.kinematics.layout import Places
 from mechgraph.maths.se3 import LEFT_FACTORS, RIGHT_FACTORS, Array, Index, finite_twist, homogeneous, skew
-from mechgraph.memo import kept
 
 DIFFERENCES = np.concatenate([np.eye(3), -np.eye(3)])
 """From the six products of a vector product to its components."""
@@ -95,7 +96,7 @@ class OneState:
         """Poses of the nodes ``(3, 4, nodes, 1)``."""
         return np.ascontiguousarray(self._X.transpose(2, 1, 0)[:3, ..., None])
 
-    @kept
+    @cached_property
     def _vectors(self) -> Array:
         """What the rows of ``loops`` make ``(3 K + 2 C, 4)``."""
         return np.asarray(self._by.loops.dot(self._X.reshape(-1, 4)))

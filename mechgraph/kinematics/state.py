@@ -30,7 +30,6 @@ from mechgraph.kinematics.batches import ScrewTable, run_sums
 from mechgraph.kinematics.one_state import OneState
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Array, Index, compose, cross, cross_twist, finite_twist, move_twist, multiplied
-from mechgraph.memo import kept
 from mechgraph.model.couplings import Axes, Contact, Lines
 from mechgraph.pairs import kinematics as evaluation
 
@@ -48,7 +47,7 @@ class Configuration:
         self.T = x.shape[1]
         self._one = one
 
-    @kept
+    @cached_property
     def solvers(self) -> dict[Any, Any]:
         """What ``kinematics.solver`` keeps with a start."""
         return {}
@@ -65,7 +64,7 @@ class Configuration:
         """The states, and what is evaluated at them, taken ``over`` to a system; the last axis is that of positions."""
         out = Configuration(system, over(self.x))
         for name, known in vars(self).items():
-            if isinstance(vars(type(self)).get(name), kept):
+            if isinstance(vars(type(self)).get(name), cached_property):
                 if isinstance(known, np.ndarray):
                     out.__dict__[name] = over(known)
                 elif isinstance(known, tuple) and isinstance(known[0], np.ndarray):
@@ -96,7 +95,7 @@ class Configuration:
 
     # --- poses -------------------------------------------------------------------------------------------------------
 
-    @kept
+    @cached_property
     def _steps(self) -> Array:
         """Poses of all factors with the markers beside them, in the sense of the walk: homogeneous, ``(4, 4, steps, T)``."""
         s = self.system
@@ -117,19 +116,19 @@ class Configuration:
             out[:, b.at_steps] = steps
         return out.reshape(4, 4, *out.shape[1:])
 
-    @kept
+    @cached_property
     def _nodes(self) -> Array:
         """Poses of the frames behind all factors ``(3, 4, nodes, T)``, see ``Walk``."""
         if self._one is not None:
             return self._one.nodes
         return self.system.walk.poses(self._steps, self.system.par.frame)
 
-    @kept
+    @cached_property
     def poses(self) -> Array:
         """Poses of all links ``(3, 4, N, T)``."""
         return self._nodes.take(self.system.walk.link_node, axis=2)
 
-    @kept
+    @cached_property
     def frames(self) -> list[list[Array]]:
         """For every group the pair frames 0, 1, ... about the internal origin; places inside a factor hold its start."""
         out = []
@@ -144,7 +143,7 @@ class Configuration:
         X = self._nodes.take(nodes, axis=2)
         return compose(X, self.system.numbers.constants[:, :, const]) if const.any() else X
 
-    @kept
+    @cached_property
     def pair_points(self) -> Array:
         """Origins of the markers B, ``(3, P, T)``; of a chord, where its link a has it."""
         s = self.system
@@ -163,13 +162,13 @@ class Configuration:
         multiplied(X[:, :3], local, out=out.swapaxes(0, 1))
         return out, X[:, 3].copy()
 
-    @kept
+    @cached_property
     def _twists(self) -> tuple[Array, Array]:
         """Turns and displacements of all freedoms ``(2, 3, F, T)`` about the origins of their nodes, and these origins ``(3, F, T)``."""
         s = self.system
         return self._turned(self._local_twists if s.moving_batches else s.numbers.twists, s.column_nodes)
 
-    @kept
+    @cached_property
     def S(self) -> Array:
         """Twists of all freedoms ``(6, F, T)``: ``(R line, R free + p x R line)``."""
         parts, origins = self._twists
@@ -177,7 +176,7 @@ class Configuration:
         out[1] += cross(origins, parts[0])
         return out.reshape(6, *out.shape[2:])
 
-    @kept
+    @cached_property
     def _local_twists(self) -> Array:
         """The twists in their nodes ``(3, 2, F, T)`` where those of some factors move."""
         s = self.system
@@ -188,7 +187,7 @@ class Configuration:
             s.numbers.place_twists(out, b, b.stack.twists(self.x[b.state_rows], s.par.pitch[b.pairs]))
         return out
 
-    @kept
+    @cached_property
     def E(self) -> Array:
         """Effort wrenches of all freedoms ``(6, F, T)``."""
         s = self.system
@@ -199,7 +198,7 @@ class Configuration:
                 out[:, g.columns] = evaluation.dual(g.row, out[:, g.columns], self.S[:, g.columns], p)
         return out
 
-    @kept
+    @cached_property
     def W(self) -> list[Array]:
         """For every group the reaction wrenches ``(6, 6 - f, n, T)``."""
         s = self.system
@@ -225,7 +224,7 @@ class Configuration:
         out[0] += cross(points, out[1])
         return out.reshape(6, *out.shape[2:])
 
-    @kept
+    @cached_property
     def lee_screws(self) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
         """For every pair the axial wrenches ``(6, n, T)`` and condition twists ``(6, n, T)`` of Lee's bookkeeping."""
         s = self.system
@@ -243,7 +242,7 @@ class Configuration:
 
     # --- closure -----------------------------------------------------------------------------------------------------
 
-    @kept
+    @cached_property
     def chord_errors(self) -> Array:
         """Closure errors ``(6, chords, T)``: finite twist from marker B reached through b to that reached through a, about the origin."""
         reached, declared = (self._nodes.take(nodes, axis=2) for nodes in self.system.chord_nodes)
@@ -269,7 +268,7 @@ class Configuration:
             return self.loop_sums(per_pair)
         return self._about_middles(errors.copy() if s.loops_of_chords is None else s.loops_of_chords @ errors)
 
-    @kept
+    @cached_property
     def middles(self) -> Array:
         """Middle of the pair points of every loop, ``(3, loops, T)``."""
         s = self.system
@@ -288,13 +287,13 @@ class Configuration:
         twists[3:] += cross(twists[:3], self.middles)
         return twists.swapaxes(0, 1).reshape(6 * self.system.graph.n_loops, self.T)
 
-    @kept
+    @cached_property
     def closure(self) -> Array:
         """Closure error ``(T,)``: largest of angle and length / L over all loops, and of the other rows."""
         errors = [part.error(self) for part in self.system.position_rows]
         return errors[0] if len(errors) == 1 else np.max(errors, axis=0)
 
-    @kept
+    @cached_property
     def residual(self) -> Array:
         """What the closure rows leave open ``(n_rows, T)``: loops first, then the others."""
         return _stacked([part.residual(self) for part in self.system.position_rows])
@@ -304,7 +303,7 @@ class Configuration:
         """Rounding of the residual ``(T,)``: that of positions, which grows with their distance from the internal origin."""
         return np.asarray(ROUNDINGS * np.finfo(float).eps * np.abs(self._nodes[:, 3]).max(axis=(0, 1), initial=1.0))
 
-    @kept
+    @cached_property
     def J(self) -> Array:
         """Closure Jacobian ``(n_rows, F, T)``; of the loops ``J = (C x I6) diag(S_k)``."""
         return _stacked([part.jacobian(self) for part in self.system.position_rows])

@@ -24,10 +24,11 @@ from numpy.typing import NDArray
 
 from mechgraph.graph.linkgraph import LinkGraph, link_graph
 from mechgraph.kinematics.batches import FACTORS_AT_ONCE, Numbers
-from mechgraph.kinematics.layout import Places, shared
+from mechgraph.kinematics.layout import Places
 from mechgraph.kinematics.one_state import FEW_NODES, OneStateMatrices
 from mechgraph.maths.linear import Place, add_at, compact
 from mechgraph.maths.se3 import Array, Index, turn_between, turn_tangent, turned
+from mechgraph.memo import graph_cached
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Parameters, coupling_places, parameters
 from mechgraph.pairs import kinematics as evaluation
@@ -203,7 +204,7 @@ class CouplingRows:
 class States(Places):
     """States ``(nx, ...)`` of a mechanism, and increments ``(F, ...)`` between them."""
 
-    @shared
+    @graph_cached
     def single_rows(self) -> Index:
         """For every freedom its row in the state, -1 for those of rotations."""
         out = np.full(self.n_freedoms, -1, dtype=np.intp)
@@ -213,13 +214,13 @@ class States(Places):
                     out[g.columns[columns]] = g.state_rows[rows]
         return out
 
-    @shared
+    @graph_cached
     def _singles(self) -> tuple[Place, Place]:
         """Columns and state rows of the single freedoms."""
         columns = np.flatnonzero(self.single_rows >= 0)
         return compact(columns), compact(self.single_rows[columns])
 
-    @shared
+    @graph_cached
     def rotations(self) -> tuple[Index, Index] | None:
         """Columns ``(3, n)`` and state rows ``(4, n)`` of the rotations; None where there are none."""
         parts = [

@@ -6,6 +6,7 @@ Source for the strategy: Golub and Van Loan, Matrix Computations, section 5.4 (r
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -13,7 +14,6 @@ import scipy
 from numpy.typing import NDArray
 
 from mechgraph.maths.se3 import SMALL_BATCH, Array, Index
-from mechgraph.memo import kept
 
 Place = slice | Index
 """Places along an axis; a slice takes no copy."""
@@ -152,7 +152,7 @@ class Choice:
         rows, cols = self.places
         return A[rows][:, cols]
 
-    @kept
+    @cached_property
     def places(self) -> tuple[Place, Place]:
         """The rows and the columns, as slices where that can be."""
         return compact(self.rows), compact(self.cols)
@@ -265,7 +265,7 @@ class LuFactors:
     def __init__(self, A: Array) -> None:
         self._each = [Lu(A[:, :, t]) for t in range(A.shape[2])]
 
-    @kept
+    @cached_property
     def condition(self) -> Array:
         """See ``Factor``."""
         return np.array([lu.condition for lu in self._each])
@@ -293,7 +293,7 @@ class Inverses:
         if not few:
             self._inverse = np.ascontiguousarray(self._inverse)
 
-    @kept
+    @cached_property
     def condition(self) -> Array:
         """See ``Factor``."""
         with np.errstate(invalid="ignore", over="ignore"):
@@ -347,7 +347,7 @@ class ChosenSystem:
             choice, at = choices[i], EVERY if len(used) == 1 else np.flatnonzero(which == i)
             self._parts.append((choice, at, factor_of(choice.square(A)[:, :, at])))
 
-    @kept
+    @cached_property
     def condition(self) -> Array:
         """Condition numbers of the square parts ``(T,)``."""
         if self._parts and self._parts[0][1] is EVERY:

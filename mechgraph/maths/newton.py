@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -11,7 +12,6 @@ import scipy
 
 from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.tolerances import PATH
-from mechgraph.memo import kept
 
 UNMET = 30.0
 """Residual over the step that takes it away from which on it is asked whether it does: rows are of size one, a few freedoms each."""
@@ -157,7 +157,7 @@ class Closed:
     done: Mask
     point: Any = None
 
-    @kept
+    @cached_property
     def correction(self) -> Array:
         """Largest correction of a freedom ``(n,)``."""
         return largest(self.total)
