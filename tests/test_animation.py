@@ -13,12 +13,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from PIL import Image
+from program import invoke
 from test_show import four_bar
-from typer.testing import CliRunner
 
 import mechgraph as mg
 from mechgraph import show
-from mechgraph.cli import app
 from mechgraph.cli.records import output_schema
 
 THETA = np.linspace(0, 2 * np.pi, 9)
@@ -122,12 +121,10 @@ def test_the_plot_command_draws_every_kind(tmp_path: Path) -> None:
     ]
     for kind in kinds:
         out = tmp_path / f"{kind}.svg"
-        result = CliRunner().invoke(app, ["plot", "four-bar", kind, "--out", str(out), *of.get(kind, [])])
+        result = invoke("plot", "four-bar", kind, "--out", str(out), *of.get(kind, []))
         assert result.exit_code == 0, result.output
         assert xml.etree.ElementTree.parse(out).getroot().tag.endswith("svg")
-    result = CliRunner().invoke(
-        app, ["plot", "four-bar", "--out", str(tmp_path / "film.gif"), "--frames", "2", "--json"]
-    )
+    result = invoke("plot", "four-bar", "--out", tmp_path / "film.gif", "--frames", "2", "--json")
     assert result.exit_code == 0
     data = json.loads(result.stdout)
     jsonschema.Draft202012Validator(output_schema()).validate(data)
@@ -144,7 +141,7 @@ def test_the_plot_command_refuses(tmp_path: Path) -> None:
         (["four-bar", "--out", str(tmp_path / "x.jpg")], ".svg"),
         (["four-bar", "efforts", "--out", str(tmp_path / "x.gif")], ".svg"),
     ):
-        result = CliRunner().invoke(app, ["plot", *arguments])
+        result = invoke("plot", *arguments)
         assert result.exit_code == 2
         assert words in result.output + result.stderr
     assert not list(tmp_path.iterdir())

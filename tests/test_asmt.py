@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 import scipy
 from asmt_writer import KINDS, Writer, lines_of, random_pose, written
-from typer.testing import CliRunner
+from program import invoke
 
 import mechgraph as mg
-from mechgraph.cli import app
 from mechgraph.document import to_text
 from mechgraph.exchange.asmt import JOINTS, REFUSED
 from mechgraph.exchange.comparison import compare
@@ -593,7 +592,7 @@ def test_rows_longer_than_the_times_and_times_that_start_again(tmp_path):
 
 
 def run(*arguments):
-    result = CliRunner().invoke(app, [str(a) for a in arguments])
+    result = invoke(*arguments)
     assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
     return result
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
+from mechgraph import show
 from mechgraph.graph.chains import contracted_graphs, least_orders, symmetries
-from mechgraph.show import draw_chains, draw_structure
 
 
 def test_orders_are_those_of_all_symmetries() -> None:
@@ -248,14 +248,14 @@ def test_system_groups_have_mobility_zero() -> None:
 def test_a_page_of_the_atlas() -> None:
     """Every chain on axes of its own: as many polygons as links with more than two joints, a circle for each joint."""
     chains = list(mg.atlas(8))
-    page = draw_chains(chains)
+    page = show.draw_chains(chains)
     assert len(page.axes) == 16
     for chain, ax in zip(chains, page.axes, strict=True):
         assert len(ax.patches) == sum(degree > 2 for degree in chain.degrees)
         assert len(ax.lines) == chain.degrees.count(2)
         assert sum(len(joints.get_offsets()) for joints in ax.collections) == len(chain.joints) == 10
     with pytest.raises(mg.DeclarationError, match="0 chains in 6 columns"):
-        draw_chains([])
+        show.draw_chains([])
 
 
 def segments(ax: Any) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -280,24 +280,24 @@ def crossings(ax: Any) -> int:
 @pytest.mark.slow
 def test_links_do_not_cross_on_the_page() -> None:
     """Those of up to eight links can all be drawn without crossings; two of the sixteen may keep one."""
-    assert [crossings(ax) for ax in draw_chains(mg.atlas(6, multiple=True)).axes] == [0, 0, 0, 0]
-    left = [crossings(ax) for ax in draw_chains(mg.atlas(8)).axes]
+    assert [crossings(ax) for ax in show.draw_chains(mg.atlas(6, multiple=True)).axes] == [0, 0, 0, 0]
+    left = [crossings(ax) for ax in show.draw_chains(mg.atlas(8)).axes]
     assert sum(left) <= 2
 
 
 def test_pair_types_are_seen() -> None:
     """A square for a slide, the symbol in a diamond for other types than turns and slides."""
-    (ax,) = draw_chains([next(c for c in mg.atlas(4, types=("R", "P")) if c.types.count("P") == 1)]).axes
+    (ax,) = show.draw_chains([next(c for c in mg.atlas(4, types=("R", "P")) if c.types.count("P") == 1)]).axes
     assert sorted(len(joints.get_offsets()) for joints in ax.collections) == [0, 1, 3]
     chain = next(mg.atlas(4, family=0, types=("R", "C", "S"), joints=4))
-    (ax,) = draw_chains([chain]).axes
+    (ax,) = show.draw_chains([chain]).axes
     assert sorted(text.get_text() for text in ax.texts) == sorted(t for t in chain.types if t != "R")
 
 
 def test_the_structural_diagram_has_a_colour_for_each_group() -> None:
     m = mg.load("windows-2")
     groups = mg.groups(m)
-    ax = draw_structure(m, groups=groups)
+    ax = show.draw_structure(m, groups=groups)
     of_link = {line.get_gid(): line.get_color() for line in ax.lines}
     tones = [{of_link[f"link {link}"] for link in g.links} for g in groups.groups]
     assert [len(t) for t in tones] == [1, 1, 1]

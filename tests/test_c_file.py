@@ -10,10 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from program import invoke
 
 import mechgraph as mg
-from mechgraph.cli import app
 from mechgraph.compiled.c_file import source_text, write_c
 from mechgraph.compiled.fmu import description, variables
 from mechgraph.compiled.tabled import STATUSES, tabled
@@ -165,12 +164,12 @@ def test_c_is_written_without_a_compiler(monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr(build, "installed", lambda: None)
     out = tmp_path / "press.c"
-    done = CliRunner().invoke(app, ["compile", "four-bar", "--out", str(out), "--name", "mill"])
+    done = invoke("compile", "four-bar", "--out", str(out), "--name", "mill")
     assert done.exit_code == 0, done.output
     assert "int mill_solve(void *state" in out.read_text(encoding="utf-8")
     assert "size_t mill_state_size(void);" in out.with_suffix(".h").read_text(encoding="utf-8")
     monkeypatch.setattr(compiler, "compilers", list)
-    done = CliRunner().invoke(app, ["compile", "four-bar", "--out", str(tmp_path / "press.fmu")])
+    done = invoke("compile", "four-bar", "--out", str(tmp_path / "press.fmu"))
     assert done.exit_code == 2
     assert "C compiler" in done.output
     assert not (tmp_path / "press.fmu").exists()
@@ -348,6 +347,6 @@ def test_steps_of_the_motion_in_c(command, tmp_path):
 def test_inputs_of_what_is_written(tmp_path):
     with pytest.raises(mg.DeclarationError, match="inputs = 'forces': expected one of 'motion', 'efforts'"):
         write_tables(tabled(mg.load("four-bar")), tmp_path / "press.c", inputs="forces")
-    done = CliRunner().invoke(app, ["compile", "four-bar", "--out", str(tmp_path / "press.c"), "--inputs", "efforts"])
+    done = invoke("compile", "four-bar", "--out", str(tmp_path / "press.c"), "--inputs", "efforts")
     assert done.exit_code == 0, done.output
     assert "int press_step(void *state, double time" in (tmp_path / "press.h").read_text(encoding="utf-8")

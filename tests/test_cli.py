@@ -13,41 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mechanisms import unclosable_four_bar
-from typer.testing import CliRunner, Result
+from program import bad, heard, invoke, process, run
 
 import mechgraph as mg
-from mechgraph.cli import app
 from mechgraph.cli.options import parse_drive
 
 ROOT = Path(__file__).resolve().parents[1]
-
-
-def run(*arguments: str | Path) -> Result:
-    result = CliRunner().invoke(app, [str(a) for a in arguments])
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-    assert "Traceback" not in result.output
-    assert "\x1b" not in result.output
-    return result
-
-
-def bad(*arguments: str | Path) -> str:
-    """The message of a call that is refused as wrong usage or bad input."""
-    result = run(*arguments)
-    assert result.exit_code == 2, result.output
-    assert not result.stdout
-    return result.stderr
-
-
-def process(*arguments: str, **environment: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [sys.executable, "-m", "mechgraph", *arguments], capture_output=True, text=True, check=False,
-        env=os.environ | {"PYTHONPATH": str(ROOT)} | environment, preexec_fn=heard if os.name == "posix" else None,
-    )  # fmt: skip
-
-
-def heard() -> None:
-    """Let Ctrl-C be heard, also where the tests run in the background."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 @pytest.fixture
@@ -747,7 +718,7 @@ def test_a_drive_declared_at_its_dead_point_is_told_without_a_hint_that_does_not
         mg.Pair("C", "R", "lower", "upper", point=(0.5, -0.5, 0), axis=z), mg.Pair("D", "R", "upper", "frame", point=(1, 0, 0), axis=z),
     ], drives=["A"])  # fmt: skip
     mg.save(gear, tmp_path / "gear.toml")
-    result = CliRunner().invoke(app, ["solve", str(tmp_path / "gear.toml"), "--drive", "A=0:10:5deg"])
+    result = invoke("solve", str(tmp_path / "gear.toml"), "--drive", "A=0:10:5deg")
     assert result.exit_code == 1
     assert "A.Rz stands still" in result.output
     assert "--on-reach" not in result.output

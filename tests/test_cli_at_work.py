@@ -11,18 +11,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from program import app, invoke
 
 import mechgraph as mg
 from mechgraph import files
-from mechgraph.cli import app, options
+from mechgraph.cli import options
 
 ROOT = Path(__file__).resolve().parents[1]
 COMMANDS = [command.name for command in app.registered_commands]
 
 
 def help_of(command: str, columns: int = 80) -> str:
-    result = CliRunner(env={"COLUMNS": str(columns), "TERMINAL_WIDTH": str(columns)}).invoke(app, [command, "--help"])
+    result = invoke(command, "--help", COLUMNS=str(columns), TERMINAL_WIDTH=str(columns))
     assert result.exit_code == 0
     return result.stdout
 
@@ -37,7 +37,7 @@ def test_the_example_of_the_help_runs(command: str, tmp_path: Path, monkeypatch:
     monkeypatch.chdir(tmp_path)
     for example in examples:
         assert example.split()[0] == command
-        result = CliRunner().invoke(app, example.split())
+        result = invoke(*example.split())
         assert result.exit_code == 0, result.output
         named = re.findall(r"(?:--out|-o) (\S+)", example)
         assert {file.stem for file in tmp_path.iterdir()} == {Path(name).stem for name in named}  # C beside its header
@@ -84,7 +84,7 @@ def test_completion(words: str, expected: list[str]) -> None:
 
 
 def test_completion_can_be_installed() -> None:
-    shown = CliRunner().invoke(app, ["--help"]).stdout
+    shown = invoke("--help").stdout
     assert "--install-completion" in shown
     assert "--show-completion" in shown
 
@@ -113,10 +113,10 @@ def test_bars_are_shown_on_a_terminal_alone(arguments: tuple[str, ...], monkeypa
         "update",
         lambda bar, task, **of: (told.append((of["completed"], of["total"])), real(bar, task, **of)),
     )
-    assert CliRunner().invoke(app, [*arguments]).exit_code == 0
+    assert invoke(*arguments).exit_code == 0
     assert not told
     monkeypatch.setattr(options, "is_terminal", lambda stream: stream is sys.stderr)
-    result = CliRunner().invoke(app, [*arguments])
+    result = invoke(*arguments)
     assert result.exit_code == 0
     assert told
     assert told[-1][0] == pytest.approx(told[-1][1])

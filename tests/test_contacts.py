@@ -6,10 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy
-from typer.testing import CliRunner
+from program import invoke
 
 import mechgraph as mg
-from mechgraph.cli import app
 from mechgraph.pairs.contact_types import pressed, pressed_along_line
 
 ALPHA, WEIGHT, SPEED, G = np.deg2rad(25.0), 12.0, 0.3, 9.81
@@ -240,11 +239,11 @@ def test_table_file_and_command_line(tmp_path: Path) -> None:
     assert np.allclose(columns["B path on wedge:x [m]"], [0, -0.1 / np.cos(ALPHA)], atol=1e-15)
     assert "B pressure [N/m^2]" in columns
     arguments = ["solve", str(tmp_path / "wedge.toml"), "--include", "contacts", "--out", str(tmp_path / "wedge.csv")]
-    result = CliRunner().invoke(app, arguments)
+    result = invoke(*arguments)
     assert result.exit_code == 0, result.output
     assert "least normal force [N]" in " ".join(result.stdout.split())
     assert "B pressure [N/m^2]" in (tmp_path / "wedge.csv").read_text(encoding="utf-8").splitlines()[0]
-    lifted = json.loads(CliRunner().invoke(app, ["solve", str(tmp_path / "wedge.toml"), "--json"]).stdout)
+    lifted = json.loads(invoke("solve", str(tmp_path / "wedge.toml"), "--json").stdout)
     assert lifted["lift_off"] == []
 
 

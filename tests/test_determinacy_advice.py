@@ -5,12 +5,11 @@ from __future__ import annotations
 import mechanisms as known
 import numpy as np
 import pytest
+from screws import rotation_exp
 
 import mechgraph as mg
 from mechgraph.determinacy import pair_changes
 from mechgraph.determinacy.pair_changes import Effect, changes_of
-from mechgraph.determinacy.report import DeterminacyReport
-from mechgraph.maths.se3 import rotation_exp
 
 BUILDERS = {
     "planar": known.planar,
@@ -25,7 +24,7 @@ BUILDERS = {
 }
 
 
-def changed(m: mg.Mechanism, effect: Effect) -> DeterminacyReport:
+def changed(m: mg.Mechanism, effect: Effect) -> mg.DeterminacyReport:
     for (pair, old, new), turn in zip(effect.changes, effect.turns, strict=True):
         if new == "left out":
             assert old == "coupling"

@@ -6,9 +6,9 @@ import mechanisms as known
 import numpy as np
 import pytest
 from mechanisms import X, Z
+from screws import pose_exp
 
 import mechgraph as mg
-from mechgraph.maths.se3 import pose_exp
 
 # --- unique by principal direction ----------------------------------------------------------------------------------------
 

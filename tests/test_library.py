@@ -8,7 +8,7 @@ from types import ModuleType
 
 import pytest
 
-from mechgraph.errors import FileError
+import mechgraph as mg
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCE = ROOT / "mechgraph" / "model" / "toml.py"
@@ -47,14 +47,14 @@ def test_the_package_comes_first(tmp_path: Path) -> None:
 
 def test_a_missing_library_names_both_places(tmp_path: Path) -> None:
     module = module_installed_in(tmp_path)
-    with pytest.raises(FileError, match=r"mechgraph.library: no .* nor in .*library; install"):
+    with pytest.raises(mg.FileError, match=r"mechgraph.library: no .* nor in .*library; install"):
         module.library_names()
 
 
 @pytest.mark.parametrize("name", ["rscr", "../library/rcsr", "schema", "rcsr.toml", ""])
 def test_an_unknown_name_lists_the_known(tmp_path: Path, name: str) -> None:
     module = module_installed_in(tmp_path, "library")
-    with pytest.raises(FileError, match="there are: 7r, bennett, rcsr"):
+    with pytest.raises(mg.FileError, match="there are: 7r, bennett, rcsr"):
         module.library_path(name)
 
 

@@ -10,10 +10,9 @@ import jsonschema
 import numpy as np
 import pytest
 import tomli_w
-from typer.testing import CliRunner
+from program import app, invoke
 
 import mechgraph as mg
-from mechgraph.cli import app
 from mechgraph.cli.records import COMMANDS, output_schema
 from mechgraph.files import json_text, patch, plain, schema_of
 from mechgraph.model.file_format import laid_out
@@ -33,7 +32,7 @@ CALLS = [
 
 
 def run(*arguments: str | Path, status: int = 0) -> Any:
-    result = CliRunner().invoke(app, [*map(str, arguments), "--json"])
+    result = invoke(*arguments, "--json")
     assert result.exit_code == status, result.output
     return json.loads(result.stdout, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
 
@@ -113,7 +112,7 @@ def test_an_advice_is_saved_by_its_number(tmp_path: Path) -> None:
     told = run("save", "four-bar", "--advice", "1", "--out", tmp_path / "better.toml")
     assert told == {"schema": 1, "command": "save", "mechanism": "four-bar", "file": str(tmp_path / "better.toml")}
     assert mg.load(tmp_path / "better.toml") == mg.check(mg.load("four-bar")).advice[1].apply()
-    result = CliRunner().invoke(app, ["save", "four-bar", "--advice", "99", "--out", str(tmp_path / "x.toml")])
+    result = invoke("save", "four-bar", "--advice", "99", "--out", str(tmp_path / "x.toml"))
     assert result.exit_code == 2
     assert "counted from 0" in result.stderr
 
@@ -154,7 +153,7 @@ def test_loads_tells_what_acts() -> None:
 
 
 def test_a_failure_leaves_no_output() -> None:
-    result = CliRunner().invoke(app, ["solve", "rcsr", "--drive", "O1=150:220:1deg", "--json"])
+    result = invoke("solve", "rcsr", "--drive", "O1=150:220:1deg", "--json")
     assert (result.exit_code, result.stdout) == (1, "")
     assert "out of reach" in result.stderr
 
@@ -165,7 +164,7 @@ def test_a_failure_leaves_no_output() -> None:
     ids=" ".join,
 )
 def test_what_excludes_it(call: tuple[str, ...]) -> None:
-    assert CliRunner().invoke(app, [*call, "--json"]).exit_code == 2
+    assert invoke(*call, "--json").exit_code == 2
 
 
 def test_numbers_that_json_has_not() -> None:

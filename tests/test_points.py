@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
-from mechgraph.show import draw_skeleton
+from mechgraph import show
 
 Z = (0.0, 0.0, 1.0)
 
@@ -102,19 +102,19 @@ def test_variants_that_differ_in_named_points_are_told_apart() -> None:
 
 def test_named_points_are_drawn() -> None:
     pytest.importorskip("matplotlib")
-    texts = [text.get_text() for text in draw_skeleton(arm()).texts]
+    texts = [text.get_text() for text in show.draw_skeleton(arm()).texts]
     assert "arm.hook" in texts
     assert "frame.wall" in texts
     s = mg.kinematics(arm(), {"A": np.linspace(0, 2, 9)})
     for traces in (True, ["arm.hook"]):
-        drawn = {line.get_gid(): line for line in draw_skeleton(s, traces=traces).collections}
+        drawn = {line.get_gid(): line for line in show.draw_skeleton(s, traces=traces).collections}
         (path,) = drawn["trace of arm.hook"].get_segments()
         np.testing.assert_allclose(path, s.link("arm").at("hook").position[:, :2], atol=1e-12)
         assert "trace of frame.wall" not in drawn  # it stands still
     with pytest.raises(
         mg.DeclarationError, match=r"no pair or named point 'arm\.tip'; there are: frame\.wall, arm\.hook, A"
     ):
-        draw_skeleton(s, traces=["arm.tip"])
+        show.draw_skeleton(s, traces=["arm.tip"])
 
 
 def test_coordinates_of_named_points_are_parameters_and_motions_outputs() -> None:
@@ -162,7 +162,7 @@ def test_coordinates_of_named_points_are_parameters_of_a_compiled_mechanism(comp
 def test_the_path_of_a_response_is_drawn_through_what_lies_between_its_outputs() -> None:
     """On the circle of its hook's radius everywhere, though six positions were asked for."""
     r = mg.respond(arm(drives=[], loads=[mg.Gravity((0, -9.81, 0))]), np.linspace(0, 2, 6), start={"A": 0.0})
-    drawn = {line.get_gid(): line for line in draw_skeleton(r, traces=["arm.hook"]).collections}
+    drawn = {line.get_gid(): line for line in show.draw_skeleton(r, traces=["arm.hook"]).collections}
     (path,) = drawn["trace of arm.hook"].get_segments()
     np.testing.assert_allclose(np.linalg.norm(path, axis=1), 5.0, atol=1e-9)
     assert len(path) > 400

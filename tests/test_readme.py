@@ -15,10 +15,9 @@ from pathlib import Path
 import matplotlib
 import matplotlib.pyplot as plt
 import pytest
-from typer.testing import CliRunner
+from program import invoke
 
 import mechgraph as mg
-from mechgraph.cli import app
 from mechgraph.compiled.tabled import STATUSES
 from mechgraph.kinematics.motion_path import Status
 
@@ -42,7 +41,7 @@ def run_python(code: str, namespace: dict[str, object]) -> str:
 def run_command(line: str) -> str:
     program, *arguments = shlex.split(line.removeprefix("$ "))
     assert program == "mechgraph", line
-    result = CliRunner().invoke(app, arguments)
+    result = invoke(*arguments)
     assert not isinstance(result.exception, Exception), line
     return f"{line}\n{result.output}"
 

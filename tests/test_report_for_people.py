@@ -9,11 +9,10 @@ import mechanisms as known
 import numpy as np
 import pytest
 from lattices import ladder, parallelograms, scissors, spatial_ladder, tree_of_loops
-from typer.testing import CliRunner
+from program import invoke
+from screws import pose_exp
 
 import mechgraph as mg
-from mechgraph.cli import app
-from mechgraph.maths.se3 import pose_exp
 
 BUILDERS = (
     {n: (lambda n=n: mg.load(n)) for n in mg.library()}
@@ -195,8 +194,7 @@ def test_a_load_that_no_part_takes_is_what_to_do_first() -> None:
 
 
 def test_the_command_line_prints_the_page_and_the_whole() -> None:
-    runner = CliRunner()
-    page, whole = (runner.invoke(app, ["check", "four-bar", *more]).stdout for more in ([], ["--full"]))
+    page, whole = (invoke("check", "four-bar", *more).stdout for more in ([], ["--full"]))
     assert "What to do:" in page
     assert "Self-stresses" not in page
     assert "Self-stresses" in whole

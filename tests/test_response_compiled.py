@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from program import invoke
 
 import mechgraph as mg
-from mechgraph.cli import app
 
 GOVERNOR = Path(__file__).parent / "reference" / "data" / "flyball-governor.toml"
 
@@ -117,7 +116,7 @@ def test_what_the_kernel_does_not_carry():
 
 @pytest.mark.usefixtures("compiled")
 def test_the_command_line_takes_the_engine():
-    done = CliRunner().invoke(app, ["respond", str(GOVERNOR), "--for", "1ms", "--engine", "compiled", "--json"])
+    done = invoke("respond", str(GOVERNOR), "--for", "1ms", "--engine", "compiled", "--json")
     assert done.exit_code == 0, done.output
     assert '"engine": "compiled"' in done.output
 

@@ -8,10 +8,9 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from program import invoke
 
 import mechgraph as mg
-from mechgraph.cli import app
 from mechgraph.cli.options import duration
 from mechgraph.model.file_format import json_schema
 
@@ -242,14 +241,14 @@ def test_the_command_line_needs_no_options(name: str, tmp_path: Path) -> None:
     m = mg.load(name)
     short = m.replace(response=mg.ResponseSetup((0.0, m.response.time[-1] / 50), rates=dict(m.response.rates)))
     mg.save(short, tmp_path / "x.toml")
-    result = CliRunner().invoke(app, ["respond", str(tmp_path / "x.toml"), "--points", "3"])
+    result = invoke("respond", str(tmp_path / "x.toml"), "--points", "3")
     assert result.exit_code == 0, result.output
     assert "Solved 3 of 3 positions" in result.output
     assert mg.respond(short).t[-1] == pytest.approx(m.response.time[-1] / 50)
 
 
 def test_the_command_line_asks_how_long() -> None:
-    result = CliRunner().invoke(app, ["respond", "rssr"])
+    result = invoke("respond", "rssr")
     assert result.exit_code == 2
     assert "Give --for TIME" in result.stderr
 

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
-from mechgraph.show import draw_skeleton, effort_curve
+from mechgraph import show
 
 matplotlib.use("agg")
 
@@ -88,7 +88,7 @@ def test_skeleton_names_pairs_and_links_and_keeps_scales_equal() -> None:
     """A plane mechanism on axes of two dimensions, in its plane wherever that is."""
     for z, size in ((0.0, (6, 4)), (3.0, (3, 6))):
         s = mg.solve(four_bar(z), {"A": THETA})
-        ax = draw_skeleton(s, 3)
+        ax = show.draw_skeleton(s, 3)
         ax.figure.set_size_inches(size)
         texts = shown(ax)
         assert {"A (R)", "D (R)", "crank", "coupler", "rocker", "x", "y"} <= texts
@@ -103,15 +103,15 @@ def test_links_and_traces_are_where_the_motion_takes_them() -> None:
     """Rods end at the pair points, on the axes as in space; more ghosts and traces draw more."""
     s = mg.solve(four_bar(2.0), {"A": THETA})
     tip = s.link("crank").point((1, 0, 2)).position
-    ax = draw_skeleton(s, 9, ghosts=4, traces=["B"], labels=False)
+    ax = show.draw_skeleton(s, 9, ghosts=4, traces=["B"], labels=False)
     assert shown(ax) == {"x", "y", "0.5"}
     (path,) = drawn(ax, "trace of B")
     assert np.allclose(path.get_segments()[0], tip[:, :2])
     assert [len(c.get_segments()) for c in drawn(ax, "ghosts")] == [4, 4, 4]
-    assert not drawn(draw_skeleton(s, ghosts=0, traces=False), "ghosts")
+    assert not drawn(show.draw_skeleton(s, ghosts=0, traces=False), "ghosts")
     whole = [path.vertices for c in ax.collections for path in c.get_paths()]
     assert min(np.abs(v - tip[9, :2]).sum(axis=1).min() for v in whole) < 0.2
-    space = draw_skeleton(s, 9, ax=matplotlib.figure.Figure().add_subplot(projection="3d"))
+    space = show.draw_skeleton(s, 9, ax=matplotlib.figure.Figure().add_subplot(projection="3d"))
     assert space.elev == pytest.approx(90.0)
 
 
@@ -124,7 +124,7 @@ def test_skeleton_of_the_library(name: str) -> None:
         s = mg.solve(m)
     except mg.MechgraphError:
         s = m
-    ax = draw_skeleton(s, forces=True)
+    ax = show.draw_skeleton(s, forces=True)
     assert {f"{p.name} ({p.type.symbol})" for p in m.pairs} <= shown(ax)
     check_texts(ax)
     ax.figure.set_size_inches(4.2, 3.4)
@@ -139,7 +139,7 @@ def test_beyond_a_dozen_pairs_numbers_stand_for_names() -> None:
         mg.Pair(f"pair number {i}", "R", f"link {i}", f"link {i + 1}", point=p, axis=(0, 0, 1))
         for i, p in enumerate(points)
     ]
-    ax = draw_skeleton(mg.Mechanism("long", pairs=pairs))
+    ax = show.draw_skeleton(mg.Mechanism("long", pairs=pairs))
     texts = shown(ax)
     assert {"1", "14", "1  pair number 0 (R)", "14  pair number 13 (R)", "link 3"} <= texts
     assert "pair number 0 (R)" not in texts
@@ -152,7 +152,7 @@ def test_a_legend_leaves_room_and_counts_what_it_leaves_out() -> None:
         mg.Pair(f"p{i}", "R", f"k{i}", f"k{i + 1}", point=(float(i), float(i % 2), 0.3 * (i % 3)), axis=(0, 0, 1))
         for i in range(90)
     ]
-    ax = draw_skeleton(mg.Mechanism("long", pairs=pairs))
+    ax = show.draw_skeleton(mg.Mechanism("long", pairs=pairs))
     ax.figure.set_size_inches(5, 3)
     assert any(text.startswith("\u2026 and ") for text in shown(ax))
     check_texts(ax)
@@ -163,13 +163,13 @@ def test_a_legend_leaves_room_and_counts_what_it_leaves_out() -> None:
 
 def test_forces_that_are_not_unique_are_hatched_and_have_no_arrow() -> None:
     s = mg.solve(mg.load("spherical-four-bar"))
-    ax = draw_skeleton(s, forces=True)
+    ax = show.draw_skeleton(s, forces=True)
     (mark,) = drawn(ax, "not unique")
     assert mark.get_hatch()
     assert len(mark.get_offsets()) == 4
     assert "hatched: not unique" in shown(ax)
     assert not drawn(ax, "reaction A")
-    known = draw_skeleton(mg.solve(mg.load("four-bar")), forces=True)
+    known = show.draw_skeleton(mg.solve(mg.load("four-bar")), forces=True)
     assert drawn(known, "reaction A")
     assert not drawn(known, "not unique")
 
@@ -184,24 +184,24 @@ def test_positions_that_were_not_solved_leave_gaps_in_the_paths() -> None:
     angles = np.concatenate([np.linspace(0, 0.3, 6), [2.5, 2.6], np.linspace(0.3, 0, 6)])
     s = mg.kinematics(bars, {"A": angles}, on_reach="flag")
     assert (s.status != "ok").sum() == 2
-    (path,) = drawn(draw_skeleton(s, traces=["B"]), "trace of B")
+    (path,) = drawn(show.draw_skeleton(s, traces=["B"]), "trace of B")
     assert [len(piece) for piece in path.get_segments()] == [6, 6]
 
 
 def test_single_position_and_effort_curve() -> None:
     s = mg.solve(four_bar(), {"A": 0.5})
-    draw_skeleton(s)
-    ax = effort_curve(s)
+    show.draw_skeleton(s)
+    ax = show.effort_curve(s)
     assert ax.get_xlabel() == "A.Rz [deg]"
     s = mg.solve(four_bar(), {"A": THETA})
-    line = effort_curve(s, "A", marked=2).lines[0]
+    line = show.effort_curve(s, "A", marked=2).lines[0]
     assert np.allclose(line.get_xdata(), np.rad2deg(THETA))
     assert np.allclose(line.get_ydata(), s["A"].effort[:, 0])
 
 
 def test_an_effort_curve_shows_motor_and_loads_apart() -> None:
     """A spring in the driver's freedom: two curves, the motor's of which falls by what the spring brings."""
-    ax = effort_curve(s := mg.solve(four_bar(), {"A": THETA}, loads=[mg.TorsionSpring("A", 2.0)]))
+    ax = show.effort_curve(s := mg.solve(four_bar(), {"A": THETA}, loads=[mg.TorsionSpring("A", 2.0)]))
     motor, spring = ax.lines[:2]
     assert [text.get_text() for text in ax.get_legend().get_texts()] == ["driver", "applied"]
     assert np.allclose(spring.get_ydata(), -2.0 * THETA)
@@ -212,11 +212,11 @@ def test_an_effort_curve_shows_motor_and_loads_apart() -> None:
 def test_faults_are_named() -> None:
     s = mg.solve(four_bar(), {"A": THETA})
     with pytest.raises(mg.DeclarationError, match="position 99"):
-        draw_skeleton(s, 99)
+        show.draw_skeleton(s, 99)
     with pytest.raises(mg.DeclarationError, match="is no driver"):
-        effort_curve(s, "D")
+        show.effort_curve(s, "D")
     with pytest.raises(mg.DeclarationError, match="solve"):
-        effort_curve(mg.kinematics(four_bar(), {"A": THETA}))
+        show.effort_curve(mg.kinematics(four_bar(), {"A": THETA}))
 
 
 def test_without_matplotlib(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -230,12 +230,12 @@ def test_without_matplotlib(monkeypatch: pytest.MonkeyPatch) -> None:
     s = mg.solve(four_bar(), {"A": THETA})
     monkeypatch.setattr(builtins, "__import__", missing)
     with pytest.raises(mg.MissingExtraError, match=r"mechgraph\[plot\]"):
-        draw_skeleton(s)
+        show.draw_skeleton(s)
 
 
 def test_cases_have_paths_of_their_own() -> None:
     s = mg.kinematics(four_bar(), {"A": np.stack([np.linspace(0, 1, 5), np.linspace(0, 2, 5)])})
-    (path,) = drawn(draw_skeleton(s, 7, traces=["B"]), "trace of B")
+    (path,) = drawn(show.draw_skeleton(s, 7, traces=["B"]), "trace of B")
     tip = s.link("crank").point((1, 0, 0)).position[..., :2]
     assert np.allclose(path.get_segments(), tip)
 
@@ -243,18 +243,18 @@ def test_cases_have_paths_of_their_own() -> None:
 def test_highlighted_loop_of_a_mechanism_that_was_not_solved() -> None:
     """Links outside the loop are grey; the picture needs no drivers."""
     m = mg.load("rcsr-csr")
-    ax = draw_skeleton(m, highlight=mg.check(m).loops[1])
+    ax = show.draw_skeleton(m, highlight=mg.check(m).loops[1])
     ax.figure.draw_without_rendering()
     colours = {text.get_text(): text.get_color() for text in ax.texts}
     grey = {name for name in m.link_names() if colours.get(name) == colours["link3"]}
     assert {p for p, _ in mg.check(m).loops[1]} == {"O1", "O2", "O5", "O6", "O7"}
     assert grey == {"link3"}
     s = mg.solve(four_bar(), {"A": 0.0})
-    drawings = [draw_skeleton(x, ghosts=0, traces=False) for x in (s, four_bar().replace(loads=[]))]
+    drawings = [show.draw_skeleton(x, ghosts=0, traces=False) for x in (s, four_bar().replace(loads=[]))]
     rods = [[path.vertices for c in ax.collections if c.get_zorder() == 4 for path in c.get_paths()] for ax in drawings]
     assert all(np.allclose(a, b) for a, b in zip(*rods, strict=True))
     with pytest.raises(mg.DeclarationError, match="there is no pair 'X'"):
-        draw_skeleton(m, highlight=["X"])
+        show.draw_skeleton(m, highlight=["X"])
 
 
 def test_nothing_outside_is_changed() -> None:
@@ -270,9 +270,9 @@ def test_nothing_outside_is_changed() -> None:
     before = outside()
     m = mg.load("rssr")
     s = mg.solve(m, {"A": THETA})
-    draw_skeleton(s).figure.draw_without_rendering()
-    draw_skeleton(m)
-    effort_curve(s, "A")
+    show.draw_skeleton(s).figure.draw_without_rendering()
+    show.draw_skeleton(m)
+    show.effort_curve(s, "A")
     mg.check(m)
     mg.formulate(m).latex()
     mg.study(m, {"coupler.mass": [0.08, 0.09]}, ["A.effort"], n=2)

@@ -5,10 +5,9 @@ import re
 import numpy as np
 import pytest
 from lattices import ladder
-from typer.testing import CliRunner
+from program import invoke
 
 import mechgraph as mg
-from mechgraph.cli import app
 from mechgraph.result import summary as summaries
 from mechgraph.result.summary import Greatest, efforts, reactions
 
@@ -32,7 +31,7 @@ def two_motors() -> mg.Mechanism:
 @pytest.mark.parametrize("redundant", ["nan", "minimum_norm"])
 @pytest.mark.parametrize("name", ["four-bar", "7r", "rssr"])
 def test_python_says_what_the_command_line_says(name: str, redundant: str) -> None:
-    shown = CliRunner().invoke(app, ["solve", name, "--redundant", redundant]).stdout
+    shown = invoke("solve", name, "--redundant", redundant).stdout
     s = mg.solve(mg.load(name), redundant=redundant)
     assert s.summary() == str(s)
     assert re.split(r"\s+", shown) == re.split(r"\s+", s.summary())  # wrapped at 80 columns alone

@@ -6,12 +6,11 @@ import mechanisms
 import numpy as np
 import pytest
 import scipy.stats
+from program import invoke
 from scipy.spatial.transform import Rotation
 from strategies import closed_mechanism
-from typer.testing import CliRunner
 
 import mechgraph as mg
-from mechgraph.cli import app
 from mechgraph.determinacy.findings import plausible
 
 SPECIAL = {
@@ -256,10 +255,9 @@ def test_files_and_the_command_line(tmp_path) -> None:
     assert mg.load(path).tol == 1e-4
     assert mg.check(mg.load(path)).mobility == 1
     mg.save(m, path)
-    run = CliRunner().invoke
-    assert run(app, ["solve", str(path), "--drive", "A=0:60:10deg"]).exit_code == 1
-    assert run(app, ["solve", str(path), "--drive", "A=0:60:10deg", "--tol", "1e-4"]).exit_code == 0
-    assert "mobility 1" in run(app, ["check", str(path), "--tol", "1e-4"]).output
+    assert invoke("solve", str(path), "--drive", "A=0:60:10deg").exit_code == 1
+    assert invoke("solve", str(path), "--drive", "A=0:60:10deg", "--tol", "1e-4").exit_code == 0
+    assert "mobility 1" in invoke("check", str(path), "--tol", "1e-4").output
 
 
 def test_a_study_takes_every_variant_as_meant() -> None:

@@ -4,10 +4,9 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from program import invoke
 
 import mechgraph as mg
-from mechgraph.cli import app
 
 
 def apex(s: mg.Solution, pair: str) -> np.ndarray:
@@ -128,10 +127,10 @@ def test_bad_outputs() -> None:
 
 
 def test_on_the_command_line() -> None:
-    result = CliRunner().invoke(app, ["solve", "four-bar", "--transmission", "D"])
+    result = invoke("solve", "four-bar", "--transmission", "D")
     assert result.exit_code == 0, result.output
     assert "From A.Rz to D.Rz, links at rest and without mass." in result.stdout
-    told = json.loads(CliRunner().invoke(app, ["solve", "four-bar", "--transmission", "D", "--json"]).stdout)
+    told = json.loads(invoke("solve", "four-bar", "--transmission", "D", "--json").stdout)
     angles = mg.transmission(mg.solve(mg.load("four-bar")), "D").transmission_angle
     assert told["transmission"] == [
         {

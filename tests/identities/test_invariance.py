@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from screws import rotation_exp
 
 import mechgraph as mg
-from mechgraph.determinacy.report import DeterminacyReport
-from mechgraph.maths.se3 import rotation_exp
 
 pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 """Random loads move passive freedoms; ``test_passive_loads`` looks at what is said of it."""
@@ -28,7 +27,7 @@ BUILDERS = {
 }
 
 
-def said(r: DeterminacyReport) -> tuple[object, ...]:
+def said(r: mg.DeterminacyReport) -> tuple[object, ...]:
     """What must stay: verdict, counts, uniqueness, self-stresses, combinations, who is passive, drivable or locked, advice."""
     assert r.reactions is not None
     return (

@@ -11,7 +11,6 @@ import pytest
 from mechanisms import X, Y, Z
 
 import mechgraph as mg
-from mechgraph.determinacy.report import DeterminacyReport
 
 
 @dataclass(frozen=True)
@@ -64,11 +63,11 @@ DETERMINATE = {
 
 
 @cache
-def report(name: str) -> DeterminacyReport:
+def report(name: str) -> mg.DeterminacyReport:
     return mg.check(CASES[name].build())
 
 
-def loose(r: DeterminacyReport, pair: str) -> set[str]:
+def loose(r: mg.DeterminacyReport, pair: str) -> set[str]:
     return {name for name, ok in r.unique[pair].items() if not ok}
 
 

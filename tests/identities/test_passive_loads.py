@@ -4,10 +4,9 @@ import warnings
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from program import invoke
 
 import mechgraph as mg
-from mechgraph.cli import app
 
 Z = (0, 0, 1)
 SI = {"length": "m", "mass": "kg", "time": "s"}
@@ -79,7 +78,7 @@ def test_a_torque_on_a_shaft_that_nothing_drives_is_named_everywhere(tmp_path) -
     assert "A *" in text
     assert "a couple of 19.51 N m" in text
     mg.save(m, tmp_path / "shaft.toml")
-    run = CliRunner().invoke(app, ["solve", str(tmp_path / "shaft.toml")])
+    run = invoke("solve", str(tmp_path / "shaft.toml"))
     assert run.exit_code == 0
     assert "load-bearing passive freedom, held by a couple of 19.51 N m at most" in " ".join(run.stdout.split())
     assert not run.stderr

@@ -13,7 +13,6 @@ import mechgraph.kinetostatics as pipeline
 from mechgraph.kinematics.prescribed import DriverMotion
 from mechgraph.kinetostatics import Pipeline
 from mechgraph.outcome import Options
-from mechgraph.result.solution import Solution
 
 SAME = 1e-11
 Z = (0.0, 0.0, 1.0)
@@ -25,7 +24,7 @@ def assert_same(m, motions, condition=1.0, **options):
     """Both forms of one call; how the reduced one did."""
     lines = [Pipeline(DriverMotion(m, motions), Options(form=form, **options)) for form in ("full", "reduced")]
     assert lines[1].reduction is not None
-    full, reduced = (Solution(line.run().trajectory) for line in lines)
+    full, reduced = (mg.Solution(line.run().trajectory) for line in lines)
     assert (full.status == "ok").any()
     worst, where, faults = differences(full, reduced)
     assert not faults

@@ -12,7 +12,6 @@ import mechgraph as mg
 from mechgraph.kinematics.prescribed import DriverMotion
 from mechgraph.kinetostatics import Pipeline
 from mechgraph.outcome import Options
-from mechgraph.result.solution import Solution
 
 pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 """Random loads move passive freedoms; ``test_passive_loads`` looks at what is said of it."""
@@ -457,7 +456,7 @@ def test_passive_bodies_beside_a_change_point(begin, form):
     def at_rest(q):
         options = Options(method=None, form=form)
         found = Pipeline(DriverMotion(m, {"A": mg.Motion(q, 1.0)}), options).run().trajectory
-        return Solution(found)
+        return mg.Solution(found)
 
     whole = at_rest(at)
     for pick in ([4], [1, 2, 3]):

@@ -17,7 +17,6 @@ import pytest
 from numpy.typing import NDArray
 
 import mechgraph as mg
-from mechgraph.result.solution import Solution
 
 Array = NDArray[np.float64]
 THREE = ("p-sp-p", "r-sp-p", "r-sp-r", "p-sp-r", "r-sg-c", "r-cp-c")
@@ -64,14 +63,14 @@ def dot(a: Array, b: Array) -> Array:
     return np.asarray((a * b).sum(axis=-1))
 
 
-def solved(name: str) -> Solution:
+def solved(name: str) -> mg.Solution:
     m = mg.load(name)
     motion = m.drives[0].motion
     assert motion is not None
     return mg.kinematics(m, {"A": mg.Motion(motion.position[3::20], 1.3, 0.7)})
 
 
-def of(s: Solution, pair: str, link: str, name: str) -> Array:
+def of(s: mg.Solution, pair: str, link: str, name: str) -> Array:
     """Value, rate and second rate of a freedom of the joint of ``link``, 0 where the pair has none of that name."""
     p = s.mechanism.pair(pair)
     sign = 1.0 if p.b == link else -1.0
@@ -85,7 +84,7 @@ def of(s: Solution, pair: str, link: str, name: str) -> Array:
 class ThreeLinks:
     """The quantities of [S], sections 2 to 4, along a solution."""
 
-    def __init__(self, s: Solution) -> None:
+    def __init__(self, s: mg.Solution) -> None:
         a, b, c = s.mechanism.pairs
         self.uA, self.uB, self.A = unit(a.axis), unit(c.axis), unit(b.axis)
         self.K = np.subtract(b.point, a.point)
@@ -271,7 +270,7 @@ def test_r_cp_c() -> None:
 class FourLinks:
     """The quantities of [G]: a function of the output for every position of the input, which is zero at the output that belongs to it."""
 
-    def __init__(self, name: str, s: Solution) -> None:
+    def __init__(self, name: str, s: mg.Solution) -> None:
         self.name = name
         a, b, c, d = (p for p in s.mechanism.pairs)
         self.u1, self.u3, self.u4 = (unit(p.axis) for p in (a, c, d))
