@@ -57,7 +57,7 @@ GROUPS: Mapping[str, tuple[str, str, tuple[str, ...]]] = {
             *("Event", "Stop", "ResponseSetup"),
         ),
     ),
-    "check": ("Check", "Mobility, redundancy, determinacy.", ("check", "DeterminacyReport")),
+    "check": ("Check", "Mobility, redundancy, determinacy.", ("check", "DeterminacyReport", "Tolerances")),
     "equations": ("Equations", "The printed equations, which are the solved ones.", ("formulate", "Formulation")),
     "solve": (
         "Solve",

@@ -40,6 +40,7 @@ from mechgraph.graph.atlas import (
 from mechgraph.graph.chains import Chain
 from mechgraph.kinetostatics import assemble, kinematics, solve
 from mechgraph.maths import inertia
+from mechgraph.maths.tolerances import Tolerances
 from mechgraph.model.chain import chain
 from mechgraph.model.couplings import Coupling
 from mechgraph.model.gears import Belt, BevelGears, Rack, SpurGears, WormGear
@@ -130,6 +131,7 @@ __all__ = [
     "StudyError",
     "Surface",
     "SystemGroup",
+    "Tolerances",
     "TorsionSpring",
     "Transmission",
     "WormGear",

@@ -47,7 +47,7 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import independent_rows
 from mechgraph.maths.se3 import Array, Index
-from mechgraph.maths.tolerances import MOTIONS, PATH
+from mechgraph.maths.tolerances import MOTIONS, PATH, Tolerances
 from mechgraph.maths.track import Nodes
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
@@ -455,6 +455,7 @@ def kinematics(
     on_reach: ReachName = "raise",
     engine: MotionEngineName = "auto",
     tol: float | None = None,
+    tolerances: Tolerances | None = None,
 ) -> Solution:
     """Compute positions, velocities and accelerations of all pairs and links, without forces.
 
@@ -462,6 +463,8 @@ def kinematics(
     ----------
     m, motions, on_reach, engine, tol
         As in ``solve``.
+    tolerances : Tolerances, optional
+        Numbers by which to decide, see ``Tolerances``. Default: those of the mechanism, which are the default ones.
 
     Returns
     -------
@@ -496,6 +499,7 @@ def solve(
     engine: MotionEngineName = "auto",
     tol: float | None = None,
     progress: Callable[[int, int], None] | None = None,
+    tolerances: Tolerances | None = None,
 ) -> Solution:
     """Compute driver efforts and reactions for prescribed driver motion (inverse dynamics; statics at zero rates).
 
@@ -532,6 +536,8 @@ def solve(
         the declared geometry, and positions at which it exceeds ``tol`` are not solved. Default: that of the mechanism, or exact.
     progress : callable, optional
         Called with the numbers of positions done and of all.
+    tolerances : Tolerances, optional
+        Numbers by which to decide, see ``Tolerances``. Default: those of the mechanism, which are the default ones.
 
     Returns
     -------

@@ -1,12 +1,59 @@
-"""What is worked out of a thing that does not change once and kept with it."""
+"""What is worked out of a thing that does not change once and kept with it, and the tolerances under which that is done."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
-from typing import Any, Generic, TypeVar
+from contextvars import ContextVar
+from functools import cached_property, wraps
+from typing import Any, Generic, ParamSpec, Self, TypeVar
 
 Made = TypeVar("Made")
+P = ParamSpec("P")
+ASKED: ContextVar[Any] = ContextVar("tolerances", default=None)
+"""The tolerances of the running call (see ``maths.tolerances``); None are the default ones."""
+
+
+class Remembers:
+    """Something that is asked under the tolerances under which it was made, whoever asks it, when, and in which thread.
+
+    So no fact that is kept with a mechanism or a result mixes two sets of tolerances.
+    """
+
+    __slots__ = ()
+
+    def __new__(cls, *args: Any, **named: Any) -> Self:
+        """An object that carries the tolerances of the running call."""
+        beside = super().__new__  # a tuple's, where the class is one too
+        made = beside(cls) if beside is object.__new__ else beside(cls, *args, **named)
+        if (tolerances := ASKED.get()) is not None and hasattr(made, "__dict__"):  # a tuple is no more than its values
+            vars(made)["_tolerances"] = tolerances
+        return made
+
+
+def carried(thing: object) -> Any:
+    """The tolerances that something carries; None are the default ones."""
+    return getattr(thing, "__dict__", {}).get("_tolerances")
+
+
+def under(tolerances: Any, make: Callable[P, Made], /, *args: P.args, **named: P.kwargs) -> Made:
+    """What a function gives under tolerances."""
+    if tolerances is ASKED.get():
+        return make(*args, **named)
+    token = ASKED.set(tolerances)
+    try:
+        return make(*args, **named)
+    finally:
+        ASKED.reset(token)
+
+
+def as_asked(method: Callable[P, Made]) -> Callable[P, Made]:
+    """A method that goes by the tolerances of its own object."""
+
+    @wraps(method)
+    def asked(*args: P.args, **named: P.kwargs) -> Made:
+        return under(carried(args[0]), method, *args, **named)
+
+    return asked
 
 
 def of_graph(make: Callable[[Any], Made]) -> Callable[[Any], Made]:
@@ -21,7 +68,7 @@ class Once:
     def once(self, make: Callable[[Any], Made]) -> Made:
         """``make(self)``, made once and kept."""
         if make not in self._kept:
-            self._kept[make] = make(self)
+            self._kept[make] = under(carried(self), make, self)
         made: Made = self._kept[make]
         return made
 

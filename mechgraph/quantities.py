@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mechgraph.errors import DeclarationError, MissingExtraError
+from mechgraph.memo import ASKED, Remembers, as_asked, carried
 
 BASE_UNITS = ("length", "mass", "time")
 """The base units that a mechanism may declare."""
@@ -362,6 +363,9 @@ class Wanted(NamedTuple):
 def door(function: Callable[P, R]) -> Callable[P, R]:
     """A public function that refuses arguments which its annotations exclude, and calls without or with too many of them.
 
+    It runs under the tolerances that its first argument carries which carries any, or under those given as ``tolerances``, with which a
+    mechanism is then asked.
+
     Raises
     ------
     DeclarationError
@@ -387,10 +391,22 @@ def door(function: Callable[P, R]) -> Callable[P, R]:
         ]
         if faults:
             raise DeclarationError(_called(function, args), faults)
-        with np.errstate(**FLOATING):
-            return function(*args, **named)
+        asked = next((carried(value) for value in bound.values() if isinstance(value, Remembers)), ASKED.get())
+        if (given := bound.get("tolerances")) is not None:
+            asked = given.asked
+            args, named = _asked_with(given, args), dict(zip(named, _asked_with(given, named.values()), strict=True))  # type: ignore[assignment]
+        token = ASKED.set(asked)  # not by ``under``: warnings count the frames up to the caller
+        try:
+            with np.errstate(**FLOATING):
+                return function(*args, **named)
+        finally:
+            ASKED.reset(token)
 
     return entered
+
+
+def _asked_with(tolerances: Any, arguments: Iterable[Any]) -> tuple[Any, ...]:
+    return tuple(one.with_tolerances(tolerances) if hasattr(one, "with_tolerances") else one for one in arguments)
 
 
 def with_doors(cls: type) -> None:
@@ -400,6 +416,22 @@ def with_doors(cls: type) -> None:
         public = not name.startswith("_") or name == "__getitem__"
         if public and inspect.isfunction(function) and not hasattr(function, "__wrapped__") and _takes_any(function):
             setattr(cls, name, door(function))
+
+
+def with_memory(cls: type) -> None:
+    """Let the public methods and properties of a class go by the tolerances under which an object was made."""
+    ours = [base for base in reversed(cls.__mro__) if base.__module__.startswith("mechgraph")]
+    for name, one in {name: one for base in ours for name, one in vars(base).items()}.items():
+        if name.startswith("_") or hasattr(getattr(one, "func", getattr(one, "fget", one)), "__wrapped__"):
+            continue
+        if inspect.isfunction(one):
+            setattr(cls, name, as_asked(one))
+        elif type(one) is property and one.fset is None and one.fget is not None:
+            setattr(cls, name, property(as_asked(one.fget), doc=one.__doc__))
+        elif type(one) is functools.cached_property:
+            again = functools.cached_property(as_asked(one.func))
+            again.__set_name__(cls, name)
+            setattr(cls, name, again)
 
 
 def _takes_any(method: types.FunctionType) -> bool:

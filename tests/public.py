@@ -333,6 +333,8 @@ def declared_doors() -> list[tuple[str, Callable, tuple, dict]]:
         ("Mechanism.with_pair_type", m.with_pair_type, ("A", "H"), {"pitch": 0.1}),
         ("Mechanism.to_units", m.to_units, (), {"length": "mm", "mass": "g", "time": "s"}),
         ("Mechanism.moved", m.moved, (np.eye(4),), {}),
+        ("Mechanism.with_tolerances", m.with_tolerances, (mg.Tolerances(),), {}),
+        ("Tolerances", mg.Tolerances, (), {"rank": {"loop": 1e-6}, "path": {"iterations": 12}}),
         ("Mechanism.link", m.link, ("crank",), {}),
         ("Mechanism.pair", m.pair, ("A",), {}),
         ("Mechanism.coupling", gears.coupling, ("g",), {}),

@@ -154,7 +154,7 @@ def check(
         refuse("check", "--json, --markdown and --compare exclude each other")
     m = loaded(mechanism)
     values = dict(parse_at(m, text) for text in at or ())
-    bounded = {} if limit is None else {"limit": longest(limit, "--limit")}
+    bounded: dict[str, Any] = {} if limit is None else {"limit": longest(limit, "--limit")}
     with working(f"checking {m.name}: what can move"):
         report = mg.check(m, at=values or None, engine=engine, tol=tol, **bounded)
     with working(f"checking {m.name}: what is unique, what to do"):

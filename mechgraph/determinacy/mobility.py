@@ -174,7 +174,7 @@ class _Search:
 
     position: Position
     driven: frozenset[int]
-    common: float = MOTIONS.common
+    common: float
 
     @cached_property
     def holding(self) -> tuple[bool, ...]:
@@ -235,17 +235,15 @@ class _Search:
         return len(mine) + len(others) > 6 or bool(s[-1] <= self.common * s[0])
 
 
-def passive_motions(
-    position: Position, left: Array, driven: Index, common: float = MOTIONS.common
-) -> list[PassiveMotion]:
+def passive_motions(position: Position, left: Array, driven: Index, common: float | None = None) -> list[PassiveMotion]:
     """Independent passive motions with the freedoms ``driven`` at rest; ``left (F, p)`` are all motions that leave free.
 
-    Twists with a singular value up to ``common`` are common to the pairs of a border.
+    Twists with a singular value up to ``common`` (else ``MOTIONS.common``) are common to the pairs of a border.
     """
     if not left.shape[1]:
         return []
     motions: list[PassiveMotion] = []
-    search = _Search(position, frozenset(driven.tolist()), common)
+    search = _Search(position, frozenset(driven.tolist()), MOTIONS.common if common is None else common)
     loaded = search.loaded()
     for links in sorted(_sets(search, left), key=lambda links: (len(links), links)):
         for motion in _of_border(search, links, search.border(links)):
@@ -261,7 +259,7 @@ def lasting(
 
     Links that move as one there do so here. Where they have more such motions here, the nearest to those there last.
     """
-    search = _Search(position, frozenset(driven.tolist()))
+    search = _Search(position, frozenset(driven.tolist()), MOTIONS.common)
     of_links: dict[tuple[int, ...], list[Array]] = {}
     for motion in there:
         of_links.setdefault(motion.links, []).append(motion.rates)

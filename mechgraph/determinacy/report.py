@@ -29,7 +29,7 @@ from mechgraph.graph.linkgraph import link_graph
 from mechgraph.kernel import build
 from mechgraph.kinematics.assembly import assembled, assembled_at, named_columns
 from mechgraph.kinematics.solver import MotionEngineName
-from mechgraph.maths.tolerances import RANKS
+from mechgraph.maths.tolerances import RANKS, Tolerances
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.pairs.pair_type import TABLE
 from mechgraph.quantities import Limit, door
@@ -554,12 +554,12 @@ class DeterminacyReport(Facts, Shown):
         return f"DeterminacyReport({self.mechanism.name!r}{known}; print it)"
 
 
-def _verdict_of(m: Mechanism, doubt: float = RANKS.doubt) -> tuple[Any, ...]:
+def _verdict_of(m: Mechanism, doubt: float | None = None) -> tuple[Any, ...]:
     """What a tolerance may change: mobility, redundancy, unique components, doubts about them; empty where the loops do not close."""
     r = check(m)
     if r.mobility is None or r.dropped is None:
         return ()
-    return r.finite_mobility, r.mobility, r.redundancy, r.unique, r.dropped > doubt
+    return r.finite_mobility, r.mobility, r.redundancy, r.unique, r.dropped > (RANKS.doubt if doubt is None else doubt)
 
 
 def hinted(m: Mechanism, error: MechgraphError) -> MechgraphError:
@@ -582,6 +582,7 @@ def check(
     engine: MotionEngineName = "auto",
     tol: float | None = None,
     limit: Limit = LIMIT,
+    tolerances: Tolerances | None = None,
 ) -> DeterminacyReport:
     """Report mobility, redundancy and the determinacy of every reaction of a mechanism, at its closed position near ``start``.
 
@@ -601,6 +602,8 @@ def check(
         mechanism, or exact.
     limit : float
         Seconds for each search (special geometry behind rounded numbers, changes that help); the report lists unfinished searches.
+    tolerances : Tolerances, optional
+        Numbers by which to decide, see ``Tolerances``. Default: those of the mechanism, which are the default ones.
 
     Returns
     -------

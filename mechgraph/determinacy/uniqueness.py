@@ -25,7 +25,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from mechgraph.force.reactions import UNIQUE, PairFrames, at_pair_points
+from mechgraph.force.reactions import PairFrames, at_pair_points
 from mechgraph.graph.linkgraph import labels_of_bipartite
 from mechgraph.kinematics.rank import ClosureRank, EngineName, closure_rank
 from mechgraph.kinematics.solver import PROBES, SEED
@@ -333,7 +333,7 @@ def unique_directions(components: Components, table: Array) -> tuple[tuple[Uniqu
 
     ``table (components, s)`` are the parts of the components in the self-stresses.
     """
-    not_unique = (table**2).sum(axis=1) > UNIQUE**2
+    not_unique = (table**2).sum(axis=1) > STRESSES.unique**2
     named: list[tuple[tuple[int, int], UniqueDirection]] = []
     known: set[int] = set()
     for g, group in enumerate(components.system.groups):
@@ -377,8 +377,8 @@ def _directions(rows: Array) -> list[Array]:
     size[:, : s.shape[1]] = s
     none = np.zeros((rows.shape[1], 0))
     out = [none] * len(rows)
-    for i in np.flatnonzero((size <= UNIQUE).any(axis=1)):
-        out[int(i)] = U[i][:, size[i] <= UNIQUE]
+    for i in np.flatnonzero((size <= STRESSES.unique).any(axis=1)):
+        out[int(i)] = U[i][:, size[i] <= STRESSES.unique]
     return out
 
 
@@ -445,33 +445,33 @@ class Uniqueness:
     @property
     def is_unique(self) -> NDArray[np.bool_]:
         """Whether each component is unique, in the order of ``components.labels``."""
-        return self.sizes[: self.components.count] <= UNIQUE
+        return self.sizes[: self.components.count] <= STRESSES.unique
 
     @property
     def coupling_is_unique(self) -> NDArray[np.bool_]:
         """Whether the multiplier of each coupling is unique, in order of declaration."""
-        return self.sizes[self.components.count :] <= UNIQUE
+        return self.sizes[self.components.count :] <= STRESSES.unique
 
     def is_unique_on(self, twists: Array) -> bool:
         """Whether the power of every pair's total wrench on ``twists (6, n)`` about the internal origin is unique, and every multiplier."""
         states = _on_every_flank(self.components.configuration, self.probes)
         power = np.einsum("in,ips->nps", twists, np.concatenate(states, axis=2)[..., 0])
-        return bool(np.abs(power).max(initial=0.0) <= UNIQUE and self.coupling_is_unique.all())
+        return bool(np.abs(power).max(initial=0.0) <= STRESSES.unique and self.coupling_is_unique.all())
 
     @property
     def all_unique(self) -> bool:
         """Whether every reaction component, effort and multiplier is unique."""
-        return bool((self.sizes <= UNIQUE).all())
+        return bool((self.sizes <= STRESSES.unique).all())
 
     @property
     def margin(self) -> float:
         """Smallest part of a self-stress in what is not unique; 1 where all is."""
-        return float(self.sizes[self.sizes > UNIQUE].min(initial=1.0))
+        return float(self.sizes[self.sizes > STRESSES.unique].min(initial=1.0))
 
     @property
     def dropped(self) -> float:
         """Largest part of a self-stress in what is called unique."""
-        return float(self.sizes[self.sizes <= UNIQUE].max(initial=0.0))
+        return float(self.sizes[self.sizes <= STRESSES.unique].max(initial=0.0))
 
     @property
     def is_near(self) -> bool:
@@ -482,11 +482,11 @@ class Uniqueness:
     def most_doubtful(self) -> tuple[str, float, bool]:
         """What has the part nearest to the limit (by ratio): its name, this part, and whether it is called unique."""
         size = np.maximum(self.sizes, np.finfo(float).tiny)
-        i = int(np.argmin(np.abs(np.log(size / UNIQUE))))
+        i = int(np.argmin(np.abs(np.log(size / STRESSES.unique))))
         known = self.components
         behind = i - known.count
         name = ":".join(known.label(i)) if behind < 0 else f"coupling {known.system.m.couplings[behind].name}"
-        return name, float(self.sizes[i]), bool(self.sizes[i] <= UNIQUE)
+        return name, float(self.sizes[i]), bool(self.sizes[i] <= STRESSES.unique)
 
     @cached_property
     def unique(self) -> dict[str, dict[str, bool]]:
@@ -510,7 +510,7 @@ class Uniqueness:
         states = self.components.table(
             relieved_states(self.components.configuration, self.closure.connecting(np.eye(shared)), 1.0)
         )
-        touched = np.flatnonzero(np.abs(states).max(axis=1) > UNIQUE * np.abs(states).max())
+        touched = np.flatnonzero(np.abs(states).max(axis=1) > STRESSES.unique * np.abs(states).max())
         number = np.array([self.components.system.graph.n_loops])
         return basis_of(self.components.count, [*local, (number, touched[None], states[touched][None])], [])
 

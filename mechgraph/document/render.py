@@ -31,7 +31,8 @@ from mechgraph.document.tree import (
     kept_lines,
     plain,
 )
-from mechgraph.quantities import with_doors
+from mechgraph.memo import Remembers
+from mechgraph.quantities import with_doors, with_memory
 
 WIDTH = 80
 """Default width of a text rendering, in columns."""
@@ -531,7 +532,7 @@ def _declared(sign: str) -> str:
     return rf"\DeclareUnicodeCharacter{{{ord(sign):04X}}}{{{meaning}}}"
 
 
-class Shown(ABC):
+class Shown(Remembers, ABC):
     """Something that a document tells: ``print(x)`` shows it as text, a notebook as HTML, what a notebook exports as LaTeX.
 
     At a prompt it shows the same text; a class whose document is long or takes time has a line of its own there (``__repr__``).
@@ -546,6 +547,7 @@ class Shown(ABC):
         super().__init_subclass__()
         if cls._every_method_is_a_door:
             with_doors(cls)
+            with_memory(cls)
 
     @abstractmethod
     def document(self) -> Document:

@@ -30,9 +30,6 @@ from mechgraph.maths.se3 import Array, Index, batch_last, cross, shift_wrench
 from mechgraph.maths.sparse import least_solution
 from mechgraph.maths.tolerances import STRESSES
 
-UNIQUE = STRESSES.unique
-"""Part of a unit self-stress in a component above which the component is not unique (forces and moments / L compared)."""
-
 
 @dataclass(frozen=True)
 class Stress:

@@ -19,6 +19,7 @@ from mechgraph.kinematics.rates import PassiveMotion
 from mechgraph.kinematics.system import CouplingRows, System
 from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Array, Index, compose, identity, inverse, rotate
+from mechgraph.memo import carried
 from mechgraph.model.loads import Load
 from mechgraph.pairs.factors import ConstantScrew, Factor, Freedom, Rotation
 
@@ -83,6 +84,8 @@ class Layout:
 def why_not(system: System) -> str | None:
     """What of a mechanism the kernel cannot carry; None where it can."""
     m = system.m
+    if carried(m) is not None:
+        return "it is asked with other tolerances than the default ones"
     for number, row in enumerate(system.types):
         if not all(isinstance(step, ConstantScrew | Rotation) for step in row.steps) or row.pushed:
             name = m.pairs[int(np.flatnonzero(system.type_of == number)[0])].name

@@ -32,8 +32,6 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker
 from mechgraph.quantities import is_numeric, shown, wrong
 
-TOO_NEAR = 10 * RANKS.loop
-"""Distance of two points over the size of their loop below which it is asked whether it was lost in a rank."""
 COMES_OF_IT = 0.01
 """Part of that distance above which the largest singular value that counted as zero comes of it: directions make it smaller."""
 NO_DISTANCE = 1e-14
@@ -63,7 +61,8 @@ def _fault(here: Configuration) -> str:
     after = np.where(np.append(loop[1:], -1) == loop, np.arange(len(loop)) + 1, np.searchsorted(loop, loop))
     apart, size = np.linalg.norm(points[:, pair] - points[:, pair[after]], axis=0), lengths_of(s.graph, points, middles)
     part = apart / size[loop]
-    near = np.flatnonzero((part < TOO_NEAR) & (part > NO_DISTANCE))
+    too_near = 10 * RANKS.loop  # up to there it is asked whether a distance was lost in a rank
+    near = np.flatnonzero((part < too_near) & (part > NO_DISTANCE))
     if not near.size:
         return ""
     lost = near[closure_rank(here).dropped > np.maximum(COMES_OF_IT * part[near], NO_DISTANCE)]
@@ -72,7 +71,7 @@ def _fault(here: Configuration) -> str:
     i, names = int(lost[np.argmin(part[lost])]), [p.name for p in s.m.pairs]
     return (
         f"lengths are too far apart: {names[pair[i]]} and {names[pair[after[i]]]} are {apart[i] * s.par.L:.3g} apart in the loop "
-        f"{listed(names[k] for k in pair[loop == loop[i]])} of size {size[loop[i]] * s.par.L:.3g}; expected at least {TOO_NEAR:g} of "
+        f"{listed(names[k] for k in pair[loop == loop[i]])} of size {size[loop[i]] * s.par.L:.3g}; expected at least {too_near:g} of "
         "that, or the same point. Make small lengths larger or zero, or replace long links by slides (the end of a link so long "
         "moves along a line)"
     )

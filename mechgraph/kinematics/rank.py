@@ -204,11 +204,13 @@ def rank_of_rows(
     rows: ClosureRows,
     fixed: Index | None = None,
     engine: EngineName = "auto",
-    tolerance: float = RANKS.position,
-    proved: float = RANKS.proved,
+    tolerance: float | None = None,
+    proved: float | None = None,
 ) -> ClosureRank:
     """The same for rows given as such; pivots of a bordered system above ``proved`` decide by themselves."""
     fixed = np.zeros(0, dtype=np.intp) if fixed is None else fixed
+    tolerance = RANKS.position if tolerance is None else tolerance
+    proved = RANKS.proved if proved is None else proved
     if engine == "dense" or not rows.graph.n_loops or (engine == "auto" and rows.count < CROSSOVER):
         reduced = ReducedRows(rows, fixed, dense=True)
         return ClosureRank(reduced, _Dense(reduced, tolerance), tolerance)

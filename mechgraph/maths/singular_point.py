@@ -53,9 +53,6 @@ BETWEEN = np.linspace(-1.0, 1.0, 8)
 CLOSES = 1e-12
 """Residual up to which they do: the roundings of a thousand loops add up in it."""
 
-PROBE = 10 * PATH.dead_zone
-"""Distance at which the condition is looked at for another crossing."""
-
 
 @dataclass(frozen=True)
 class Crossing:
@@ -132,13 +129,13 @@ class Crossing:
 
     def at_another(self, places: Array) -> Mask:
         """Which places ``(n,)`` lie on another crossing, passed together with this one: condition times distance from it is constant."""
-        n = len(places)
-        ends = [(places + PROBE * np.array([[far], [-far]])).ravel() for far in (1.0, 2.0)]
+        n, probe = len(places), 10.0 * PATH.dead_zone
+        ends = [(places + probe * np.array([[far], [-far]])).ravel() for far in (1.0, 2.0)]
         tracks = np.full(2 * n, self.track)
         near, far = (self.problem.at(self.states(at), self.drives(at), tracks) for at in ends)
         which = self.problem.chosen(far, np.full(2 * n, -1))
         a, b = (self.problem.factored(point, which).condition for point in (near, far))
-        away = np.abs(PROBE - PROBE * b / np.where(a > b, a - b, 1.0))
+        away = np.abs(probe - probe * b / np.where(a > b, a - b, 1.0))
         return np.asarray(((a > b) & (away < PATH.dead_zone)).reshape(2, n).all(axis=0))
 
 
@@ -364,7 +361,7 @@ def _straight_on(
     base: Nodes,
     ends: Array,
     some: Index,
-    first: float = PATH.first,
+    first: float | None = None,
     leads: bool = False,
     careful: bool = True,
 ) -> Tracks:

@@ -1,204 +1,302 @@
-"""Tolerances, each with its reason; one frozen object a subject, passed on as a default and nowhere repeated."""
+"""Tolerances, each with its reason: one frozen object, of which the running call reads what it was asked with.
 
-from __future__ import annotations
+``RANKS``, ``MOTIONS``, ``STRESSES``, ``CHECKS`` and ``PATH`` are the parts of the object that applies to the running call: the default
+one, or the one that its mechanism carries (see ``memo.Remembers``). They are read where they are needed, never when a module is loaded.
+"""
 
-from dataclasses import dataclass
+# annotations are read at run time here: they hold the reasons
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Annotated, Any, ClassVar, cast, get_type_hints
+
+from mechgraph.errors import DeclarationError
+from mechgraph.memo import ASKED
+from mechgraph.quantities import is_numeric, wrong
 
 
 @dataclass(frozen=True)
 class RankTolerances:
     """When a singular value or a pivot counts as zero. Rows are those of a loop in its own measure, columns of unit size."""
 
-    loop: float = 1e-9
-    """Singular value of a loop's own rows; seven digits above rounding, so that printed geometry of ten digits stays redundant."""
-    position: float = 1e-9
-    """Singular value of all rows against the largest, and pivot of an elimination against unit rows; as for one loop."""
-    generic: float = 1e-7
-    """The same for random geometry of size one, where no dimension is meant to be special: far from rounding on both sides."""
-    nearby: float = 1e-6
-    """The same at positions reached by a motion: closing a double root to 1e-13 leaves 3e-7 of the way that returns."""
-    proved: float = 1e-3
-    """Pivot of a bordered system above which it proves the rank without another test."""
-    distance: float = 1e-8
-    """Distance to a singular matrix above which the bordered system decides the rank, whatever its pivots."""
-    near: float = 1e-3
-    """Margin of one loop below which a position is called nearly singular: forces are a thousand times the loads."""
-    doubt: float = 1e-11
-    """Largest dropped value above which it may be more than rounding."""
-    damping: float = 1e-13
-    """Square of the singular value (3e-7) below which the normal equations ignore a direction; rounding of a square is 1e-16."""
+    loop: Annotated[
+        float,
+        "Singular value of a loop's own rows; seven digits above rounding, so that printed geometry of ten digits stays "
+        "redundant.",
+    ] = 1e-9
+    position: Annotated[
+        float,
+        "Singular value of all rows against the largest, and pivot of an elimination against unit rows; as for one loop.",
+    ] = 1e-9
+    generic: Annotated[
+        float,
+        "The same for random geometry of size one, where no dimension is meant to be special: far from rounding on both sides.",
+    ] = 1e-7
+    nearby: Annotated[
+        float,
+        "The same at positions reached by a motion: closing a double root to 1e-13 leaves 3e-7 of the way that returns.",
+    ] = 1e-6
+    proved: Annotated[float, "Pivot of a bordered system above which it proves the rank without another test."] = 1e-3
+    distance: Annotated[
+        float, "Distance to a singular matrix above which the bordered system decides the rank, whatever its pivots."
+    ] = 1e-8
+    near: Annotated[
+        float,
+        "Margin of one loop below which a position is called nearly singular: forces are a thousand times the loads.",
+    ] = 1e-3
+    doubt: Annotated[float, "Largest dropped value above which it may be more than rounding."] = 1e-11
+    damping: Annotated[
+        float,
+        "Square of the singular value (3e-7) below which the normal equations ignore a direction; rounding of a square is "
+        "1e-16.",
+    ] = 1e-13
 
 
 @dataclass(frozen=True)
 class MotionTolerances:
     """When something counts as at rest. Motions are of size one; lengths over the length of the mechanism."""
 
-    still: float = 1e-8
-    """Part of a motion below which a freedom or a link stands still: the square root of rounding."""
-    dependent: float = 1e-8
-    """Part of a motion below which the weakest driver stands still: drivers depend on each other, or a dead point."""
-    rounding: float = 1e-11
-    """Part of a unit rate that counts as zero."""
-    nearby: float = 1e-5
-    """Part of a motion above which a freedom that stands still here moves at a nearby position, a trial step of 0.05 away."""
-    common: float = 1e-9
-    """Singular value against the largest below which twists of a border are common to its pairs; as for a rank."""
-    in_place: float = 1e-5
-    """Rate at which a pair element may leave its place in a passive motion; central differences of step 1e-4 are good to 1e-8."""
-    tied: float = 1e-7
-    """Singular value against the largest below which passive motions depend on each other."""
-    proportional: float = 3e-5
-    """Sine of the angle between the parts of two freedoms in the motions up to which they move in proportion."""
-    idle: float = 1e-6
-    """Part of the loads' power in a passive motion below which they leave it alone: inertias of five printed digits leave 1e-7."""
-    error: float = 1e-9
-    """Error of such a part that has to be expected near a singular position: near a dead point parts are small."""
+    still: Annotated[
+        float, "Part of a motion below which a freedom or a link stands still: the square root of rounding."
+    ] = 1e-8
+    dependent: Annotated[
+        float,
+        "Part of a motion below which the weakest driver stands still: drivers depend on each other, or a dead point.",
+    ] = 1e-8
+    rounding: Annotated[float, "Part of a unit rate that counts as zero."] = 1e-11
+    nearby: Annotated[
+        float,
+        "Part of a motion above which a freedom that stands still here moves at a nearby position, a trial step of 0.05 away.",
+    ] = 1e-5
+    common: Annotated[
+        float,
+        "Singular value against the largest below which twists of a border are common to its pairs; as for a rank.",
+    ] = 1e-9
+    in_place: Annotated[
+        float,
+        "Rate at which a pair element may leave its place in a passive motion; central differences of step 1e-4 are good to "
+        "1e-8.",
+    ] = 1e-5
+    tied: Annotated[float, "Singular value against the largest below which passive motions depend on each other."] = (
+        1e-7
+    )
+    proportional: Annotated[
+        float, "Sine of the angle between the parts of two freedoms in the motions up to which they move in proportion."
+    ] = 3e-5
+    idle: Annotated[
+        float,
+        "Part of the loads' power in a passive motion below which they leave it alone: inertias of five printed digits leave "
+        "1e-7.",
+    ] = 1e-6
+    error: Annotated[
+        float,
+        "Error of such a part that has to be expected near a singular position: near a dead point parts are small.",
+    ] = 1e-9
 
 
 @dataclass(frozen=True)
 class StressTolerances:
     """When a part of a self-stress counts as zero. Self-stresses are of size one, moments over the length of the mechanism."""
 
-    unique: float = 1e-7
-    """Part in a component above which the component is not unique: far from rounding and from shares that are meant."""
-    doubt: float = 1e-11
-    """Part of a component called unique above which it may be more than rounding: rounding leaves 1e-13 in regular positions."""
-    near: float = 1e-4
-    """Part of a component that is not unique below which a small change of dimensions may make it so: where no dimension is meant to
-    be nearly special, parts are 3e-3 and more (215 library, known and random mechanisms)."""
-    shown: float = 1e-6
-    """Part (of a largest part of one) below which a component is not shown."""
-    drivers_alone: float = 1e-9
-    """Part below which reactions count as none: drivers that strain each other alone."""
-    rounding: float = 1e-12
-    """Part of the largest multiplier by which one may miss the sign of its flank, so that rounding leaves a solution."""
-    relieved: float = 1e-6
-    """Power of a unit twist on a self-stress above which the twist relieves it."""
+    unique: Annotated[
+        float,
+        "Part in a component above which the component is not unique: far from rounding and from shares that are meant.",
+    ] = 1e-7
+    doubt: Annotated[
+        float,
+        "Part of a component called unique above which it may be more than rounding: rounding leaves 1e-13 in regular "
+        "positions.",
+    ] = 1e-11
+    near: Annotated[
+        float,
+        "Part of a component that is not unique below which a small change of dimensions may make it so: where no dimension is "
+        "meant to be nearly special, parts are 3e-3 and more (215 library, known and random mechanisms).",
+    ] = 1e-4
+    shown: Annotated[float, "Part (of a largest part of one) below which a component is not shown."] = 1e-6
+    drivers_alone: Annotated[
+        float, "Part below which reactions count as none: drivers that strain each other alone."
+    ] = 1e-9
+    rounding: Annotated[
+        float,
+        "Part of the largest multiplier by which one may miss the sign of its flank, so that rounding leaves a solution.",
+    ] = 1e-12
+    relieved: Annotated[float, "Power of a unit twist on a self-stress above which the twist relieves it."] = 1e-6
 
 
 @dataclass(frozen=True)
 class CheckTolerances:
     """When a solution fails its own checks."""
 
-    balanced: float = 1e-6
-    """Residual of equilibrium or power, over the largest term, above which a solution warns: as for ``PathTolerances.inaccurate``."""
-    rounding: float = 1e-12
-    """Forces, over mass times speed times angular speed, that are rounding of the motion: nothing is said of their equilibrium."""
-
-
-RANKS = RankTolerances()
-MOTIONS = MotionTolerances()
-STRESSES = StressTolerances()
-CHECKS = CheckTolerances()
+    balanced: Annotated[
+        float,
+        "Residual of equilibrium or power, over the largest term, above which a solution warns: as for "
+        "``PathTolerances.inaccurate``.",
+    ] = 1e-6
+    rounding: Annotated[
+        float,
+        "Forces, over mass times speed times angular speed, that are rounding of the motion: nothing is said of their "
+        "equilibrium.",
+    ] = 1e-12
 
 
 @dataclass(frozen=True)
 class PathTolerances:
     """Following a path of closed positions (see ``maths.tracker``)."""
 
-    closed: float = 1e-14
-    """Closure residual that Newton aims at: some roundings of numbers of size one; where it cannot be had, the smallest one there is."""
-    accepted: float = 1e-11
-    """Residual with which a position counts as closed where rounding lets it come no nearer (poor condition)."""
-    iterations: int = 10
-    """Most Newton steps at a position; from a good prediction two suffice, so that more mean a poor one."""
-    lost: float = 0.3
-    """Sum of corrections above which Newton stops: the correction exceeds the trust radius of the prediction."""
-    correction: float = 0.06
-    """Largest correction that a prediction may need; the certificate of the step asks for more than that."""
-    aim: float = 0.02
-    """Correction that the step control aims at: a third of what is allowed. One Newton step from there leaves 4e-4, which does for a node
-    of the first march (all nodes are closed together afterwards)."""
-    node: float = 1e-8
-    """Last Newton step of a node that counts as closed: its square is rounding."""
-    rates: float = 1e-6
-    """Product of the last step and the condition number up to which a node is closed: its rates err by about as much."""
-    rounding: float = 1e-14
-    """Part of the condition number below which a Newton step is rounding."""
-    exact: float = 1e-12
-    """The same where many positions are interpolated between the nodes, so that their sensitivities must be exact as well."""
-    first: float = 0.05
-    """First step of a path, where there are no earlier nodes to predict from."""
-    longest: float = 0.35
-    """Longest step between nodes, unless tracks go straight on; longer ones would be refused by the certificate more often than not."""
-    ahead: float = 3.0
-    """Times that longest step up to which the first march may reach at once; nodes between are interpolated and closed with the others."""
-    shortest_quick: float = 2e-3
-    """Step at which the first march stops and the careful one takes over."""
-    shortest: float = 1e-10
-    """Step at which the careful march stops; the end of the reach is known to this, far above the rounding of a driver value."""
-    quick_steps: int = 30_000
-    """Most steps of a track in the first march (a thousand turns and more that do not repeat themselves): half a minute."""
-    careful_steps: int = 4_000
-    """The same in the careful march; past a crossing it takes some sixty."""
-    steps_a_point: int = 20
-    """Further steps of both for every point of the polyline that is followed."""
-    straight: float = 0.98
-    """Smallest ratio of chord to path between two nodes; a path that bends or turns back gets a node there."""
-    departure: float = 0.7
-    """Largest change of the closure matrix from the middle of a step to its ends, against its inverse in the middle: below one nothing
-    on the parabola through the three is singular; what is left is for the third order, which three matrices do not show."""
-    smooth: float = 0.05
-    """Part of the change of rates over a step by which the rates in its middle may miss those of the Hermite cubic of its ends (and of
-    the sagitta that it makes, by which the state may)."""
-    alone: float = 0.05
-    """Part of the inverse condition number, over rates above one, up to which another branch is not as near: matrices change by at most
-    forty a radian (near the limits of four-bars the other branch is 170 times as far)."""
-    round: float = 10.0
-    """Curvature of curves and surfaces, over one of the length of the mechanism, above which that part falls: to half of a radius."""
-    tiny: float = 1e-9
-    """Distance between states below which ``smooth`` is not tested: differences of rounding and of numerical derivatives."""
-    fair: float = 1e3
-    """Condition number above which another choice of rows and columns is sought."""
-    better: float = 0.2
-    """Part of the condition number that another choice must undercut to be taken."""
-    independent: float = 1e-8
-    """Part of the closure rates that unit rates of the drivers may leave open before drivers count as dependent on each other."""
-    singular: float = 1e9
-    """Condition number above which a position counts as a dead point: rates would keep fewer than seven digits."""
-    dead_point: float = 1e-10
-    """Distance to a dead point (in driver coordinates) below which a position counts as one."""
-    scatter: float = 1e-2
-    """Part by which rounding may change accelerations before a position counts as one: beside a crossing of branches, not near a fold."""
-    doubtful: float = 1e4
-    """Condition number above which the distance to a dead point is computed."""
-    square: float = 5.0
-    """Condition number above which errors of rates are taken to grow with its square: so they do towards a fold."""
-    cube: float = 100.0
-    """The same for the cube, as beside a crossing. Estimates from both are within a factor of ten of the errors of four-bars beside change
-    points (against 50 digits), and up to a hundred times those of ordinary positions."""
-    poor: float = 300.0
-    """Condition number above which what rounding does to accelerations is tried, not estimated; few mechanisms come there."""
-    inaccurate: float = 1e-6
-    """Estimated relative error of rates and forces above which a solution warns: six digits are what dimensions are known to."""
-    dead_zone: float = 1e-7
-    """Distance from the end of a path up to which a requested position counts as the dead point itself."""
-    crossing: float = 3e6
-    """Condition number at which the careful march stops before a crossing: rounding over it is far below the distance of the branches
-    there; at a fold the end of the reach is nearer than ``shortest`` before."""
-    away: float = 2e-3
-    """Distance before a singular point at which its rates are compared with those next to it."""
-    steeper: float = 10.0
-    """Factor by which they grow towards a fold, which is met to ``shortest``: by thousands; towards a crossing they stay."""
-    held: float = 3.0
-    """Largest rate of a freedom for a unit rate of the freedom that holds a passive motion, before another one holds it."""
-    interpolation: float = 3e-14
-    """Error of interpolation that needs no correction."""
-    gain: float = 1e-3
-    """Part of that error that nodes twice as dense leave at most (the order is twelve, 2^-12)."""
-    window: int = 6
-    """Most nodes through which one interpolation goes, each with value and rate."""
-    worth: int = 20
-    """Positions for every new node above which new nodes save time (fewer corrections of positions)."""
-    finest: int = 6
-    """Most halvings of a step for its certificate: what is left open then is beside a singular point, which the careful march takes."""
-    halvings: int = 4
-    """Most halvings of a gap between nodes at a time."""
-    refinements: int = 5
-    """Times that nodes are put between nodes at most."""
-
-
-PATH = PathTolerances()
+    closed: Annotated[
+        float,
+        "Closure residual that Newton aims at: some roundings of numbers of size one; where it cannot be had, the smallest one "
+        "there is.",
+    ] = 1e-14
+    accepted: Annotated[
+        float, "Residual with which a position counts as closed where rounding lets it come no nearer (poor condition)."
+    ] = 1e-11
+    iterations: Annotated[
+        int, "Most Newton steps at a position; from a good prediction two suffice, so that more mean a poor one."
+    ] = 10
+    lost: Annotated[
+        float, "Sum of corrections above which Newton stops: the correction exceeds the trust radius of the prediction."
+    ] = 0.3
+    correction: Annotated[
+        float, "Largest correction that a prediction may need; the certificate of the step asks for more than that."
+    ] = 0.06
+    aim: Annotated[
+        float,
+        "Correction that the step control aims at: a third of what is allowed. One Newton step from there leaves 4e-4, which "
+        "does for a node of the first march (all nodes are closed together afterwards).",
+    ] = 0.02
+    node: Annotated[float, "Last Newton step of a node that counts as closed: its square is rounding."] = 1e-8
+    rates: Annotated[
+        float,
+        "Product of the last step and the condition number up to which a node is closed: its rates err by about as much.",
+    ] = 1e-6
+    rounding: Annotated[float, "Part of the condition number below which a Newton step is rounding."] = 1e-14
+    exact: Annotated[
+        float,
+        "The same where many positions are interpolated between the nodes, so that their sensitivities must be exact as well.",
+    ] = 1e-12
+    first: Annotated[float, "First step of a path, where there are no earlier nodes to predict from."] = 0.05
+    longest: Annotated[
+        float,
+        "Longest step between nodes, unless tracks go straight on; longer ones would be refused by the certificate more often "
+        "than not.",
+    ] = 0.35
+    ahead: Annotated[
+        float,
+        "Times that longest step up to which the first march may reach at once; nodes between are interpolated and closed with "
+        "the others.",
+    ] = 3.0
+    shortest_quick: Annotated[float, "Step at which the first march stops and the careful one takes over."] = 2e-3
+    shortest: Annotated[
+        float,
+        "Step at which the careful march stops; the end of the reach is known to this, far above the rounding of a driver "
+        "value.",
+    ] = 1e-10
+    quick_steps: Annotated[
+        int,
+        "Most steps of a track in the first march (a thousand turns and more that do not repeat themselves): half a minute.",
+    ] = 30_000
+    careful_steps: Annotated[int, "The same in the careful march; past a crossing it takes some sixty."] = 4_000
+    steps_a_point: Annotated[int, "Further steps of both for every point of the polyline that is followed."] = 20
+    straight: Annotated[
+        float, "Smallest ratio of chord to path between two nodes; a path that bends or turns back gets a node there."
+    ] = 0.98
+    departure: Annotated[
+        float,
+        "Largest change of the closure matrix from the middle of a step to its ends, against its inverse in the middle: below "
+        "one nothing on the parabola through the three is singular; what is left is for the third order, which three matrices "
+        "do not show.",
+    ] = 0.7
+    smooth: Annotated[
+        float,
+        "Part of the change of rates over a step by which the rates in its middle may miss those of the Hermite cubic of its "
+        "ends (and of the sagitta that it makes, by which the state may).",
+    ] = 0.05
+    alone: Annotated[
+        float,
+        "Part of the inverse condition number, over rates above one, up to which another branch is not as near: matrices change "
+        "by at most forty a radian (near the limits of four-bars the other branch is 170 times as far).",
+    ] = 0.05
+    round: Annotated[
+        float,
+        "Curvature of curves and surfaces, over one of the length of the mechanism, above which that part falls: to half of a "
+        "radius.",
+    ] = 10.0
+    tiny: Annotated[
+        float,
+        "Distance between states below which ``smooth`` is not tested: differences of rounding and of numerical derivatives.",
+    ] = 1e-9
+    fair: Annotated[float, "Condition number above which another choice of rows and columns is sought."] = 1e3
+    better: Annotated[float, "Part of the condition number that another choice must undercut to be taken."] = 0.2
+    independent: Annotated[
+        float,
+        "Part of the closure rates that unit rates of the drivers may leave open before drivers count as dependent on each "
+        "other.",
+    ] = 1e-8
+    singular: Annotated[
+        float,
+        "Condition number above which a position counts as a dead point: rates would keep fewer than seven digits.",
+    ] = 1e9
+    dead_point: Annotated[
+        float, "Distance to a dead point (in driver coordinates) below which a position counts as one."
+    ] = 1e-10
+    scatter: Annotated[
+        float,
+        "Part by which rounding may change accelerations before a position counts as one: beside a crossing of branches, not "
+        "near a fold.",
+    ] = 1e-2
+    doubtful: Annotated[float, "Condition number above which the distance to a dead point is computed."] = 1e4
+    square: Annotated[
+        float,
+        "Condition number above which errors of rates are taken to grow with its square: so they do towards a fold.",
+    ] = 5.0
+    cube: Annotated[
+        float,
+        "The same for the cube, as beside a crossing. Estimates from both are within a factor of ten of the errors of four-bars "
+        "beside change points (against 50 digits), and up to a hundred times those of ordinary positions.",
+    ] = 100.0
+    poor: Annotated[
+        float,
+        "Condition number above which what rounding does to accelerations is tried, not estimated; few mechanisms come there.",
+    ] = 300.0
+    inaccurate: Annotated[
+        float,
+        "Estimated relative error of rates and forces above which a solution warns: six digits are what dimensions are known "
+        "to.",
+    ] = 1e-6
+    dead_zone: Annotated[
+        float, "Distance from the end of a path up to which a requested position counts as the dead point itself."
+    ] = 1e-7
+    crossing: Annotated[
+        float,
+        "Condition number at which the careful march stops before a crossing: rounding over it is far below the distance of the "
+        "branches there; at a fold the end of the reach is nearer than ``shortest`` before.",
+    ] = 3e6
+    away: Annotated[
+        float, "Distance before a singular point at which its rates are compared with those next to it."
+    ] = 2e-3
+    steeper: Annotated[
+        float,
+        "Factor by which they grow towards a fold, which is met to ``shortest``: by thousands; towards a crossing they stay.",
+    ] = 10.0
+    held: Annotated[
+        float,
+        "Largest rate of a freedom for a unit rate of the freedom that holds a passive motion, before another one holds it.",
+    ] = 3.0
+    interpolation: Annotated[float, "Error of interpolation that needs no correction."] = 3e-14
+    gain: Annotated[
+        float, "Part of that error that nodes twice as dense leave at most (the order is twelve, 2^-12)."
+    ] = 1e-3
+    window: Annotated[int, "Most nodes through which one interpolation goes, each with value and rate."] = 6
+    worth: Annotated[
+        int, "Positions for every new node above which new nodes save time (fewer corrections of positions)."
+    ] = 20
+    finest: Annotated[
+        int,
+        "Most halvings of a step for its certificate: what is left open then is beside a singular point, which the careful "
+        "march takes.",
+    ] = 6
+    halvings: Annotated[int, "Most halvings of a gap between nodes at a time."] = 4
+    refinements: Annotated[int, "Times that nodes are put between nodes at most."] = 5
 
 
 @dataclass(frozen=True)
@@ -221,3 +319,125 @@ class ShapeTolerances:
 
 
 SHAPES = ShapeTolerances()
+"""Of declared things, which know no call: the same for all."""
+
+
+PARTS: dict[str, type] = {
+    "rank": RankTolerances,
+    "motion": MotionTolerances,
+    "stress": StressTolerances,
+    "check": CheckTolerances,
+    "path": PathTolerances,
+}
+
+
+def _reasons(part: type) -> dict[str, str]:
+    hints = get_type_hints(part, include_extras=True)
+    return {f.name: hints[f.name].__metadata__[0] for f in fields(part)}
+
+
+def _listed() -> str:
+    """All fields with default and reason, as help shows them."""
+    lines = []
+    for name, part in PARTS.items():
+        lines.append(f"\n    {name}: {(part.__doc__ or '').strip()}")
+        lines += [f"        {f} = {getattr(part(), f):g} : {why}" for f, why in _reasons(part).items()]
+    return "\n".join(lines)
+
+
+@dataclass(frozen=True, repr=False)
+class Tolerances:
+    """Show every number that decides when something counts as zero, closed, singular or too long a step; change some for a call.
+
+    Parameters
+    ----------
+    rank, motion, stress, check, path : mapping of str to float, optional
+        Numbers other than the default ones, by their names. Dimensionless: angles in radians, lengths over the length of the mechanism.
+
+    Raises
+    ------
+    DeclarationError
+        With every name that is none, and every number that is not finite and above 0.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> mg.Tolerances().rank.loop
+    1e-09
+    >>> coarse = mg.Tolerances(rank={"loop": 1e-4, "position": 1e-4})
+    >>> mg.check(mg.load("four-bar"), tolerances=coarse).redundancy
+    3
+    """
+
+    rank: RankTolerances = field(default_factory=RankTolerances)
+    motion: MotionTolerances = field(default_factory=MotionTolerances)
+    stress: StressTolerances = field(default_factory=StressTolerances)
+    check: CheckTolerances = field(default_factory=CheckTolerances)
+    path: PathTolerances = field(default_factory=PathTolerances)
+    _wanted: ClassVar[str] = "Tolerances, as mg.Tolerances(rank={'loop': 1e-6})"
+
+    def __post_init__(self) -> None:
+        faults: list[str] = []
+        for name, part in PARTS.items():
+            given = getattr(self, name)
+            if isinstance(given, Mapping):
+                object.__setattr__(self, name, _part(name, part, given, faults))
+            elif not isinstance(given, part):
+                faults.append(wrong(given, name, f"numbers by name, of {', '.join(_reasons(part))}"))
+        if faults:
+            raise DeclarationError("Tolerances", faults)
+
+    @property
+    def asked(self) -> "Tolerances | None":
+        """What calls go by: None where these are the default ones."""
+        return None if self == DEFAULT else self
+
+    def __repr__(self) -> str:
+        lines = []
+        for name, part in PARTS.items():
+            mine, usual = getattr(self, name), part()
+            for f, why in _reasons(part).items():
+                value = getattr(mine, f)
+                other = "" if value == getattr(usual, f) else f" (default {getattr(usual, f):g})"
+                lines.append(f"{name}.{f} = {value:g}{other}: {why}")
+        return "\n".join(lines)
+
+
+Tolerances.__doc__ = f"{Tolerances.__doc__}\n    All of them, with their default values:\n{_listed()}\n"
+DEFAULT = Tolerances()
+
+
+def _part(name: str, part: type, given: Mapping[str, Any], faults: list[str]) -> Any:
+    usual, known = part(), {}
+    for key, value in given.items():
+        if not hasattr(usual, str(key)):
+            faults.append(wrong(key, f"name in {name}", f"one of {', '.join(_reasons(part))}"))
+            continue
+        whole = isinstance(getattr(usual, key), int)
+        if not is_numeric(value, ()) or not 0.0 < value < float("inf") or (whole and value != int(value)):
+            faults.append(wrong(value, f"{name}.{key}", "a whole number above 0" if whole else "a number above 0"))
+        else:
+            known[key] = int(value) if whole else float(value)
+    return part(**known)
+
+
+def asked_for() -> Tolerances:
+    """Those of the running call."""
+    return ASKED.get() or DEFAULT
+
+
+class _Asked:
+    """One part of the tolerances of the running call."""
+
+    def __init__(self, part: str) -> None:
+        self._part = part
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(getattr(ASKED.get() or DEFAULT, self._part), name)
+
+
+RANKS = cast(RankTolerances, _Asked("rank"))
+MOTIONS = cast(MotionTolerances, _Asked("motion"))
+STRESSES = cast(StressTolerances, _Asked("stress"))
+CHECKS = cast(CheckTolerances, _Asked("check"))
+PATH = cast(PathTolerances, _Asked("path"))

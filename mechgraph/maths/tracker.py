@@ -224,12 +224,12 @@ class Follower(Marching):
         self,
         x: Array,
         paths: Paths,
-        first: float = PATH.first,
+        first: float | None = None,
         which: Index | None = None,
         careful: bool = True,
         least: Array | None = None,
     ) -> Tracks:
-        """All tracks from their closed states ``x (nx, V)`` in forms ``which``; ``first`` is the first step tried.
+        """All tracks from their closed states ``x (nx, V)`` in forms ``which``; ``first`` is the first step tried, else ``PATH.first``.
 
         Unless ``careful`` a track ends, not named, where the quick march or its certificate ends. ``least (V,)`` are condition numbers
         that are known of the branches elsewhere: of a start beside a singular point its own tells nothing of what is ordinary.
@@ -272,10 +272,10 @@ class Follower(Marching):
 
     # --- the quick march -------------------------------------------------------------------------------------------------
 
-    def _quick(self, start: Nodes, first: float) -> Nodes:
+    def _quick(self, start: Nodes, first: float | None) -> Nodes:
         """Nodes behind the starts, most of them closed by one Newton step only; ends early where that does not do."""
         out: list[Nodes] = []
-        march = March(start, start, np.zeros(len(start), dtype=bool), np.full(len(start), first))
+        march = March(start, start, np.zeros(len(start), dtype=bool), np.full(len(start), first or PATH.first))
         while len(march.last):
             last = march.last
             at, drive, x, order = self.predicted(march)

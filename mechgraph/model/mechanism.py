@@ -18,7 +18,8 @@ import numpy as np
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, MechgraphWarning, counted
 from mechgraph.fields import plain, same_fields
-from mechgraph.memo import Once
+from mechgraph.maths.tolerances import Tolerances
+from mechgraph.memo import Once, carried, under
 from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.declaration import Parts, declaration_faults, flat_start, item_faults, mapping_faults
 from mechgraph.model.loads import Gravity, Load
@@ -322,8 +323,8 @@ class Mechanism(Parts, Once, Shown):
         """Links, pairs, drivers, couplings and loads as tables."""
         return mechanism_document(self)
 
-    def __reduce__(self) -> tuple[Callable[..., Mechanism], tuple[dict[str, Any]]]:
-        return _rebuilt, (self._arguments(),)
+    def __reduce__(self) -> tuple[Callable[..., Mechanism], tuple[dict[str, Any], Tolerances | None]]:
+        return _rebuilt, (self._arguments(), carried(self))
 
     def _arguments(self) -> dict[str, Any]:
         out = {k: getattr(self, k) for k in self.formats}
@@ -366,12 +367,12 @@ class Mechanism(Parts, Once, Shown):
                 f"mechanism {self.name!r}", [f"replace: unknown field {k!r}" for k in sorted(unknown)]
             )
         if not set(changes) <= {"drives", "loads", "start"}:
-            changed = Mechanism(**{**self._arguments(), **changes})
+            changed = under(carried(self), Mechanism, **{**self._arguments(), **changes})
             if changed.has_graph_of(self):
                 changed.take_graph_of(self)
             return changed
         # links, pairs and couplings stay, and with them what is kept of the graph: only what refers to them is checked again
-        out = object.__new__(Mechanism)
+        out = under(carried(self), Mechanism.__new__, Mechanism)
         fields = {k: getattr(self, k) for k in self.formats}
         wrong_kinds: list[str] = []
         fields["drives"] = _as_drives(items_of(changes.get("drives", self.drives), "drives", wrong_kinds))
@@ -388,6 +389,44 @@ class Mechanism(Parts, Once, Shown):
         if "loads" in changes:
             out._doubt()
         return out
+
+    @property
+    def tolerances(self) -> Tolerances:
+        """The tolerances with which the mechanism is asked."""
+        return carried(self) or Tolerances()
+
+    @door
+    def with_tolerances(self, numbers: Tolerances) -> Mechanism:
+        """Return the mechanism as it is asked with other tolerances; the same argument of ``solve`` and others does that for one call.
+
+        Everything that is made of the copy goes by them: copies of it, solutions, reports, what is worked out of these later.
+
+        Parameters
+        ----------
+        numbers : Tolerances
+            See ``Tolerances``.
+
+        Returns
+        -------
+        Mechanism
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> m = mg.load("four-bar").with_tolerances(mg.Tolerances(path={"longest": 0.1}))
+        >>> m.tolerances.path.longest
+        0.1
+        """
+        known: dict[Tolerances | None, Mechanism] = vars(self).setdefault("_asked_otherwise", {})
+        asked = numbers.asked
+        if asked not in known:
+            out = under(asked, Mechanism.__new__, type(self))
+            vars(out).update(
+                (k, v) for k, v in vars(self).items() if k not in ("_kept", "_tolerances", "_asked_otherwise")
+            )
+            out.take_graph_of(self)
+            known[asked] = out
+        return known[asked]
 
     def has_graph_of(self, other: Mechanism) -> bool:
         """Whether links and pairs have the names, ends and types of those of another mechanism, in the same order."""
@@ -644,5 +683,5 @@ def _named(items: tuple[Any, ...], pairs: Iterable[Any]) -> tuple[Any, ...]:
     )
 
 
-def _rebuilt(arguments: dict[str, Any]) -> Mechanism:
-    return Mechanism(**arguments)
+def _rebuilt(arguments: dict[str, Any], tolerances: Tolerances | None = None) -> Mechanism:
+    return under(tolerances, Mechanism, **arguments)

@@ -20,6 +20,7 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import Index
+from mechgraph.maths.tolerances import Tolerances
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.certificate import TINY, Certificate, certificate, told_apart
 from mechgraph.modes.continua import Found, Nearby, continua, irregular, least_value, searched
@@ -503,6 +504,7 @@ def assemblies(
     turns: Positive = GUESSED_TURNS,
     cache: bool = True,
     progress: Progress | None = None,
+    tolerances: Tolerances | None = None,
 ) -> Any:
     """Find all assembly modes for given joint values, points or link poses by homotopy continuation.
 
@@ -527,6 +529,8 @@ def assemblies(
         Keep start solutions in the user's folder (``MECHGRAPH_CACHE``, else ``~/.cache/mechgraph``).
     progress : callable, optional
         Called with a line of text now and then; an exception raised in it ends the call.
+    tolerances : Tolerances, optional
+        Numbers by which to decide, see ``Tolerances``. Default: those of the mechanism, which are the default ones.
 
     Returns
     -------

@@ -26,7 +26,7 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import Array, Index
-from mechgraph.maths.tolerances import MOTIONS
+from mechgraph.maths.tolerances import MOTIONS, Tolerances
 from mechgraph.model.declaration import mapping_faults
 from mechgraph.model.loads import Law, Load
 from mechgraph.model.mechanism import Mechanism
@@ -254,6 +254,7 @@ def respond(
     passive: PassiveName | None = None,
     tol: float | None = None,
     progress: Callable[[float], None] | None = None,
+    tolerances: Tolerances | None = None,
 ) -> Response:
     """Integrate the motion under given loads (forward dynamics), with all reactions.
 
@@ -297,6 +298,8 @@ def respond(
         As in ``solve``.
     progress : callable, optional
         Called with the time reached after every step.
+    tolerances : Tolerances, optional
+        Numbers by which to decide, see ``Tolerances``. Default: those of the mechanism, which are the default ones.
 
     Returns
     -------

@@ -21,7 +21,7 @@ from mechgraph.equations.terms import MovingState
 from mechgraph.errors import DeclarationError, MechgraphError
 from mechgraph.force.block import BlockForces
 from mechgraph.force.loads import inertia_wrenches, user_poses, user_twists
-from mechgraph.force.reactions import UNIQUE, PairFrames, internal_state
+from mechgraph.force.reactions import PairFrames, internal_state
 from mechgraph.kinematics.motion_path import Status, in_blocks
 from mechgraph.kinematics.rates import PassiveMotion, Rates, Velocities
 from mechgraph.kinematics.state import Configuration, ContactLines
@@ -29,7 +29,7 @@ from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import EVERY, Place
 from mechgraph.maths.newton import Work
 from mechgraph.maths.se3 import Array, Index, cross, rotate, rotate_back, shift_wrench
-from mechgraph.maths.tolerances import PATH
+from mechgraph.maths.tolerances import PATH, STRESSES
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Parameters
@@ -396,7 +396,7 @@ def _sizes(states: Array) -> Array:
     if not stress.shape[-1]:
         return np.asarray(np.linalg.norm(vectors, axis=0))
     ways, sizes, _ = np.linalg.svd(stress, full_matrices=False)
-    loose = sizes > UNIQUE
+    loose = sizes > STRESSES.unique
     along = np.einsum("tij,it->tj", ways, vectors) * loose
     left = vectors - np.einsum("tij,tj->it", ways, along)
     return np.where(loose.sum(axis=-1) == len(vectors), np.nan, np.linalg.norm(left, axis=0))
@@ -404,7 +404,7 @@ def _sizes(states: Array) -> Array:
 
 def _touched(stress: Array, scale: float = 1.0) -> Mask:
     """Where self-stresses have a part: ``stress (..., s, T)``."""
-    return np.asarray(np.sqrt((stress * stress).sum(axis=-2)) > UNIQUE * scale)
+    return np.asarray(np.sqrt((stress * stress).sum(axis=-2)) > STRESSES.unique * scale)
 
 
 class PairForces(Kept):

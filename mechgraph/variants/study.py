@@ -25,6 +25,8 @@ from mechgraph.kinematics.prescribed import Motions, actuators, driven
 from mechgraph.kinematics.solver import MotionEngineName
 from mechgraph.kinetostatics import RedundantName
 from mechgraph.maths.se3 import Array
+from mechgraph.maths.tolerances import Tolerances
+from mechgraph.memo import ASKED, under
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.quantities import Count, Index, door, has_quantity, is_numeric, real_array, shown, wrong
@@ -607,6 +609,7 @@ def study(
     engine: MotionEngineName = "auto",
     tol: float | None = None,
     progress: Progress | None = None,
+    tolerances: Tolerances | None = None,
 ) -> Study:
     """Solve many variants of a mechanism (Monte Carlo, Latin hypercube, grid).
 
@@ -634,6 +637,8 @@ def study(
         Default: the processors of this machine, threads if the compiled kernel serves, else processes.
     progress : callable, optional
         Called with the numbers of parts done and of all parts.
+    tolerances : Tolerances, optional
+        Numbers by which to decide, see ``Tolerances``. Default: those of the mechanism, which are the default ones.
 
     Returns
     -------
@@ -825,7 +830,7 @@ def _submitted(tasks: Mapping[int, Task], executor: concurrent.futures.Executor)
     failed: BaseException | None = None
     try:
         for i, task in tasks.items():
-            futures[executor.submit(solved, task)] = i
+            futures[executor.submit(under, ASKED.get(), solved, task)] = i
         for future in concurrent.futures.as_completed(futures):
             error = future.exception()
             if error is None or isinstance(error, MechgraphError):

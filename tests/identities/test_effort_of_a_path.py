@@ -1,7 +1,5 @@
 """What a path costs: effort is bounded near folds, for variants by the hundred and far away, and where it ends is named."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -9,7 +7,6 @@ import mechgraph as mg
 from mechgraph.kinematics import assembly
 from mechgraph.kinetostatics import Pipeline
 from mechgraph.maths import tracker
-from mechgraph.maths.tolerances import PATH
 
 Z = (0, 0, 1)
 
@@ -129,7 +126,7 @@ def test_a_slide_far_away_is_reached_in_steps_that_grow(works):
 
 def test_a_path_of_too_many_steps_is_named(monkeypatch):
     """A screw that goes on and on never repeats itself: after so many steps it is said how far the path was followed."""
-    monkeypatch.setattr(tracker, "PATH", replace(PATH, quick_steps=100, steps_a_point=0))
+    monkeypatch.setattr(tracker, "PATH", mg.Tolerances(path={"quick_steps": 100, "steps_a_point": 1}).path)
     places = {"A": (0, 0, 0), "B": (1, 0, 0), "C": (3, 1, 0), "D": (3, -1, 0)}
     ends = [("f", "a"), ("a", "b"), ("b", "c"), ("c", "f")]
     how = [("H", {"pitch": 0.3}), ("R", {}), ("R", {}), ("C", {})]
@@ -147,7 +144,7 @@ def test_a_path_of_too_many_steps_is_named(monkeypatch):
 
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 def test_so_is_one_of_too_many_careful_steps(monkeypatch, engine):
-    monkeypatch.setattr(tracker, "PATH", replace(PATH, careful_steps=4, steps_a_point=0))
+    monkeypatch.setattr(tracker, "PATH", mg.Tolerances(path={"careful_steps": 4, "steps_a_point": 1}).path)
     m = near_its_dead_point(1e-6)
     with pytest.raises(mg.ReachError, match="takes more steps than are made"):
         mg.kinematics(m, {"D": [m.start["D.Rz"], -0.05]}, engine=engine)
