@@ -10,7 +10,7 @@ from test_modes import FOUR, STEPHENSON, WATT, planar, platform
 
 import mechgraph as mg
 from mechgraph.modes.assemblies import Question
-from mechgraph.modes.targets import Group, Undivided, groups_of
+from mechgraph.modes.targets import EquationGroup, Undivided, groups_of
 
 ON_A_COUPLER = {
     "A": ("a", "b", 0.0, 2.0),
@@ -114,7 +114,7 @@ def test_a_group_that_leaves_its_class_is_no_group() -> None:
             for k, (a, b, x, y) in FOUR.items()
         ]
         family = Question(mg.Mechanism("dyad", pairs=pairs, frame="ground"), {"A": 0.0}).family
-        group = Group(family, np.array([1, 2, 3]), np.zeros(0, dtype=np.intp), np.array([0]))
+        group = EquationGroup(family, np.array([1, 2, 3]), np.zeros(0, dtype=np.intp), np.array([0]))
         assert (group.family.rank, group.within) == (3, stays)
 
 

@@ -21,7 +21,7 @@ from mechgraph.modes.assemblies import Finder, Question
 from mechgraph.modes.family import Member
 from mechgraph.modes.homotopy import Equations
 from mechgraph.modes.start_sets import _beside, _poles, _tame, bound, rational, start_set, trace_test
-from mechgraph.modes.targets import Ends, _account, _Run
+from mechgraph.modes.targets import Ends, _account, _TrackRun
 
 
 @pytest.fixture
@@ -227,7 +227,7 @@ def test_ends_far_away_count_where_they_are_plainly_not_real_and_once() -> None:
         x[family.free[0]] = angles
         known = Ends.none(len(x), len(angles))
         none, every = np.zeros(len(angles), dtype=bool), np.ones(len(angles), dtype=bool)
-        _account(family, at, known, _Run(x, every, none, none), 0)
+        _account(family, at, known, _TrackRun(x, every, none, none), 0)
         return known
 
     far = 9.0j  # cosines of some 4,000

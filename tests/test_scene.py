@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
-from mechgraph.show.scene import Part, Scene, scene
+from mechgraph.show.scene import DrawnPart, Scene, scene
 from mechgraph.show.shapes import frame_along, symbol
 
 Z = (0.0, 0.0, 1.0)
@@ -17,7 +17,7 @@ def solved(name: str) -> mg.Solution | mg.Mechanism:
         return mg.load(name)
 
 
-def parts(found: Scene, role: str, owner: str = "") -> list[Part]:
+def parts(found: Scene, role: str, owner: str = "") -> list[DrawnPart]:
     return [p for p in found.parts if p.role == role and p.owner.startswith(owner)]
 
 

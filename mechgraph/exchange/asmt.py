@@ -88,7 +88,7 @@ def inclined(RI: Array, RJ: Array, angle: float) -> Directions:
     return Directions(made, made, rotation_exp(tilt) @ made)
 
 
-class Row(NamedTuple):
+class JointRow(NamedTuple):
     """A joint: its pair, which of x, y, z of J in I are free, what holds its axes, and the name of its number in the file.
 
     ``type`` is a symbol, or a function of ``angle`` (between the z axes) that makes the row of the pair table.
@@ -153,28 +153,28 @@ def motion_type(order: str) -> str | PairType:
     return PairType(f"Motion{order}", HELD_BY_MOTION, freedoms=[*SLIDES, *turns_in(order)], reactions=[])
 
 
-def ball_type(row: Row, order: str) -> PairType:
+def ball_type(row: JointRow, order: str) -> PairType:
     """The pair of a ball in its seat, groove or on its plane whose rotation is turns in order, so that a motion can drive them."""
     slides = [name for name, is_free in zip(SLIDES, row.slides, strict=True) if is_free]
     return PairType(f"{row.type}{order}", "ball that turns in order", freedoms=[*slides, *turns_in(order)])
 
 
-JOINTS: dict[str, Row] = {
-    "FixedJoint": Row("W", AT, same),
-    "RevoluteJoint": Row("R", AT, about_z),
-    "TranslationalJoint": Row("P", ALONG, same),
-    "CylindricalJoint": Row("C", ALONG, about_z),
-    "SphericalJoint": Row("S", AT, free),
-    "UniversalJoint": Row("U", AT, inclined),
-    "PlanarJoint": Row("E", ACROSS, about_z, "offset"),
-    "PointInLineJoint": Row("Sg", ALONG, free),
-    "PointInPlaneJoint": Row("Sp", ACROSS, free, "offset"),
-    "LineInPlaneJoint": Row("Cp", ACROSS, inclined, "offset"),
-    "ScrewJoint": Row(screw, ANYWHERE, free, "pitch"),
-    "ParallelAxesJoint": Row(parallel, ANYWHERE, about_z),
-    "PerpendicularJoint": Row(at_angle, ANYWHERE, inclined),
-    "AngleJoint": Row(at_angle, ANYWHERE, inclined, "theIzJz"),
-    "NoRotationJoint": Row(no_rotation, ANYWHERE, same),
+JOINTS: dict[str, JointRow] = {
+    "FixedJoint": JointRow("W", AT, same),
+    "RevoluteJoint": JointRow("R", AT, about_z),
+    "TranslationalJoint": JointRow("P", ALONG, same),
+    "CylindricalJoint": JointRow("C", ALONG, about_z),
+    "SphericalJoint": JointRow("S", AT, free),
+    "UniversalJoint": JointRow("U", AT, inclined),
+    "PlanarJoint": JointRow("E", ACROSS, about_z, "offset"),
+    "PointInLineJoint": JointRow("Sg", ALONG, free),
+    "PointInPlaneJoint": JointRow("Sp", ACROSS, free, "offset"),
+    "LineInPlaneJoint": JointRow("Cp", ACROSS, inclined, "offset"),
+    "ScrewJoint": JointRow(screw, ANYWHERE, free, "pitch"),
+    "ParallelAxesJoint": JointRow(parallel, ANYWHERE, about_z),
+    "PerpendicularJoint": JointRow(at_angle, ANYWHERE, inclined),
+    "AngleJoint": JointRow(at_angle, ANYWHERE, inclined, "theIzJz"),
+    "NoRotationJoint": JointRow(no_rotation, ANYWHERE, same),
 }
 """Joints that have a pair."""
 
@@ -203,7 +203,7 @@ RESULTS = "TimeSeries"
 
 
 @dataclass(frozen=True)
-class Part:
+class AsmtPart:
     """A part, or the assembly itself, which is the ground: its placement, mass data in its own frame, where it stands in the file."""
 
     name: str
@@ -217,7 +217,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Marker:
+class AsmtMarker:
     """A marker: its part and its pose ``(3, 4)`` in the frame of the part."""
 
     path: str
@@ -247,9 +247,9 @@ class Assembly:
     """A whole file. ``ground`` is the assembly itself; ``notes`` says what was read otherwise than it stands."""
 
     name: str
-    ground: Part
-    parts: Mapping[str, Part]
-    markers: Mapping[str, Marker]
+    ground: AsmtPart
+    parts: Mapping[str, AsmtPart]
+    markers: Mapping[str, AsmtMarker]
     joints: Sequence[Connection]
     motions: Sequence[Connection]
     limits: Sequence[Connection]
@@ -262,7 +262,7 @@ class Assembly:
     notes: Sequence[str]
 
 
-class Reader:
+class AsmtReader:
     """Reads a file and collects its faults."""
 
     def __init__(self, path: Path, text: str) -> None:
@@ -277,8 +277,8 @@ class Reader:
         self.top = top
         self.faults: list[str] = []
         self.notes: list[str] = []
-        self.markers: dict[str, Marker] = {}
-        self.parts: dict[str, Part] = {}
+        self.markers: dict[str, AsmtMarker] = {}
+        self.parts: dict[str, AsmtPart] = {}
         self.variables: dict[str, str] = {}
         self.connected: dict[str, list[Connection]] = {key: [] for key in CONNECTIONS}
         self.stem = path.stem
@@ -298,7 +298,7 @@ class Reader:
         u, _, vt = np.linalg.svd(R)
         return np.column_stack([u @ vt if error > 1e-15 else R, position])
 
-    def container(self, node: Node, name: str, path: str, within: Array) -> Part:
+    def container(self, node: Node, name: str, path: str, within: Array) -> AsmtPart:
         """A part with its mass data, placed ``within`` a frame; its markers are noted."""
         where = f"part {shown(name)}"
         for point in node.under("RefPoints"):
@@ -309,7 +309,7 @@ class Reader:
         mass = node.child("PrincipalMassMarker")
         pose = compose(within, self.pose(node, where))
         if mass is None:
-            return Part(name, path, pose, line=node.line)
+            return AsmtPart(name, path, pose, line=node.line)
         axes = self.pose(mass, f"{where}: PrincipalMassMarker")
         if mass.word("Name"):
             self.marker(mass, f"{path}/{mass.word('Name')}", name, axes)
@@ -319,13 +319,13 @@ class Reader:
             self.faults.append(f"line {mass.line}: {where}: Mass = {weight:g}: a mass is not below 0")
         inertia = axes[:, :3] @ np.diag(moments) @ axes[:, :3].T
         placeholder = weight == 1.0 and bool((moments == 1.0).all())
-        return Part(name, path, pose, weight, axes[:, 3], (inertia + inertia.T) / 2, placeholder, node.line)
+        return AsmtPart(name, path, pose, weight, axes[:, 3], (inertia + inertia.T) / 2, placeholder, node.line)
 
     def marker(self, node: Node, path: str, part: str, pose: Array) -> None:
         """Notes a marker."""
         if path in self.markers:
             self.faults.append(f"line {node.line}: two markers are named {path}")
-        self.markers[path] = Marker(path, part, pose)
+        self.markers[path] = AsmtMarker(path, part, pose)
 
     def connections(self, entries: Sequence[Node], within: str) -> list[Connection]:
         """Joints, motions, limits or forces of an assembly; those without a name of their own get one."""
@@ -343,7 +343,7 @@ class Reader:
             found[name] = Connection(entry.text, within + name, i, j, joint, entry)
         return list(found.values())
 
-    def assembly(self, node: Node, ground: Part) -> None:
+    def assembly(self, node: Node, ground: AsmtPart) -> None:
         """Parts, variables, joints, motions, limits and forces of an assembly, and of the assemblies within it."""
         within = "" if node is self.top else f"{ground.name}/"
         for entry in (*node.under("Parts"), *node.under("Assemblies")):
@@ -529,7 +529,7 @@ class Standing:
     notes: list[str] = field(default_factory=list)
     moved: dict[str, tuple[float, float]] = field(default_factory=dict)
 
-    def part(self, name: str) -> Part:
+    def part(self, name: str) -> AsmtPart:
         """The part, or the ground."""
         return self.assembly.parts.get(name, self.assembly.ground)
 

@@ -53,11 +53,11 @@ from mechgraph.exchange.asmt import (
     REFUSED,
     SLIDES,
     UNMENTIONED,
+    AsmtPart,
     Assembly,
     Connection,
     Directions,
-    Part,
-    Row,
+    JointRow,
     Snapping,
     Standing,
     ball_type,
@@ -321,7 +321,7 @@ class Seat:
     """A joint with its row and marker poses in the assembly: I, J as the file has it, J as it shall be, and the pair coordinates there."""
 
     joint: Connection
-    row: Row
+    row: JointRow
     on_a: Array
     on_b: Array
     given: Array
@@ -348,7 +348,7 @@ class Builder(Standing):
 
     # --- joints ----------------------------------------------------------------------------------------------------
 
-    def rows(self) -> Iterator[tuple[Connection, Row]]:
+    def rows(self) -> Iterator[tuple[Connection, JointRow]]:
         """The joints that hold two parts to each other."""
         for joint in self.assembly.joints:
             ends = self.ends(joint)
@@ -364,20 +364,20 @@ class Builder(Standing):
             elif ends:
                 yield joint, self.numbered(joint, row)
 
-    def numbered(self, joint: Connection, row: Row) -> Row:
+    def numbered(self, joint: Connection, row: JointRow) -> JointRow:
         """The row with the angle of the joint; axes at the angle 0 are parallel."""
         if row.number != "theIzJz" or joint.node.child(row.number) is None:
             return row
         angle = self.number(joint, row)
         return row._replace(angle=angle) if abs(np.sin(angle)) > FITS else JOINTS["ParallelAxesJoint"]
 
-    def number(self, joint: Connection, row: Row) -> float:
+    def number(self, joint: Connection, row: JointRow) -> float:
         """The number of a joint (offset, pitch, angle); 0 where it has none."""
         if not row.number or joint.node.child(row.number) is None:
             return 0.0
         return float(joint.node.numbers(row.number, (1,), joint.title.partition(": ")[2], self.faults)[0])
 
-    def seat(self, joint: Connection, row: Row, I: Array) -> Seat:
+    def seat(self, joint: Connection, row: JointRow, I: Array) -> Seat:
         """Markers of the pair for the pose of I: the place of J, and the coordinates there."""
         J = self.pose(joint.j)
         d = row.turns(I[:, :3], J[:, :3], row.angle)
@@ -404,7 +404,7 @@ class Builder(Standing):
             )
         return out
 
-    def straightened(self, snap: Snapping, joint: Connection, row: Row, I: Array) -> tuple[Array, Array]:
+    def straightened(self, snap: Snapping, joint: Connection, row: JointRow, I: Array) -> tuple[Array, Array]:
         """Rotation and origin of marker I with its axis made exact."""
         if row.turns is free and not any(row.slides):
             return I[:, :3], I[:, 3]
@@ -599,7 +599,7 @@ class Builder(Standing):
             )
         return [Link(a.name), *(self.link(part) for part in used)]
 
-    def link(self, part: Part) -> Link:
+    def link(self, part: AsmtPart) -> Link:
         """A link with the mass of its part."""
         if not part.mass:
             return Link(part.name)

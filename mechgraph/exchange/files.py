@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mechgraph.errors import ContentError, DeclarationError, FileError, MechgraphWarning, visible
-from mechgraph.exchange.asmt import Assembly, Reader
+from mechgraph.exchange.asmt import AsmtReader, Assembly
 from mechgraph.exchange.asmt_mechanism import mechanism_of
 from mechgraph.exchange.mjcf import read_mjcf, save_mjcf
 from mechgraph.exchange.urdf import read_urdf
@@ -88,7 +88,7 @@ Notes = tuple[str, ...]
 
 def assembly_of(path: Path) -> Assembly:
     """A FreeCAD assembly as its file holds it."""
-    return Reader(path, text_of(path, "FreeCAD assembly")).read()
+    return AsmtReader(path, text_of(path, "FreeCAD assembly")).read()
 
 
 def _from_asmt(path: Path) -> tuple[Mechanism, Notes]:

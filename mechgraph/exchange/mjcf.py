@@ -29,7 +29,7 @@ import numpy as np
 import scipy
 
 from mechgraph.errors import HIDDEN, DeclarationError, FileError
-from mechgraph.exchange.syntax import Element, read_xml
+from mechgraph.exchange.syntax import XmlElement, read_xml
 from mechgraph.files import write_whole
 from mechgraph.kinetostatics import assemble
 from mechgraph.maths.inertia import physical_faults, shifted
@@ -57,7 +57,7 @@ class Compiler:
         return value if self.radians else float(np.deg2rad(value))
 
 
-def pose_of(e: Element, c: Compiler) -> Array:
+def pose_of(e: XmlElement, c: Compiler) -> Array:
     """Position and orientation of an element in its parent."""
     given = [key for key in ORIENTATIONS if key in e.attributes]
     if len(given) > 1:
@@ -66,25 +66,25 @@ def pose_of(e: Element, c: Compiler) -> Array:
     return np.column_stack([R, e.numbers("pos", (3,), np.zeros(3), c.faults)])
 
 
-def _of_euler(e: Element, c: Compiler) -> Array:
+def _of_euler(e: XmlElement, c: Compiler) -> Array:
     """Three turns in the order of the compiler, about axes that turn along (small letters) or stay (capitals)."""
     angles = [c.angle(v) for v in e.numbers("euler", (3,), None, c.faults)]
     turn: Any = scipy.spatial.transform.Rotation
     return np.asarray(turn.from_euler(c.order.swapcase(), angles).as_matrix())
 
 
-def _of_quat(e: Element, c: Compiler) -> Array:
+def _of_quat(e: XmlElement, c: Compiler) -> Array:
     q = e.numbers("quat", (4,), None, c.faults)
     return quaternion_matrix(q / np.linalg.norm(q)) if q.any() else np.eye(3)
 
 
-def _of_axisangle(e: Element, c: Compiler) -> Array:
+def _of_axisangle(e: XmlElement, c: Compiler) -> Array:
     *axis, angle = e.numbers("axisangle", (4,), None, c.faults)
     turn: Any = scipy.spatial.transform.Rotation
     return np.asarray(turn.from_rotvec(np.array(axis) / (np.linalg.norm(axis) or 1.0) * c.angle(angle)).as_matrix())
 
 
-def _of_xyaxes(e: Element, c: Compiler) -> Array:
+def _of_xyaxes(e: XmlElement, c: Compiler) -> Array:
     x, y = e.numbers("xyaxes", (2, 3), None, c.faults)
     z = np.cross(x, y)
     if not z.any():
@@ -93,7 +93,7 @@ def _of_xyaxes(e: Element, c: Compiler) -> Array:
     return np.column_stack([v / np.linalg.norm(v) for v in (x, np.cross(z, x), z)])
 
 
-def _of_zaxis(e: Element, c: Compiler) -> Array:
+def _of_zaxis(e: XmlElement, c: Compiler) -> Array:
     """The smallest turn that brings z there."""
     z = e.numbers("zaxis", (3,), None, c.faults)
     z = z / (np.linalg.norm(z) or 1.0)
@@ -103,7 +103,7 @@ def _of_zaxis(e: Element, c: Compiler) -> Array:
     return np.asarray(turn.from_rotvec(axis / np.linalg.norm(axis) * np.arccos(np.clip(z[2], -1, 1))).as_matrix())
 
 
-ORIENTATIONS: dict[str, Callable[[Element, Compiler], Array]] = {
+ORIENTATIONS: dict[str, Callable[[XmlElement, Compiler], Array]] = {
     "quat": _of_quat,
     "axisangle": _of_axisangle,
     "euler": _of_euler,
@@ -384,15 +384,15 @@ class ReadBody:
     name: str
     parent: str
     pose: Array
-    element: Element
+    element: XmlElement
 
 
 @dataclass
-class Reader:
+class MjcfReader:
     """Collects links, pairs and faults."""
 
     path: Path
-    root: Element
+    root: XmlElement
     faults: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     bodies: dict[str, ReadBody] = field(default_factory=dict)
@@ -404,7 +404,7 @@ class Reader:
     frame: str = WORLD
     turn: Array = field(default_factory=lambda: np.eye(3))
 
-    def section(self, tag: str) -> list[Element]:
+    def section(self, tag: str) -> list[XmlElement]:
         """The children of all sections of a tag."""
         return [child for part in self.root.all(tag) for child in part.children]
 
@@ -429,7 +429,7 @@ class Reader:
                     rows[child.tag] = rows.get(child.tag, {}) | child.attributes
         return found
 
-    def with_defaults(self, element: Element, inherited: str) -> Element:
+    def with_defaults(self, element: XmlElement, inherited: str) -> XmlElement:
         """An element with the attributes of its class; its own come first."""
         rows = self.classes.get(element.attributes.get("class", inherited))
         if rows is None:
@@ -437,7 +437,7 @@ class Reader:
                 f"{element.title}: there is no class {shown(element.attributes.get('class', inherited))}"
             )
             return element
-        return Element(element.tag, rows.get(element.tag, {}) | element.attributes, element.line, element.children)
+        return XmlElement(element.tag, rows.get(element.tag, {}) | element.attributes, element.line, element.children)
 
     # --- bodies -----------------------------------------------------------------------------------------------------
 
@@ -543,7 +543,7 @@ class Reader:
                 self.links[b] = Link(b)
             self.joint(self.with_defaults(e, inherited), a, b, body.pose if k == 0 else np.eye(3, 4))
 
-    def joint(self, e: Element, a: str, b: str, X: Array) -> None:
+    def joint(self, e: XmlElement, a: str, b: str, X: Array) -> None:
         """The pair of a joint from a to b, whose frame stands at X in a where the coordinate is ``ref``."""
         kind = e.attributes.get("type", "hinge")
         if kind not in JOINTS:
@@ -580,12 +580,12 @@ class Reader:
 
     # --- equality, parts, drives ---------------------------------------------------------------------------------------
 
-    def equality(self, e: Element) -> None:
+    def equality(self, e: XmlElement) -> None:
         """A pair or coupling that closes a loop."""
         if e.attributes.get("active", "true") != "true":
             self.notes.append(f"{e.title} is not active: left out")
             return
-        makers: Mapping[str, Callable[[Element, str], None]] = {
+        makers: Mapping[str, Callable[[XmlElement, str], None]] = {
             "connect": self.connect,
             "weld": self.weld,
             "joint": self.couple,
@@ -597,7 +597,7 @@ class Reader:
         name = e.attributes.get("name", f"{e.tag} on line {e.line}")
         makers[e.tag](e, f"{name} ({e.tag})" if name in taken else name)
 
-    def ends(self, e: Element) -> tuple[str, str] | None:
+    def ends(self, e: XmlElement) -> tuple[str, str] | None:
         """The two bodies of an equality; the second is the world where left out."""
         names = e.attributes.get("body1", ""), e.attributes.get("body2", WORLD)
         unknown = [shown(name) for name in names if name not in self.poses]
@@ -607,7 +607,7 @@ class Reader:
             return None
         return names
 
-    def connect(self, e: Element, name: str) -> None:
+    def connect(self, e: XmlElement, name: str) -> None:
         """A common point of two bodies, at the anchor in the first."""
         ends = self.ends(e)
         if ends is None:
@@ -616,7 +616,7 @@ class Reader:
         B = compose(inverse(self.poses[ends[1]]), compose(self.poses[ends[0]], A))
         self.pairs.append(self.pair(name, "S", *ends, A, B))
 
-    def weld(self, e: Element, name: str) -> None:
+    def weld(self, e: XmlElement, name: str) -> None:
         """Two bodies as they stand, or at a relative pose."""
         ends = self.ends(e)
         if ends is None:
@@ -627,7 +627,7 @@ class Reader:
             A = np.column_stack([quaternion_matrix(given[3:] / np.linalg.norm(given[3:])), given[:3]])
         self.pairs.append(self.pair(name, "W", *ends, A, np.eye(3, 4)))
 
-    def couple(self, e: Element, name: str) -> None:
+    def couple(self, e: XmlElement, name: str) -> None:
         """``q_1 - ref_1 = c_0 + c_1 (q_2 - ref_2)``."""
         freedoms = {pair.name: pair.freedom_names[0] for pair in self.pairs if pair.type.f == 1}
         names = [e.attributes[key] for key in ("joint1", "joint2") if key in e.attributes]
@@ -684,4 +684,4 @@ def joined(one: Link, other: Link) -> Link:
 
 def read_mjcf(path: Path) -> tuple[Mechanism, tuple[str, ...]]:
     """The mechanism of an MJCF file, and what was taken otherwise than it stands."""
-    return Reader(path, read_xml(path, "MJCF", "mujoco")).read()
+    return MjcfReader(path, read_xml(path, "MJCF", "mujoco")).read()

@@ -96,19 +96,19 @@ def _nodes(lines: Sequence[str], first: int) -> Iterator[tuple[int, Node]]:
 
 
 @dataclass
-class Element:
+class XmlElement:
     """An element: its tag, attributes, line and children."""
 
     tag: str
     attributes: dict[str, str]
     line: int
-    children: list[Element] = field(default_factory=list)
+    children: list[XmlElement] = field(default_factory=list)
 
-    def all(self, tag: str) -> list[Element]:
+    def all(self, tag: str) -> list[XmlElement]:
         """The children of a tag."""
         return [child for child in self.children if child.tag == tag]
 
-    def first(self, tag: str) -> Element | None:
+    def first(self, tag: str) -> XmlElement | None:
         """The first child of a tag."""
         return next((child for child in self.children if child.tag == tag), None)
 
@@ -135,7 +135,7 @@ class Element:
         return float(self.numbers(key, (1,), None if default is None else np.array([default]), faults)[0])
 
 
-def read_xml(path: Path, kind: str, root: str) -> Element:
+def read_xml(path: Path, kind: str, root: str) -> XmlElement:
     """The root element of a file.
 
     Raises
@@ -145,11 +145,11 @@ def read_xml(path: Path, kind: str, root: str) -> Element:
     """
     text = text_of(path, kind)
     parser = expat.ParserCreate()
-    top = Element("", {}, 0)
+    top = XmlElement("", {}, 0)
     open_ = [top]
 
     def start(tag: str, attributes: dict[str, str]) -> None:
-        made = Element(tag, attributes, parser.CurrentLineNumber)
+        made = XmlElement(tag, attributes, parser.CurrentLineNumber)
         open_[-1].children.append(made)
         open_.append(made)
 
@@ -251,7 +251,7 @@ OPERATIONS: dict[type[ast.operator], Callable[[Jet, Jet], Jet]] = {
 NONE: Mapping[str, str] = {}
 
 
-class Known(dict[str, Jet]):
+class KnownJets(dict[str, Jet]):
     """Jets by name; a variable's is found from its formula when it is first asked for."""
 
     def __init__(self, jets: Mapping[str, Jet], variables: Mapping[str, str]) -> None:
@@ -281,7 +281,7 @@ def evaluated(formula: str, t: Array, variables: Mapping[str, str] = NONE) -> tu
     FormulaFault
         where it is none, holds what is not known here, or has no finite value.
     """
-    jet = _found(formula, _tree(formula), Known({"time": Jet(t, np.ones_like(t), np.zeros_like(t))}, variables))
+    jet = _found(formula, _tree(formula), KnownJets({"time": Jet(t, np.ones_like(t), np.zeros_like(t))}, variables))
     value, rate, acceleration = (np.array(np.broadcast_to(part, t.shape), float) for part in (jet.s, jet.v, jet.a))
     if not all(np.isfinite(part).all() for part in (value, rate, acceleration)):
         raise FormulaFault(f"{shown(formula)} has no finite value, rate or acceleration at some of the times")
@@ -299,7 +299,7 @@ def law(formula: str, variables: Mapping[str, str] = NONE) -> Callable[[Array, A
     tree = _tree(formula)
 
     def value(x: Array, v: Array, t: Array) -> Array:
-        known = Known({"rij(self)": Jet(x), "vrij(self)": Jet(v), "time": Jet(t)}, variables)
+        known = KnownJets({"rij(self)": Jet(x), "vrij(self)": Jet(v), "time": Jet(t)}, variables)
         found = _found(formula, tree, known)
         return np.array(np.broadcast_to(found.s, np.shape(x)), float)
 
@@ -324,7 +324,7 @@ def _none(formula: str) -> str:
     return f"{shown(formula)} is no formula of time, such as 2*pi*time"
 
 
-def _found(formula: str, tree: ast.expr, known: Known) -> Jet:
+def _found(formula: str, tree: ast.expr, known: KnownJets) -> Jet:
     """The jet of a formula where what is ``known`` has these."""
     try:
         with np.errstate(all="ignore"):
@@ -333,7 +333,7 @@ def _found(formula: str, tree: ast.expr, known: Known) -> Jet:
         raise FormulaFault(_none(formula)) from None
 
 
-def _jet(node: ast.expr, known: Known) -> Jet:
+def _jet(node: ast.expr, known: KnownJets) -> Jet:
     """The jet of a part of a formula."""
     match node:
         case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):

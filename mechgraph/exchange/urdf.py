@@ -14,7 +14,7 @@ import numpy as np
 import scipy
 
 from mechgraph.errors import DeclarationError, listed
-from mechgraph.exchange.syntax import Element, read_xml
+from mechgraph.exchange.syntax import XmlElement, read_xml
 from mechgraph.maths.inertia import physical_faults
 from mechgraph.maths.se3 import Array, compose
 from mechgraph.model.couplings import Coupling
@@ -28,14 +28,14 @@ NOT_APPLIED = ("limit", "dynamics", "safety_controller")
 
 
 @dataclass
-class Reader:
+class UrdfReader:
     """Collects links, pairs, couplings and faults."""
 
-    root: Element
+    root: XmlElement
     faults: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
-    def origin(self, e: Element) -> Array:
+    def origin(self, e: XmlElement) -> Array:
         """The pose of the ``origin`` of an element; the identity where it has none."""
         found = e.first("origin")
         if found is None:
@@ -44,7 +44,7 @@ class Reader:
         R = scipy.spatial.transform.Rotation.from_euler("xyz", angles).as_matrix()
         return np.column_stack([R, found.numbers("xyz", (3,), np.zeros(3), self.faults)])
 
-    def link(self, e: Element) -> Link:
+    def link(self, e: XmlElement) -> Link:
         """A link with its inertia; ``ixy`` and the like are entries of the tensor."""
         name, inertial = e.attributes.get("name", ""), e.first("inertial")
         mass = inertial and inertial.first("mass")
@@ -62,7 +62,7 @@ class Reader:
             self.notes.append(f"the inertia of link {name!r} is that of no body")
         return Link(name, weight, X[:, 3], (I + I.T) / 2, unphysical=odd)
 
-    def pair(self, e: Element) -> Pair | None:
+    def pair(self, e: XmlElement) -> Pair | None:
         """The pair of a joint; None, and a fault, where there is none."""
         name, kind = e.attributes.get("name", f"joint on line {e.line}"), e.attributes.get("type", "")
         ends = [found.attributes.get("link", "") if (found := e.first(side)) else "" for side in ("parent", "child")]
@@ -88,7 +88,7 @@ class Reader:
             self.notes.append(f"joint {name!r}: {', '.join(dropped)} not applied")
         return Pair(name, TYPES[kind], *ends, on_a=on_a, on_b=on_b)
 
-    def coupling(self, e: Element, pairs: dict[str, Pair]) -> list[Coupling]:
+    def coupling(self, e: XmlElement, pairs: dict[str, Pair]) -> list[Coupling]:
         """``q = multiplier q_mimicked + offset`` of a joint that mimics another."""
         mimic, own = e.first("mimic"), pairs.get(e.attributes.get("name", ""))
         if mimic is None or own is None:
@@ -134,4 +134,4 @@ class Reader:
 def read_urdf(path: Path) -> tuple[Mechanism, tuple[str, ...]]:
     """The mechanism of a URDF file, and what was taken otherwise than it stands."""
     root = read_xml(path, "URDF", "robot")
-    return Reader(root).read(root.attributes.get("name", path.stem))
+    return UrdfReader(root).read(root.attributes.get("name", path.stem))

@@ -25,7 +25,7 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.certificate import TINY, Certificate, certificate, told_apart
 from mechgraph.modes.continua import Found, Nearby, continua, irregular, least_value, searched
 from mechgraph.modes.family import NO_NUMBERS, SPAN, Array, Family, at_rest
-from mechgraph.modes.form import Form, Rod, Whole, WithoutRods, rods_of
+from mechgraph.modes.form import EquationForm, RodChain, Whole, WithoutRods, rods_of
 from mechgraph.modes.result import Assemblies, AssembliesOver, ComplexModes, Continuum, weakest
 from mechgraph.modes.start_sets import ONE_ASSEMBLY, Irregular, StartSet, bound, distinct, keep, kept, start_set
 from mechgraph.modes.targets import (
@@ -33,7 +33,7 @@ from mechgraph.modes.targets import (
     REAL,
     REAL_SINGULAR,
     Ends,
-    Group,
+    EquationGroup,
     Product,
     Undivided,
     groups_of,
@@ -108,7 +108,7 @@ class Question:
         return np.array(out, dtype=np.intp)
 
     @cached_property
-    def form(self) -> Form:
+    def form(self) -> EquationForm:
         """The equations in which assemblies are looked for: without couplings and rods, where these can be left out."""
         family, drive, rods = self._uncoupled()
         if rods:
@@ -119,7 +119,7 @@ class Question:
                 return found
         return Whole(family, drive)
 
-    def _uncoupled(self) -> tuple[Family, Array, list[Rod]]:
+    def _uncoupled(self) -> tuple[Family, Array, list[RodChain]]:
         """The class, what is given, and rods; without couplings, where these say as much of freedoms as there are that are not given.
 
         With ``G_d`` and ``G`` the coefficients of what is given and of the others, ``q = q_0 - G^-1 G_d (d - d_0)``.
@@ -249,13 +249,13 @@ class Finder:
 
     def __init__(self, question: Question, seed: int, cache: bool, progress: Progress | None) -> None:
         self.question, self.progress = question, progress
-        self.form: Form = question.form
+        self.form: EquationForm = question.form
         self.family = self.form.family
         self.rng, self.cache = np.random.default_rng(seed), cache
         self.fault = self.family.fault
 
     @cached_property
-    def groups(self) -> Sequence[Undivided | Group]:
+    def groups(self) -> Sequence[Undivided | EquationGroup]:
         """What is solved, one after the other."""
         return groups_of(self.family)
 
@@ -415,7 +415,7 @@ class Finder:
 
 
 def _completeness(
-    found: Ends, groups: Sequence[Undivided | Group], starts: Sequence[StartSet]
+    found: Ends, groups: Sequence[Undivided | EquationGroup], starts: Sequence[StartSet]
 ) -> tuple[str, tuple[str, ...]]:
     """The word for how sure it is that no assembly is missing, and what it rests on."""
     told = [_of_class(group.family, start) for group, start in zip(groups, starts, strict=True)]

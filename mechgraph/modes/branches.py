@@ -55,7 +55,7 @@ TOUCHES = 1e-3
 
 
 @dataclass
-class Piece:
+class BranchPiece:
     """The way of assembly ``mode`` of sample ``sample`` in one ``sense``: states ``x (nx, n)`` at driver values, and its end.
 
     ``arrives`` is the assembly of the next sample, or -1; ``end`` the driver value where the piece ends at a ``fold``; ``rim`` says that it
@@ -99,7 +99,7 @@ class Tracer:
     def _prints(self, x: Array) -> Array:
         return self.family.prints(Configuration(self.system, x))
 
-    def pieces(self) -> list[Piece]:
+    def pieces(self) -> list[BranchPiece]:
         """All pieces."""
         step, total, requests, out = self.samples[1] - self.samples[0], 0, [], []
         part = np.linspace(0.0, 1.0, self.points + 1)[1:]
@@ -112,7 +112,7 @@ class Tracer:
                     others = np.repeat(x[self.family.rows, mode][:, None], len(part), axis=1)
                     others[self.place] = values
                     requests.append(Request(x[:, mode], 0, others, np.arange(total, total + len(part))))
-                    out.append(Piece(i, mode, sense, values, np.zeros(0), rim=rim))
+                    out.append(BranchPiece(i, mode, sense, values, np.zeros(0), rim=rim))
                     total += len(part)
         if not requests:
             return []
@@ -130,7 +130,7 @@ class Tracer:
         last = np.flatnonzero(np.append(nodes.track[1:] != nodes.track[:-1], True))
         return {int(nodes.track[k]): (float(nodes.drive[self.place, k]), nodes.x[:, k]) for k in last}
 
-    def _read(self, piece: Piece, places: Index, found: Positions, reach: dict[int, tuple[float, Array]]) -> None:
+    def _read(self, piece: BranchPiece, places: Index, found: Positions, reach: dict[int, tuple[float, Array]]) -> None:
         good = found.moved[places]
         stop = int(np.argmin(good)) if not good.all() else len(good)
         piece.values, piece.x = piece.values[:stop], found.x[:, places[:stop]]
@@ -169,7 +169,7 @@ class Tracer:
 class Map:
     """Pieces joined: branches as chains of (sample, assembly) in the sense of the driver, folds as pairs of pieces, and what meets."""
 
-    def __init__(self, pieces: list[Piece], states: list[Array]) -> None:
+    def __init__(self, pieces: list[BranchPiece], states: list[Array]) -> None:
         self.piece = {(p.sample, p.mode, p.sense): p for p in pieces}
         n = len(states)
         self.after: dict[Node, Node] = {}
@@ -209,12 +209,12 @@ class Map:
         chain = self.chains[number]
         return sum((*node, sense) not in self._told for node, sense in ((chain[0], -1), (chain[-1], 1)))
 
-    def branch(self, piece: Piece) -> int:
+    def branch(self, piece: BranchPiece) -> int:
         """The branch of a piece."""
         return self.of[piece.sample, piece.mode]
 
     @staticmethod
-    def _folds(ended: list[Piece]) -> list[tuple[Piece, Piece]]:
+    def _folds(ended: list[BranchPiece]) -> list[tuple[BranchPiece, BranchPiece]]:
         out = []
         for i, a in enumerate(ended):
             for b in ended[i + 1 :]:
@@ -224,8 +224,8 @@ class Map:
         return out
 
     @staticmethod
-    def _crossings(crossed: list[tuple[Piece, float, Array]]) -> list[tuple[float, list[Piece]]]:
-        out: list[tuple[float, list[Piece], Array]] = []
+    def _crossings(crossed: list[tuple[BranchPiece, float, Array]]) -> list[tuple[float, list[BranchPiece]]]:
+        out: list[tuple[float, list[BranchPiece], Array]] = []
         for piece, value, at in crossed:
             for known, pieces, there in out:
                 turns = (value - known) / (2 * np.pi)

@@ -233,7 +233,7 @@ WAYS = "A leg that two turns carry can stand in two ways in the same assembly: n
 """What is said of rods with two turns at an end."""
 
 
-class Form(Protocol):
+class EquationForm(Protocol):
     """Equations of a class, at given positions."""
 
     family: Family
@@ -268,35 +268,35 @@ class Whole:
         return x
 
 
-class Step(NamedTuple):
+class RodStep(NamedTuple):
     """A pair on the way along a rod, from its link a to b (``sign`` 1) or back."""
 
     pair: int
     sign: int
 
 
-class Rod(NamedTuple):
+class RodChain(NamedTuple):
     """A chain of links between two bodies: its pairs, of which the last is a ball, the links on the way, and the bodies."""
 
-    steps: tuple[Step, ...]
+    steps: tuple[RodStep, ...]
     links: tuple[int, ...]
     bodies: tuple[int, int]
 
 
-def rods_of(system: System, columns: Index) -> list[Rod]:
+def rods_of(system: System, columns: Index) -> list[RodChain]:
     """The rods of a mechanism with freedoms ``columns`` at rest; no pair and no link belongs to two."""
     driven, rows = set(columns.tolist()), [pair.type for pair in system.m.pairs]
-    at: list[list[Step]] = [[] for _ in system.m.links]
+    at: list[list[RodStep]] = [[] for _ in system.m.links]
     for k, (a, b) in enumerate(system.graph.ends):
-        at[a].append(Step(k, 1))
-        at[b].append(Step(k, -1))
+        at[a].append(RodStep(k, 1))
+        at[b].append(RodStep(k, -1))
     ends = {k for k, row in enumerate(rows) if _points(row) and driven.isdisjoint(_columns(system, k))}
-    out: list[Rod] = []
+    out: list[RodChain] = []
     for k in sorted(ends, key=lambda k: _is_ball(rows[k])):
         for body, sign in zip(system.graph.ends[k], (1, -1), strict=True):
             if k not in ends:
                 continue
-            steps, links = [Step(k, sign)], [sum(system.graph.ends[k]) - body]
+            steps, links = [RodStep(k, sign)], [sum(system.graph.ends[k]) - body]
             while len(at[links[-1]]) == 2 and links[-1] != system.graph.frame:
                 steps.append(next(step for step in at[links[-1]] if step.pair != steps[-1].pair))
                 links.append(sum(system.graph.ends[steps[-1].pair]) - links[-1])
@@ -305,12 +305,12 @@ def rods_of(system: System, columns: Index) -> list[Rod]:
             last = steps[-1].pair
             # the first end may have two turns, as ends are taken in that order; the second is a ball
             if len(steps) > 1 and last in ends and _is_ball(rows[last]) and links[-1] not in links[:-1]:
-                out.append(Rod(tuple(steps), tuple(links[:-1]), (body, links[-1])))
+                out.append(RodChain(tuple(steps), tuple(links[:-1]), (body, links[-1])))
                 ends -= {k, last}
     return out
 
 
-def behind(system: System, step: Step, x: Array) -> Array:
+def behind(system: System, step: RodStep, x: Array) -> Array:
     """Pose ``(3, 4, T)`` of the link behind a pair, seen from the link before it, at states ``x (nx, T)``."""
     par, pair = system.par, step.pair
     row, states = system.m.pairs[pair].type.scaled(par.L), x[system.first_row[pair] : system.first_row[pair + 1], None]
@@ -342,7 +342,7 @@ def _points(row: PairType) -> bool:
 class WithoutRods:
     """What is left of the mechanism of a class, with drivers at ``drive (d, n)``, when ``rods`` fall away, of which ``rows`` have rows."""
 
-    def __init__(self, whole: Family, drive: Array, rods: list[Rod], rows: list[Rod]) -> None:
+    def __init__(self, whole: Family, drive: Array, rods: list[RodChain], rows: list[RodChain]) -> None:
         self.start, self.full, self._rows = whole.here, whole.system, whole.rows
         self._drive = drive
         s = self.full
@@ -373,7 +373,7 @@ class WithoutRods:
         self.family: Family = (RodFamily if self.rods else Family)(here, columns, self._passive(here, whole.idle), held)
 
     @property
-    def needed(self) -> list[Rod]:
+    def needed(self) -> list[RodChain]:
         """The rods of which the rows do not depend on those of loops and of rods before."""
         J, n, out = self.family.here.J[:, self.family.free, 0], len(self.rods), []
         held = J[: len(J) - n]
@@ -386,7 +386,7 @@ class WithoutRods:
 
     # --- numbers -----------------------------------------------------------------------------------------------------
 
-    def _points(self, rod: Rod) -> list[tuple[int, Array]]:
+    def _points(self, rod: RodChain) -> list[tuple[int, Array]]:
         """The points ``(3,)`` of a rod in the frames of its bodies, with the places of these."""
         out = []
         for body, step, outside in zip(rod.bodies, (rod.steps[0], rod.steps[-1]), (1, -1), strict=True):
@@ -394,7 +394,7 @@ class WithoutRods:
             out.append((int(self.place[body]), marker[:, 3, step.pair, 0]))
         return out
 
-    def _inside(self, rod: Rod, x: Array) -> tuple[Array, Array]:
+    def _inside(self, rod: RodChain, x: Array) -> tuple[Array, Array]:
         """From the first link of a rod to its last ``(3, 4, T)``, and the way between its ends ``(3, T)`` seen from the first."""
         C = identity(x.shape[1])
         for step in rod.steps[1:-1]:
@@ -491,7 +491,7 @@ class WithoutRods:
                 self._put_back(rod, here, out, begin)
         return out
 
-    def _put_back(self, rod: Rod, here: Configuration, out: Array, begin: Array) -> None:
+    def _put_back(self, rod: RodChain, here: Configuration, out: Array, begin: Array) -> None:
         """The numbers of a rod in states ``out``, near those where it ``begin``s."""
         s, par = self.full, self.full.par
         near, far = rod.steps[0], rod.steps[-1]

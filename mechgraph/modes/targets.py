@@ -37,7 +37,7 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Pair
 from mechgraph.modes.continua import Nearby, irregular, least_value
 from mechgraph.modes.family import SPAN, Array, Family, Member, generated
-from mechgraph.modes.form import RodFamily, RodSystem, Step, behind
+from mechgraph.modes.form import RodFamily, RodStep, RodSystem, behind
 from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, Equations, Leg, follow, rounding
 from mechgraph.modes.start_sets import ONE_ASSEMBLY, StartSet, distinct
 
@@ -139,7 +139,7 @@ def _block(family: Family, start: StartSet, goals: Member, rng: np.random.Genera
 
 
 @dataclass
-class _Run:
+class _TrackRun:
     """Ends of tracks of a run: states, and which are regular, singular, at infinity; the others are lost."""
 
     x: Array
@@ -147,20 +147,22 @@ class _Run:
     singular: Array
     infinite: Array
 
-    def taken(self, at: Index) -> _Run:
-        return _Run(self.x[:, at], self.regular[at], self.singular[at], self.infinite[at])
+    def taken(self, at: Index) -> _TrackRun:
+        return _TrackRun(self.x[:, at], self.regular[at], self.singular[at], self.infinite[at])
 
 
-def _run(leg: Leg, x: Array, care: Care) -> _Run:
+def _run(leg: Leg, x: Array, care: Care) -> _TrackRun:
     tracked = follow(leg, x, care)
-    out = _Run(tracked.x, tracked.arrived.copy(), np.zeros(x.shape[1], dtype=bool), np.zeros(x.shape[1], dtype=bool))
+    out = _TrackRun(
+        tracked.x, tracked.arrived.copy(), np.zeros(x.shape[1], dtype=bool), np.zeros(x.shape[1], dtype=bool)
+    )
     doubtful = np.flatnonzero(~tracked.arrived & (tracked.s > NEAR_END))
     if doubtful.size:
         _endgame(leg, x[:, doubtful], doubtful, care, out)
     return out
 
 
-def _endgame(leg: Leg, x: Array, tracks: Index, care: Care, out: _Run) -> None:
+def _endgame(leg: Leg, x: Array, tracks: Index, care: Care, out: _TrackRun) -> None:
     """Tracks from their starts to a distance from the end, and round it until they are back."""
     eq = leg.equations
     near = follow(
@@ -207,7 +209,7 @@ def _arc(k: int) -> Callable[[Array], tuple[Array, Array]]:
     return way
 
 
-def _account(family: Family, at: Member, known: Ends, run: _Run, lost_before: int) -> None:
+def _account(family: Family, at: Member, known: Ends, run: _TrackRun, lost_before: int) -> None:
     """Put the ends of a run to those that are known."""
     told, infinite = _Told(family, at, run), int(run.infinite.sum())
     # a track that is bounded near its end has an assembly there: what closes nowhere is none, or was led round to another one
@@ -235,7 +237,7 @@ class _Told:
     ``doubtful`` is the number of those that seemed singular and close nowhere, ``error (n,)`` how far ends may be off.
     """
 
-    def __init__(self, family: Family, at: Member, run: _Run) -> None:
+    def __init__(self, family: Family, at: Member, run: _TrackRun) -> None:
         self.family, self.system = family, family.system_of(at)
         self.x, self.regular = run.x.copy(), run.regular.copy()
         self.moving, self.meet = np.zeros(len(self.regular), dtype=bool), np.zeros(len(self.regular), dtype=np.intp)
@@ -304,7 +306,7 @@ class Undivided:
         return found
 
 
-class Group:
+class EquationGroup:
     """A group of ``pairs`` and ``rods`` of a class, behind pairs that are ``known``."""
 
     def __init__(self, whole: Family, pairs: Index, rods: Index, known: Index) -> None:
@@ -329,18 +331,18 @@ class Group:
         """Bodies: links that known pairs join, each with a first link that bears a marker; ways from there to the others."""
         s = self.whole.system
         body = components_of_edges(len(s.m.links), [s.graph.ends[k] for k in known])
-        at: list[list[tuple[int, Step]]] = [[] for _ in s.m.links]
+        at: list[list[tuple[int, RodStep]]] = [[] for _ in s.m.links]
         for k in known.tolist():
             a, b = s.graph.ends[k]
-            at[a].append((b, Step(k, 1)))
-            at[b].append((a, Step(k, -1)))
+            at[a].append((b, RodStep(k, 1)))
+            at[b].append((a, RodStep(k, -1)))
         # the frame leads its body and stands before all others
         first: dict[int, int] = {}
         for link in sorted(self._bearers.tolist(), key=lambda link: link != s.graph.frame):
             first.setdefault(int(body[link]), link)
         self.links = list(first.values())
         self._first = np.array([first.get(b, -1) for b in body.tolist()])
-        self._ways: list[tuple[int, int, Step]] = []
+        self._ways: list[tuple[int, int, RodStep]] = []
         reached = list(self.links)
         seen = set(reached)
         for link in reached:  # the list grows while it is run through
@@ -435,13 +437,13 @@ class Group:
         return RodFamily(Configuration(RodSystem(m, None, numbers, points), x), columns, idle, held, same)
 
 
-def groups_of(family: Family) -> Sequence[Undivided | Group]:
+def groups_of(family: Family) -> Sequence[Undivided | EquationGroup]:
     """The groups of a class in the order in which they can be solved; the whole where it has one, or a group no class of its own."""
     graph = family.system.graph
     if len(family.bearers) // 2 - len(graph.ends) + graph.n_loops > 1:
         found = []
         for pairs, rods, known in _sets(family):
-            group = Group(family, pairs, rods, known)
+            group = EquationGroup(family, pairs, rods, known)
             if group.family.rank or group.family.unknowns:
                 found.append(group)
             if group.family.fault or not group.within:
@@ -544,7 +546,7 @@ class Product:
     """Assemblies of a class of ``groups`` with start sets ``starts``, at driver values ``drive (d, n)``."""
 
     def __init__(
-        self, family: Family, groups: Sequence[Undivided | Group], starts: Sequence[StartSet], drive: Array
+        self, family: Family, groups: Sequence[Undivided | EquationGroup], starts: Sequence[StartSet], drive: Array
     ) -> None:
         self.family, self.groups, self.starts, self.drive = family, groups, starts, drive
         n = drive.shape[1]
@@ -591,7 +593,7 @@ class Product:
         for name in ("x", "at", "count", "error", "moving"):
             setattr(self, name, getattr(self, name)[..., going])
 
-    def _go_on(self, group: Undivided | Group, found: list[Ends], rest: int) -> None:
+    def _go_on(self, group: Undivided | EquationGroup, found: list[Ends], rest: int) -> None:
         """The assemblies with what was found of a group for each of them; each of the group counts for ``rest`` of all."""
         x, parts = [self.x[:, :0]], []
         for j, (one, place) in enumerate(zip(found, self.at.tolist(), strict=True)):

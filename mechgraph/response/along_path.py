@@ -58,7 +58,7 @@ from mechgraph.maths.tracker import End, Follower
 from mechgraph.model.loads import Load
 from mechgraph.response.charts import Task
 from mechgraph.response.kernel_rates import KernelPath
-from mechgraph.response.motion_equations import MASSLESS, Closed, Loads, Stopped, along_one
+from mechgraph.response.motion_equations import MASSLESS, ClosedChart, Loads, Stopped, along_one
 
 OF_LOADS = 4
 """Tabulated terms of the loads that depend on the place, and on rates linearly: see ``along_one``."""
@@ -219,7 +219,7 @@ NOISE = 1e-9
 
 
 @dataclass(frozen=True)
-class Piece:
+class SeriesPiece:
     """The path between two values of its coordinate: Chebyshev series ``(POINTS, 4 + m)`` of the terms (see ``along_terms``).
 
     ``steepness``: the largest rate of another freedom for a unit rate of the coordinate.
@@ -244,7 +244,7 @@ class Way:
         self.length, self.closed = 0.0, False
         self.crossings: list[Crossing] = []
         self._next, self._ended = FIRST_PART, False
-        self._pieces: list[Piece] = []
+        self._pieces: list[SeriesPiece] = []
         self._starts: list[float] = []
         here = Paths([self._drives(np.zeros(2))])
         self._nodes = self.follower.follow(x[:, None], here).nodes
@@ -253,7 +253,7 @@ class Way:
         """Without the kernel, a thing of this process: numpy tabulates what is asked for later."""
         return vars(self) | {"kernel": None}
 
-    def piece(self, at: float) -> Piece:
+    def piece(self, at: float) -> SeriesPiece:
         """The piece in which a place lies."""
         return self._pieces[max(0, bisect_right(self._starts, at) - 1)]
 
@@ -370,7 +370,7 @@ class Way:
         """Whether a place ``(T,)`` is so near to a change point that its state is interpolated."""
         return any((np.abs(at - c.place) < WINDOW).any() for c in self.crossings)
 
-    def _tabulated(self, begin: float, end: float) -> list[Piece]:
+    def _tabulated(self, begin: float, end: float) -> list[SeriesPiece]:
         """Pieces between two places with their series, halved until these have converged."""
         spans, out = self._spans(begin, end), []
         middles = np.array([c.place for c in self.crossings])
@@ -385,7 +385,7 @@ class Way:
                     again += [(a, 0.5 * (a + b)), (0.5 * (a + b), b)]
                 else:
                     begin, end = self._drives(np.array([a, b]))[0].tolist()
-                    out.append(Piece(begin, end, c, float(steepness)))
+                    out.append(SeriesPiece(begin, end, c, float(steepness)))
             spans = again
         return sorted(out, key=lambda piece: self.sense * piece.begin)
 
@@ -489,7 +489,7 @@ class Arc:
         """What a turn adds to the state where it comes back then; None while it does not."""
         self._sense = 1.0
 
-    def piece(self, u: float) -> tuple[Piece, float] | None:
+    def piece(self, u: float) -> tuple[SeriesPiece, float] | None:
         """The piece in which a place lies, and the whole turns by which the place is further on; None where the table ends before."""
         turns = 0.0 if self.advance is None else self._sense * math.floor(self._sense * (u - self.begin) / self.turn)
         u -= self.turn * turns
@@ -509,7 +509,7 @@ class Arc:
             return np.zeros(len(u))
         return np.asarray(self._sense * np.floor(self._sense * (u - self.begin) / self.turn))
 
-    def close(self, u: Array) -> Closed:
+    def close(self, u: Array) -> ClosedChart:
         """Closed states at places ``u (T,)`` within the table."""
         s = self.task.system
         turns = self._turns(u)
@@ -524,7 +524,7 @@ class Arc:
         if self.advance is not None:
             x += self.advance[:, None] * turns
         here = Configuration(s, x)
-        return Closed(here, self.path.solver.factored(here, which), np.ones(len(u), dtype=bool))
+        return ClosedChart(here, self.path.solver.factored(here, which), np.ones(len(u), dtype=bool))
 
     def _extend(self, way: Way) -> None:
         """Tabulate the path further, up to where another freedom moves much faster, or until it comes back."""
@@ -559,7 +559,7 @@ class PathStage:
     def __init__(self, arc: Arc, t: float, u: float, v: float) -> None:
         self.arc, self.task, self._first = arc, arc.task, np.array([u, v, 0.0])
         self.engine = self.task.engine if self.task.library is None else COMPILED
-        self._piece: Piece | None = None
+        self._piece: SeriesPiece | None = None
         self._turns = 0.0
         self._mass, smooth, *_ = (terms := self._terms(u)).tolist()
         if self._piece is not None and self._mass <= MASSLESS * np.abs(self._piece.series[:, 0]).sum():
@@ -639,7 +639,7 @@ class PathStage:
         stage._first[1] = math.copysign(math.sqrt(self._mass / stage._mass) * y[1], arc.rate)
         return stage
 
-    def states(self, t: Array, y: Array) -> tuple[Closed, Array]:
+    def states(self, t: Array, y: Array) -> tuple[ClosedChart, Array]:
         """See ``Stage``."""
         mass = np.array([self._terms(u)[0] for u in y[0].tolist()])
         return self.arc.close(y[0]), y[1:2] / np.sqrt(mass / self._mass)

@@ -35,10 +35,10 @@ from mechgraph.maths.se3 import Array, Index
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
-from mechgraph.response.kernel_rates import Evaluated, KernelRates
+from mechgraph.response.kernel_rates import EvaluatedRates, KernelRates
 from mechgraph.response.motion_equations import (
     Chart,
-    Closed,
+    ClosedChart,
     Loads,
     Moved,
     Stopped,
@@ -70,7 +70,7 @@ _PLACES, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 
 
 @dataclass(frozen=True)
-class _Panel:
+class _TimePanel:
     """A panel, and by how much the changes ``(2,)`` of position and velocity miss the integrals of the rates.
 
     ``part``: the worse of both, against what is allowed; ``order`` which it is; ``said`` the integral, ``size`` the largest change by rate.
@@ -99,7 +99,7 @@ def differentiated(law: Law, begin: float, end: float) -> str | tuple[float, ...
     return tuple(breaks)
 
 
-def _panel(law: Law, a: float, b: float, rounding: Array) -> _Panel:
+def _panel(law: Law, a: float, b: float, rounding: Array) -> _TimePanel:
     h = b - a
     inside = np.array([law(float(t)) for t in a + 0.5 * h * (1.0 + _PLACES)])
     ends = np.array([law(a), law(b)])
@@ -108,10 +108,10 @@ def _panel(law: Law, a: float, b: float, rounding: Array) -> _Panel:
     allowed = AGREEING_CHANGE * h * largest[1:] + rounding
     part = np.abs(change - said) / np.where(allowed > 0.0, allowed, np.inf)
     k = int(np.argmax(part))
-    return _Panel(a, b, float(part[k]), k, float(change[k]), float(said[k]), float(h * largest[k + 1]))
+    return _TimePanel(a, b, float(part[k]), k, float(change[k]), float(said[k]), float(h * largest[k + 1]))
 
 
-def _narrowed(law: Law, panel: _Panel, rounding: Array) -> str | list[float]:
+def _narrowed(law: Law, panel: _TimePanel, rounding: Array) -> str | list[float]:
     """What is wrong in a panel, or the time at which an acceleration jumps there, if any."""
     parts: list[float] = []
     for _ in range(PANEL_HALVINGS):
@@ -162,7 +162,7 @@ OVER_POSITIONS = "is an array over positions, which a motion in time does not ha
 """What is wrong with a load that holds such an array."""
 
 
-class Sampled:
+class SampledMotion:
     """The quintic spline through samples of position, velocity and acceleration; refuses times outside of them."""
 
     def __init__(self, name: str, motion: Motion) -> None:
@@ -221,7 +221,7 @@ def law_of(name: str, motion: Any) -> Law | str:
         if not (np.diff(motion.t) > 0).all():
             return f"motion of {name!r}: its times do not rise"
         fault = samples_fault(motion.t, np.stack([motion.position, motion.velocity, motion.acceleration], axis=1))
-        return f"motion of {name!r}: {fault}" if fault else Sampled(name, motion)
+        return f"motion of {name!r}: {fault}" if fault else SampledMotion(name, motion)
     if callable(motion):
         return Called(name, motion)
     return f"motion of {name!r} = {type(motion).__name__}: expected a Motion with t, or a callable t -> (position, velocity, acceleration)"
@@ -384,7 +384,7 @@ class ChartStage:
             return self._rates(t, y[:, None])[:, 0]
         return here.rates
 
-    def _by_kernel(self, t: float, y: Array) -> Evaluated | None:
+    def _by_kernel(self, t: float, y: Array) -> EvaluatedRates | None:
         """The same by the kernel; None where there is none, or it does not serve: numpy says what is there."""
         if self._kernel is None:
             return None
@@ -443,7 +443,7 @@ class ChartStage:
         """See ``Stage``."""
         return ChartStage(self.task, t, self._last.x, self._last.dq)
 
-    def states(self, t: Array, y: Array) -> tuple[Closed, Array]:
+    def states(self, t: Array, y: Array) -> tuple[ClosedChart, Array]:
         """See ``Stage``."""
         times = np.array([known.t for known in self._path])
         before = np.maximum(np.searchsorted(times, t, side="right") - 1, 0)
@@ -480,7 +480,7 @@ def _by_time(task: Task, at: Moved, loads: tuple[Load, ...], t: Array) -> Array:
     return np.concatenate([own, task.prescribed_at(t)[2]])
 
 
-Block = tuple[Index, Task, Closed, Array]
+Block = tuple[Index, Task, ClosedChart, Array]
 """Places, the task by which they were followed, closed states, and the rates ``v (n, T)`` of the independent columns of their factors."""
 
 

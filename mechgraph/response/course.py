@@ -26,7 +26,7 @@ from mechgraph.model.parameters import declared
 from mechgraph.quantities import real_array, wrong
 from mechgraph.response.charts import Task, trajectory_of
 from mechgraph.response.integration import Integration, Occurrence
-from mechgraph.response.motion_equations import Closed, moved, positions_together
+from mechgraph.response.motion_equations import ClosedChart, moved, positions_together
 from mechgraph.result.solution import Solution
 from mechgraph.result.summary import SolutionData, solution_data, summary
 from mechgraph.result.trajectory import Trajectory
@@ -250,7 +250,7 @@ class Course:
             trajectory.as_declared(partial(declared_closure, system, declared(m.declared)), m.changes.tol)
         return trajectory, kinetic, potential, works * system.par.L**2
 
-    def _states(self, flat: Array) -> Iterator[tuple[Index, Task, Closed, Array, Array]]:
+    def _states(self, flat: Array) -> Iterator[tuple[Index, Task, ClosedChart, Array, Array]]:
         """Closed states at times ``(T,)`` in blocks: places, task, states, rates of the independent columns, work done."""
         for places, stage, y, work in self.integration.at(flat):
             together = positions_together(self.task.system, (len(y) - 1) // 2)

@@ -33,7 +33,7 @@ from mechgraph.maths.se3 import Array
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import door, unit_of
 from mechgraph.response.charts import OVER_POSITIONS, Prescribed, Task, trajectory_of
-from mechgraph.response.motion_equations import MASSLESS, Chart, Closed, Columns, Loads, applied, in_unit_inertias
+from mechgraph.response.motion_equations import MASSLESS, Chart, ClosedChart, Columns, Loads, applied, in_unit_inertias
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import bracket, number
 
@@ -126,7 +126,7 @@ class Derivatives:
     dry: tuple[int, ...]
 
 
-class Place:
+class RestPlace:
     """Forces about a chart at rest."""
 
     def __init__(self, m: Mechanism, call: str, at: Mapping[str, float] | None, engine: EngineName) -> None:
@@ -153,7 +153,7 @@ class Place:
         self.held = x[self.task.system.single_rows[self.task.columns]][:, None]
         self.n = len(self.chart.free)
 
-    def closed(self, u: Array) -> Closed:
+    def closed(self, u: Array) -> ClosedChart:
         """Closed states at coordinates ``u (n, T)`` in the chart."""
         guess = self.task.system.advance(self.chart.x0[:, None], self.motions @ u)
         return self.chart.close(guess, u, np.repeat(self.held, u.shape[1], axis=1))
@@ -163,7 +163,7 @@ class Place:
         """Rates of all freedoms ``(F, n)`` for unit rates of the independent ones."""
         return self.chart.solver.factored(self.chart.start, self.chart.which).sensitivity()[:, : self.n, 0]
 
-    def forces(self, closed: Closed, v: Array) -> tuple[Array, Array]:
+    def forces(self, closed: ClosedChart, v: Array) -> tuple[Array, Array]:
         """Generalized forces ``(n, T)`` and masses ``(n, n, T)`` at closed states with rates ``v (n, T)``, the drives at rest."""
         columns, loads = Columns(closed.here, closed.f, self.n), self.task.loads
         velocities, _, inertia = columns.bound((columns.Z * v).sum(axis=1))
@@ -194,7 +194,7 @@ class Place:
         def moving(v: Array) -> Array:
             here = one.here.part(np.zeros(v.shape[1], dtype=np.intp))
             f = self.chart.solver.factored(here, np.repeat(self.chart.which, v.shape[1]))
-            return self.forces(Closed(here, f, np.ones(v.shape[1], dtype=bool)), v)[0]
+            return self.forces(ClosedChart(here, f, np.ones(v.shape[1], dtype=bool)), v)[0]
 
         rates = settled_slopes(moving, n, RATE_STEP)
         assert rates is not None  # the position is closed
@@ -317,9 +317,9 @@ def equilibrium(
     >>> m.stable, round(m.start["A0.Rz"], 6)
     (True, 3.141593)
     """
-    place = Place(m, "equilibrium of", start, engine)
+    place = RestPlace(m, "equilibrium of", start, engine)
     begin, why = place.chart.x0, ""
-    ways: tuple[Callable[[Place], Derivatives | str], ...] = (_downhill, _newton)
+    ways: tuple[Callable[[RestPlace], Derivatives | str], ...] = (_downhill, _newton)
     for way in ways if kind == "stable" else ways[::-1]:
         place.go(begin)
         found = way(place)
@@ -347,7 +347,7 @@ def _left(d: Derivatives) -> str:
     )
 
 
-def _newton(place: Place) -> Derivatives | str:
+def _newton(place: RestPlace) -> Derivatives | str:
     """Newton to where the forces balance, or why it does not come there."""
     largest = 0.0
     for _ in range(EQUILIBRIUM_STEPS):
@@ -369,7 +369,7 @@ def _newton(place: Place) -> Derivatives | str:
     return _left(d)
 
 
-def _downhill(place: Place) -> Derivatives | str:
+def _downhill(place: RestPlace) -> Derivatives | str:
     """Steps along which the loads do work, to where they balance and every small step costs some; or why it does not come there."""
     largest, longest = 0.0, LONGEST_EQUILIBRIUM_STEP
     for _ in range(EQUILIBRIUM_STEPS):
@@ -405,7 +405,7 @@ def _step(d: Derivatives, w: Array, U: Array, balanced: float, longest: float) -
     return np.asarray(step * min(1.0, longest / max(float(np.abs(step).max()), longest)))
 
 
-def _shortened(place: Place, Q: Array, step: Array, noise: float) -> tuple[float, Array, Array | None]:
+def _shortened(place: RestPlace, Q: Array, step: Array, noise: float) -> tuple[float, Array, Array | None]:
     """A step, or a shorter one, along which the loads do work: the work, the step, and the state; None where there is none."""
     for _ in range(SHORTENINGS):
         at = place.closed(step[:, None] * np.array([0.5, 1.0]))
@@ -589,7 +589,7 @@ def linearize(m: Mechanism, at: Mapping[str, float] | None = None, *, engine: En
     >>> mg.linearize(hanging).frequencies.round(4)
     array([3.383])
     """
-    place = Place(m, "linearize", at, engine)
+    place = RestPlace(m, "linearize", at, engine)
     d = place.derivatives()
     if np.linalg.eigvalsh(in_unit_inertias(d.M)).min() <= MASSLESS:
         raise DeclarationError(

@@ -42,7 +42,15 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.response_setup import WHATS, Event, Stop
 from mechgraph.quantities import items_of, real_array, shown, wrong
 from mechgraph.response.charts import Prescribed, Task
-from mechgraph.response.motion_equations import NO_INERTIA, UNOPPOSED, Closed, Stopped, accelerations, moved, stopping
+from mechgraph.response.motion_equations import (
+    NO_INERTIA,
+    UNOPPOSED,
+    ClosedChart,
+    Stopped,
+    accelerations,
+    moved,
+    stopping,
+)
 from mechgraph.result.solution import Solution
 
 POINTS_OF_STEP = 16
@@ -239,7 +247,7 @@ class Stage(Protocol):
     def following(self, t: float, y: Array) -> Stage:
         """The stage that takes over."""
 
-    def states(self, t: Array, y: Array) -> tuple[Closed, Array]:
+    def states(self, t: Array, y: Array) -> tuple[ClosedChart, Array]:
         """Closed states at times ``(T,)`` of accepted steps with coordinates ``y (k, T)``, and the rates ``v (n, T)`` of the columns that
         their factors hold fixed.
         """
@@ -582,7 +590,7 @@ class _Free:
     def __init__(self, task: Task, t: float, x: Array, dq: Array, closed: tuple[_Limit, ...]) -> None:
         self.chart = task.chart(x)
         f = self.chart.solver.factored(self.chart.start, self.chart.which)
-        at = Closed(self.chart.start, f, np.ones(1, dtype=bool), self.chart.held)
+        at = ClosedChart(self.chart.start, f, np.ones(1, dtype=bool), self.chart.held)
         p = task.prescribed_at(np.array([t]))[1:]
         found = moved(at, dq[self.chart.moving][:, None], p, task.loads, np.array([t]))
         self.dq, self.mass = dq, found.columns.mass

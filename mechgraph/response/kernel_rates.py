@@ -20,7 +20,7 @@ from mechgraph.response.motion_equations import SPARSE_FROM, Chart, Loads
 
 
 @dataclass(frozen=True)
-class Evaluated:
+class EvaluatedRates:
     """Of one state: the rates of ``u``, ``v`` and the work, how steep the chart is there and its condition; and the state itself."""
 
     rates: Array
@@ -96,7 +96,7 @@ class KernelRates:
             self._out.ctypes.data,
         )
 
-    def __call__(self, known: Array, h: float, y: Array, p: Array) -> Evaluated | None:
+    def __call__(self, known: Array, h: float, y: Array, p: Array) -> EvaluatedRates | None:
         """At ``y = (u, v)`` a time ``h`` behind a ``known`` state (x, q', q''), prescribed freedoms at ``p (3, p)``; None where it does not
         serve.
         """
@@ -105,7 +105,7 @@ class KernelRates:
         if self._call(known.ctypes.data, h, found.ctypes.data, self._result):
             return None
         *_, steepness, condition = self._out.tolist()
-        return Evaluated(self._out[:-2].copy(), steepness, condition, found)
+        return EvaluatedRates(self._out[:-2].copy(), steepness, condition, found)
 
 
 MOST_NODES = 256

@@ -95,7 +95,7 @@ class Held:
 
 
 @dataclass(frozen=True)
-class Closed:
+class ClosedChart:
     """A closed state: evaluated, factored, which positions were closed ``(T,)``, and the passive motions held."""
 
     here: Configuration
@@ -154,7 +154,7 @@ class Chart:
             return dq[self.free]
         return self.system.tangent(self.system.difference(x, self.x0[:, None]), dq)[self.free]
 
-    def close(self, x: Array, u: Array, p: Array, first: Configuration | None = None) -> Closed:
+    def close(self, x: Array, u: Array, p: Array, first: Configuration | None = None) -> ClosedChart:
         """States near ``x (nx, T)`` with independent coordinates ``u (n, T)`` and prescribed positions ``p (p, T)``, all loops closed.
 
         Newton on the closure and on ``difference(x, x0) = u``; what the first leaves free the second settles.
@@ -187,7 +187,7 @@ class Chart:
             if closed.all() or not np.isfinite(size).all() or (total > LOST).any():
                 break
             x = s.advance(x, step)
-        return Closed(here, f, closed & (here.closure <= PATH.accepted), self.held)
+        return ClosedChart(here, f, closed & (here.closure <= PATH.accepted), self.held)
 
 
 def _leading(null: Array) -> Index:
@@ -434,7 +434,7 @@ def _at_rest(here: Configuration, rest: PassiveMotions, Z: Array) -> Array:
     return out
 
 
-def moved(closed: Closed, v: Array, p: Array, loads: Loads, t: Array) -> Moved:
+def moved(closed: ClosedChart, v: Array, p: Array, loads: Loads, t: Array) -> Moved:
     """Accelerations at closed states with independent rates ``v (n, T)`` and prescribed rates and accelerations ``p (2, p, T)``.
 
     The factors as in ``Columns``.

@@ -182,7 +182,7 @@ JUMPS = 0.5
 """Part of the difference of the forces to both sides that is left then."""
 
 
-class Followed(Protocol):
+class SeenMotion(Protocol):
     """What is seen of a motion."""
 
     def site(self, t: Array) -> Site:
@@ -192,7 +192,7 @@ class Followed(Protocol):
 class Chatter:
     """Watches short steps for laws that jump with the sign of their rate."""
 
-    def __init__(self, motion: Followed, loads: tuple[Load, ...], span: float) -> None:
+    def __init__(self, motion: SeenMotion, loads: tuple[Load, ...], span: float) -> None:
         self.motion, self.span = motion, span
         self.laws = [load for load in loads if isinstance(load, Law) and load.of_time]
         self._ends: list[float] = []

@@ -386,7 +386,7 @@ LEADER = 2.4
 
 
 @dataclass
-class Placed:
+class PlacedText:
     """A text, the point of space that it belongs to, the length in space that it keeps away from it, and its leader line."""
 
     text: Text
@@ -417,7 +417,7 @@ class Arrangement(Artist):
         super().__init__()
         self._places = {} if places is None else places
         self._pixels, self._taken, self._camera, self._inside, self._prepare = pixels, taken, camera, inside, prepare
-        self._ax, self._placed = ax, list[Placed]()
+        self._ax, self._placed = ax, list[PlacedText]()
         self._corner: list[tuple[Line2D, Text, Array]] = []
         self._bars: list[tuple[Line2D, Text, float]] = []
         self._legend: list[Text] = []
@@ -428,7 +428,7 @@ class Arrangement(Artist):
 
     def name(self, text: str, at: Array, colour: str, away: float, **style: Any) -> None:
         """A text that is put beside a point of space."""
-        placed = Placed(self._text(text, colour, **style), np.asarray(at, dtype=float), away)
+        placed = PlacedText(self._text(text, colour, **style), np.asarray(at, dtype=float), away)
         self._placed.append(placed)
         self._line(placed.leader)
 

@@ -21,7 +21,7 @@ from mechgraph.response.course import Response
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import MaterialPoint
 from mechgraph.show.canvas import HATCH, INK, MUTED, PALETTE, REACTION, Axes, axis_label, new_axes, plain, said
-from mechgraph.show.scene import Stage, known_force, place_of
+from mechgraph.show.scene import DrawnPose, known_force, place_of
 
 TICKS = (10, 15, 30, 45, 60, 90, 180, 360)
 """Distances of ticks of angles, degrees."""
@@ -550,7 +550,7 @@ def polar_force(s: Solution, pair: str, *, on: Literal["a", "b"] = "a", ax: Axes
             f"polar force of {m.name!r}", ["ax: expected polar axes, add_subplot(projection='polar')"]
         )
     good, place = place_of(s)
-    stage = Stage(m, place, len(good))
+    stage = DrawnPose(m, place, len(good))
     frame = stage.frames[f"pair:{pair}@{0 if on == 'a' else p.type.f}"][:, :, :3]
     force = known_force(stage, s, p, good, frame[:, :, 2])
     if not np.isfinite(force).all(axis=1).any():
@@ -718,7 +718,7 @@ def _solved(s: Solution) -> Array:
 def _draw(s: Solution, found: dict[str, Array], rank: int, ax: Any) -> Any:
     m = s.mechanism
     good, place = place_of(s)
-    stage = Stage(m, place, len(good))
+    stage = DrawnPose(m, place, len(good))
     flat = stage.normal is not None
     if ax is None:
         ax = new_axes() if flat else new_axes((6.4, 5.6), projection="3d")

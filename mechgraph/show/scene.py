@@ -24,9 +24,9 @@ from mechgraph.model.pair import Pair
 from mechgraph.pairs import kinematics
 from mechgraph.result.solution import Solution
 from mechgraph.show import shapes
-from mechgraph.show.shapes import Line, Shape, frame_along, lines_of, symbol
+from mechgraph.show.shapes import FreedomLine, Shape, frame_along, lines_of, symbol
 
-__all__ = ["Label", "Part", "Place", "Scene", "place_of_states", "scene", "scene_at"]
+__all__ = ["Label", "DrawnPart", "DrawnPlace", "Scene", "place_of_states", "scene", "scene_at"]
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Scene:
     mechanism: Mechanism
     positions: Any
     frames: Mapping[str, Array]
-    parts: tuple[Part, ...]
+    parts: tuple[DrawnPart, ...]
     labels: tuple[Label, ...]
     points: Mapping[tuple[str, str], Array]
     everything: Array
@@ -66,7 +66,7 @@ class Scene:
     not_unique: tuple[str, ...] = ()
     reaction_scale: float = 0.0
 
-    def vertices(self, part: Part, t: int) -> Array:
+    def vertices(self, part: DrawnPart, t: int) -> Array:
         """Vertices of a part in the global frame at a position, ``(n, 3)``."""
         X = self.frames[part.frame][t]
         return np.asarray(part.shape.vertices @ X[:, :3].T + X[:, 3])
@@ -99,33 +99,33 @@ def scene(drawn: Solution | Mechanism, *, forces: bool = False) -> Scene:
     return scene_at(drawn.mechanism, place, good, drawn, forces=forces)
 
 
-def place_of(s: Solution) -> tuple[Any, Place]:
+def place_of(s: Solution) -> tuple[Any, DrawnPlace]:
     """Flat indices of the solved positions of a solution, and where its mechanism stands there."""
     m = s.mechanism
     good = np.flatnonzero(np.asarray(s.status).reshape(-1) == "ok")
     if not good.size:
         raise DeclarationError(f"picture of {m.name!r}", ["the solution has no solved position"])
-    return good, Place(
+    return good, DrawnPlace(
         {name: s.link(name).pose.reshape(-1, 4, 4)[good] for name in m.link_names()},
         {p.name: s[p.name].position.reshape(-1, p.type.f)[good].T for p in m.pairs},
     )
 
 
-def place_of_states(system: System, x: Array) -> Place:
+def place_of_states(system: System, x: Array) -> DrawnPlace:
     """Where the mechanism of a system stands at closed states ``x (nx, T)``."""
     m = system.m
     poses, q = user_poses(Configuration(system, x)), system.coordinates_of(x, system.start_coordinates(m.start))
     columns = (slice(int(i), int(i) + p.type.f) for i, p in zip(system.first_column, m.pairs, strict=False))
-    return Place(
+    return DrawnPlace(
         dict(zip(m.link_names(), poses, strict=True)), {p.name: q[c] for p, c in zip(m.pairs, columns, strict=True)}
     )
 
 
 def scene_at(
-    m: Mechanism, place: Place, positions: Any, solution: Solution | None = None, *, forces: bool = False
+    m: Mechanism, place: DrawnPlace, positions: Any, solution: Solution | None = None, *, forces: bool = False
 ) -> Scene:
     """The scene of a mechanism that stands somewhere; a ``solution`` gives values to loads that vary, and to reactions."""
-    stage = Stage(m, place, len(positions))
+    stage = DrawnPose(m, place, len(positions))
     parts = [*links(stage), *pairs(stage), *loads(stage, solution, positions)]
     cases = np.asarray(positions) // (
         solution.batch[-1] if solution is not None and solution.batch else 1 + len(positions)
@@ -165,7 +165,7 @@ Role = Literal[
 
 
 @dataclass(frozen=True)
-class Part:
+class DrawnPart:
     """One body of a drawing.
 
     ``role`` says how it is painted: ``link`` (rods) and ``plate`` in the colour of ``link``, ``guide`` likewise but translucent, ``body``
@@ -194,14 +194,14 @@ class Label:
 
 
 @dataclass(frozen=True)
-class Place:
+class DrawnPlace:
     """Where a mechanism stands at ``T`` positions: link poses ``(T, 4, 4)`` and coordinates of every pair ``(f, T)``."""
 
     poses: Mapping[str, Array]
     coordinates: Mapping[str, Array]
 
 
-class Stage:
+class DrawnPose:
     """A mechanism at ``T`` places: what its parts are made from.
 
     Attributes
@@ -214,7 +214,7 @@ class Stage:
     gravity : the vector g, None where there is none.
     """
 
-    def __init__(self, m: Mechanism, place: Place, count: int) -> None:
+    def __init__(self, m: Mechanism, place: DrawnPlace, count: int) -> None:
         self.m, self.place, self.count = m, place, count
         self.frames: dict[str, Array] = {"": np.broadcast_to(np.eye(3, 4), (count, 3, 4))}
         self.frames |= {f"link:{name}": pose[:, :3] for name, pose in place.poses.items()}
@@ -282,7 +282,7 @@ class Stage:
         nearest = min((gap for gap in gaps if gap > FLAT_THICKNESS * self.size), default=self.size)
         return float(np.clip(0.4 * nearest, 0.45 * self.symbol, self.symbol))
 
-    def freedom(self, name: str) -> tuple[Pair, int, Line, str]:
+    def freedom(self, name: str) -> tuple[Pair, int, FreedomLine, str]:
         """The pair of a freedom, its number there, its line, and the frame of that."""
         k, j = self.m.freedom(name)
         pair = self.m.pairs[k]
@@ -322,7 +322,7 @@ ROD, EDGE = 0.3, 0.2
 """Radii of rods, and of the edges of plates, over the size of a symbol."""
 
 
-def links(stage: Stage) -> Iterator[Part]:
+def links(stage: DrawnPose) -> Iterator[DrawnPart]:
     """Links as what they join: a rod between two points, a plate or a body between more; mass centres and points of interest."""
     for link in stage.m.links:
         frame, moving = f"link:{link.name}", link.name != stage.m.frame
@@ -332,15 +332,15 @@ def links(stage: Stage) -> Iterator[Part]:
         else:
             yield from _feet(stage)
         for name, p in link.points.items():
-            yield Part("point", f"{link.name}.{name}", link.name, frame, Shape(np.array([p], dtype=float)))
+            yield DrawnPart("point", f"{link.name}.{name}", link.name, frame, Shape(np.array([p], dtype=float)))
         if link.mass > 0 and moving:
             center = np.asarray(link.center, dtype=float)
             middle = np.mean(corners, axis=0) if corners else center
-            yield Part("tie", link.name, link.name, frame, shapes.polyline([middle, center]))
-            yield Part("center", link.name, link.name, frame, Shape(center[None]))
+            yield DrawnPart("tie", link.name, link.name, frame, shapes.polyline([middle, center]))
+            yield DrawnPart("center", link.name, link.name, frame, Shape(center[None]))
 
 
-def _body(stage: Stage, link: str, corners: list[Array]) -> Iterator[Part]:
+def _body(stage: DrawnPose, link: str, corners: list[Array]) -> Iterator[DrawnPart]:
     frame, near = f"link:{link}", FLAT_THICKNESS * stage.size
     points = distinct(corners, near)
     if len(points) == 1 and stage.m.link(link).mass > 0:
@@ -349,18 +349,18 @@ def _body(stage: Stage, link: str, corners: list[Array]) -> Iterator[Part]:
         return
     faces, edges = hull(points)
     if faces:
-        yield Part("plate", link, link, frame, Shape(points, faces))
+        yield DrawnPart("plate", link, link, frame, Shape(points, faces))
     radius = (EDGE if faces else ROD) * stage.symbol
-    yield Part("link", link, link, frame, shapes.together([rod(points[i], points[j], radius) for i, j in edges]))
+    yield DrawnPart("link", link, link, frame, shapes.together([rod(points[i], points[j], radius) for i, j in edges]))
 
 
-def _feet(stage: Stage) -> Iterator[Part]:
+def _feet(stage: DrawnPose) -> Iterator[DrawnPart]:
     """A hatched foot under every pair point of the frame."""
     name = stage.m.frame
     X = stage.frames[f"link:{name}"][0]
     foot = shapes.foot().moved(1.8 * stage.symbol * X[:, :3].T @ stage.upright)
     for at in distinct(stage.corners(name), FLAT_THICKNESS * stage.size):
-        yield Part("foot", name, "", f"link:{name}", foot.moved(np.eye(3), at))
+        yield DrawnPart("foot", name, "", f"link:{name}", foot.moved(np.eye(3), at))
 
 
 def rod(p: Array, q: Array, radius: float) -> Shape:
@@ -390,24 +390,24 @@ def hull(points: Array) -> tuple[tuple[tuple[int, ...], ...], tuple[tuple[int, i
     return tuple(tuple(face) for face in solid.simplices.tolist()), sharp
 
 
-def pairs(stage: Stage) -> Iterator[Part]:
+def pairs(stage: DrawnPose) -> Iterator[DrawnPart]:
     """Symbols of the pairs with their axes, and arrows at the driven freedoms."""
     driven = {stage.m.full_name(d.freedom) for d in stage.m.drives}
     for pair in stage.m.pairs:
         size, lines = stage.symbol_size(pair), lines_of(pair.type, pair.pitch_per_radian)
         for e in symbol(pair.type, pair.pitch_per_radian, size, _strokes(stage, pair, lines, size)):
             link = pair.a if e.role == "guide" else ""
-            yield Part(e.role, pair.name, link, f"pair:{pair.name}@{e.frame}", e.shape, e.dashed)
+            yield DrawnPart(e.role, pair.name, link, f"pair:{pair.name}@{e.frame}", e.shape, e.dashed)
         for name, line, single in zip(pair.freedom_names, lines, pair.type.drivable, strict=True):
             frame = f"pair:{pair.name}@{line.frame}"
             if line.turns and single:
                 reach = 2.6 * size * line.direction
-                yield Part("axis", pair.name, "", frame, shapes.polyline([line.point - reach, line.point + reach]))
+                yield DrawnPart("axis", pair.name, "", frame, shapes.polyline([line.point - reach, line.point + reach]))
             if name in driven:
-                yield Part("drive", name, "", frame, freedom_arrow(line, 1.75 * size))
+                yield DrawnPart("drive", name, "", frame, freedom_arrow(line, 1.75 * size))
 
 
-def _strokes(stage: Stage, pair: Pair, lines: list[Line], size: float) -> list[tuple[float, float]]:
+def _strokes(stage: DrawnPose, pair: Pair, lines: list[FreedomLine], size: float) -> list[tuple[float, float]]:
     """Least and greatest coordinates, zero among them.
 
     A guide on the line of which link a is held by another pair reaches to there: the barrel of a cylinder, from its eye to the piston.
@@ -426,7 +426,7 @@ def _strokes(stage: Stage, pair: Pair, lines: list[Line], size: float) -> list[t
     return out
 
 
-def freedom_arrow(line: Line, size: float, sign: float = 1.0) -> Shape:
+def freedom_arrow(line: FreedomLine, size: float, sign: float = 1.0) -> Shape:
     """An arrow about the line of a turn, or beside that of a slide."""
     turn = frame_along(line.direction)
     if line.turns:
@@ -435,7 +435,7 @@ def freedom_arrow(line: Line, size: float, sign: float = 1.0) -> Shape:
     return shapes.arrow().moved(lengthwise, size * (turn[:, 0] - line.direction))
 
 
-def labels(stage: Stage) -> Iterator[Label]:
+def labels(stage: DrawnPose) -> Iterator[Label]:
     """Names of pairs with their types, of points, and of moving links."""
     for pair in stage.m.pairs:
         text = plain(f"{pair.name} ({pair.type.symbol})")
@@ -465,7 +465,7 @@ LAW_SHAPES: dict[str, tuple[Shape, Shape]] = {
 """Shapes of laws by their kind: between points or along a slide, and about a turn."""
 
 
-class Acting(NamedTuple):
+class DrawnLoad(NamedTuple):
     """A force at a point or a moment, ``(T, 3)`` each."""
 
     load: int
@@ -474,9 +474,9 @@ class Acting(NamedTuple):
     vector: Array
 
 
-def loads(stage: Stage, solution: Solution | None, positions: Any) -> Iterator[Part]:
+def loads(stage: DrawnPose, solution: Solution | None, positions: Any) -> Iterator[DrawnPart]:
     """Laws between points or in freedoms; given forces, moments and efforts as arrows, the tip of a force where it acts."""
-    acting: list[Acting] = []
+    acting: list[DrawnLoad] = []
     for i, load in enumerate(stage.m.loads):
         if isinstance(load, Law):
             yield _law(stage, i, load)
@@ -497,7 +497,7 @@ def loads(stage: Stage, solution: Solution | None, positions: Any) -> Iterator[P
             length, width = LONGEST_ARROW * stage.size * share, np.full(stage.count, 0.42 * stage.symbol)
             at = one.at - frame_along(one.vector)[..., 2] * length[:, None]
         stage.frames[frame] = stretched(one.vector, at, length, width)
-        yield Part("load", f"loads[{one.load}]", "", frame, shapes.turn_arrow() if one.turns else shapes.arrow())
+        yield DrawnPart("load", f"loads[{one.load}]", "", frame, shapes.turn_arrow() if one.turns else shapes.arrow())
 
 
 def stretched(along: Array, at: Array, length: Array, width: Array) -> Array:
@@ -506,7 +506,7 @@ def stretched(along: Array, at: Array, length: Array, width: Array) -> Array:
     return np.concatenate([frame_along(along) * scale[:, None], at[:, :, None]], axis=2)
 
 
-def _wrench(stage: Stage, i: int, load: Wrench, solution: Solution | None, positions: Any) -> Iterator[Acting]:
+def _wrench(stage: DrawnPose, i: int, load: Wrench, solution: Solution | None, positions: Any) -> Iterator[DrawnLoad]:
     center = stage.m.link(load.link).center
     point = load.point if load.point is not None else center if center is not None else np.zeros(3)
     at = stage.on(load.link, point)
@@ -517,12 +517,12 @@ def _wrench(stage: Stage, i: int, load: Wrench, solution: Solution | None, posit
         wrench = solution.load(i).wrenches[load.link].reshape(-1, 6)[positions]
         force, moment = wrench[:, 3:], wrench[:, :3] - np.cross(at, wrench[:, 3:])
     if load.force is not None:
-        yield Acting(i, False, at, force)
+        yield DrawnLoad(i, False, at, force)
     if load.moment is not None:
-        yield Acting(i, True, at, moment)
+        yield DrawnLoad(i, True, at, moment)
 
 
-def _effort(stage: Stage, i: int, load: Effort, solution: Solution | None, positions: Any) -> Acting:
+def _effort(stage: DrawnPose, i: int, load: Effort, solution: Solution | None, positions: Any) -> DrawnLoad:
     pair, j, line, frame = stage.freedom(load.freedom)
     X, couple = stage.frames[frame], pair.type.efforts[j].is_couple
     if solution is None:
@@ -530,7 +530,7 @@ def _effort(stage: Stage, i: int, load: Effort, solution: Solution | None, posit
     else:
         value = solution.load(i).force.reshape(-1)[positions]
     at = X[:, :, :3] @ line.point + X[:, :, 3] if line.turns else stage.points[pair.name, pair.b]
-    return Acting(i, couple, at, (X[:, :, :3] @ line.direction) * value[:, None])
+    return DrawnLoad(i, couple, at, (X[:, :, :3] @ line.direction) * value[:, None])
 
 
 def _constant(value: Any, n: int = 3) -> Array:
@@ -541,7 +541,7 @@ def _constant(value: Any, n: int = 3) -> Array:
         return np.full(n, np.nan)
 
 
-def _law(stage: Stage, i: int, load: Law) -> Part:
+def _law(stage: DrawnPose, i: int, load: Law) -> DrawnPart:
     """A law between two points, or in a freedom: wound about its axis, or along its slide from the end of the guide."""
     name, frame = f"loads[{i}]", f"load:{i}"
     straight, turning = LAW_SHAPES[load.kind]
@@ -551,15 +551,17 @@ def _law(stage: Stage, i: int, load: Law) -> Part:
         pair, j, line, own = stage.freedom(load.in_freedom)
         size, X = stage.symbol_size(pair), stage.frames[own]
         if line.turns:
-            return Part("spring", name, "", own, turning.moved(1.7 * size * frame_along(line.direction), line.point))
+            return DrawnPart(
+                "spring", name, "", own, turning.moved(1.7 * size * frame_along(line.direction), line.point)
+            )
         low = float(stage.place.coordinates[pair.name][j].min(initial=0.0)) - 4.5 * size
         begin, end = X[:, :, :3] @ (low * line.direction) + X[:, :, 3], stage.points[pair.name, pair.b]
     width = np.full(stage.count, 0.75 * stage.symbol)
     stage.frames[frame] = stretched(end - begin, begin, np.linalg.norm(end - begin, axis=1), width)
-    return Part("spring", name, "", frame, straight)
+    return DrawnPart("spring", name, "", frame, straight)
 
 
-def reactions(stage: Stage, solution: Solution, positions: Any) -> tuple[list[Part], tuple[str, ...], float]:
+def reactions(stage: DrawnPose, solution: Solution, positions: Any) -> tuple[list[DrawnPart], tuple[str, ...], float]:
     """Reaction forces on links b as arrows at their markers, pairs whose force is not unique, and the length of a unit of force."""
     values = {p.name: known_force(stage, solution, p, positions, stage.normal) for p in stage.m.pairs}
     lost = tuple(name for name, force in values.items() if np.isnan(force).any())
@@ -573,11 +575,11 @@ def reactions(stage: Stage, solution: Solution, positions: Any) -> tuple[list[Pa
         at = stage.points[pair.name, pair.b]
         width = np.minimum(0.36 * stage.symbol, 0.2 * length)
         stage.frames[f"reaction:{pair.name}"] = stretched(np.nan_to_num(force), at, length, width)
-        out.append(Part("reaction", pair.name, pair.b, f"reaction:{pair.name}", shapes.arrow()))
+        out.append(DrawnPart("reaction", pair.name, pair.b, f"reaction:{pair.name}", shapes.arrow()))
     return out, lost, scale
 
 
-def known_force(stage: Stage, solution: Solution, pair: Pair, positions: Any, along: Array | None) -> Array:
+def known_force(stage: DrawnPose, solution: Solution, pair: Pair, positions: Any, along: Array | None) -> Array:
     """Reaction force ``(T, 3)``, NaN where it is not unique (also where values of least norm stand for it).
 
     With a direction ``along (3,)`` or ``(T, 3)`` the part across it, which may be unique alone: in the plane of a plane mechanism, across

@@ -34,7 +34,7 @@ class Element:
 
 
 @dataclass(frozen=True)
-class Line:
+class FreedomLine:
     """The line of one freedom in frame ``frame`` of its pair: a unit ``direction`` through ``point``; ``advance`` a turn's per radian."""
 
     frame: int
@@ -44,18 +44,18 @@ class Line:
     advance: float = 0.0
 
 
-def lines_of(row: PairType, pitch: float) -> list[Line]:
+def lines_of(row: PairType, pitch: float) -> list[FreedomLine]:
     """The lines of all freedoms, at coordinates zero where a factor moves them."""
     return [_line(freedom, k, pitch) for freedom, k in zip(row.freedoms, row.frame_before, strict=True)]
 
 
-def _line(freedom: Freedom, frame: int, pitch: float) -> Line:
+def _line(freedom: Freedom, frame: int, pitch: float) -> FreedomLine:
     twist = np.array(freedom.twist) + pitch * np.array(freedom.per_pitch)
     w, v = twist[:3], twist[3:]
     if not freedom.turns:
-        return Line(frame, False, v / np.linalg.norm(v), np.zeros(3))
+        return FreedomLine(frame, False, v / np.linalg.norm(v), np.zeros(3))
     w = w / np.linalg.norm(w)
-    return Line(frame, True, w, np.cross(w, v), float(w @ v))
+    return FreedomLine(frame, True, w, np.cross(w, v), float(w @ v))
 
 
 def symbol(row: PairType, pitch: float, size: float, strokes: Sequence[tuple[float, float]]) -> list[Element]:
@@ -90,7 +90,7 @@ def symbol(row: PairType, pitch: float, size: float, strokes: Sequence[tuple[flo
 
 
 def _slide_elements(
-    lines: list[Line], strokes: list[tuple[float, float]], size: float, square: bool, last: int
+    lines: list[FreedomLine], strokes: list[tuple[float, float]], size: float, square: bool, last: int
 ) -> Iterator[Element]:
     """A guide along one direction or a plate along two, and a block in or on it where nothing turns."""
     frame, directions = lines[0].frame, [line.direction for line in lines]
@@ -117,7 +117,7 @@ def _plate(directions: list[Array], low: Array, high: Array, size: float) -> Sha
 
 
 def _turn_elements(
-    lines: list[Line], stroke: tuple[float, float], slides: list[Line], size: float, last: int
+    lines: list[FreedomLine], stroke: tuple[float, float], slides: list[FreedomLine], size: float, last: int
 ) -> Iterator[Element]:
     """A drum, a ball with two pins, or a ball; in or on a guide of its own size."""
     normal = np.cross(slides[0].direction, slides[1].direction) if len(slides) == 2 else None
@@ -137,7 +137,9 @@ def _turn_elements(
             )
 
 
-def _drum(line: Line, stroke: tuple[float, float], slides: list[Line], size: float, last: int) -> Iterator[Element]:
+def _drum(
+    line: FreedomLine, stroke: tuple[float, float], slides: list[FreedomLine], size: float, last: int
+) -> Iterator[Element]:
     """A drum about its axis: a bearing by itself, a piston in a guide along it, a roller on a plate, or a nut on a threaded spindle."""
     coaxial = any(_parallel(line.direction, slide.direction) for slide in slides)
     radius, half = (BODY, 0.8) if coaxial else (BODY, 1.3) if len(slides) == 2 else (0.8, 1.15)

@@ -42,7 +42,7 @@ from mechgraph.show.canvas import (
     shaded,
 )
 from mechgraph.show.curves import finely
-from mechgraph.show.scene import Part, Scene, scene
+from mechgraph.show.scene import DrawnPart, Scene, scene
 
 NAMES_IN_DRAWING = 12
 """Pairs up to which all names stand in the drawing; beyond, numbers stand there and a legend beside it says what they are."""
@@ -243,7 +243,7 @@ class Drawing:
 
     def position(self, t: int) -> None:
         """Everything at one position."""
-        heights: dict[float, list[tuple[Part, Array]]] = {}
+        heights: dict[float, list[tuple[DrawnPart, Array]]] = {}
         for part in self.scene.parts:
             vertices = self.scene.vertices(part, t)
             if np.isnan(vertices).any():
@@ -267,7 +267,7 @@ class Drawing:
             }
             self.painter.marks(np.array(lost), zorder=6.4, gid="not unique", **style)
 
-    def _polygons(self, parts: list[tuple[Part, Array]], height: float) -> None:
+    def _polygons(self, parts: list[tuple[DrawnPart, Array]], height: float) -> None:
         corners, faces, edges = [], [], []
         for part, vertices in parts:
             if part.dashed or not part.shape.faces:
@@ -285,7 +285,7 @@ class Drawing:
         if corners:
             self.painter.polygons(corners, np.concatenate(faces), np.concatenate(edges), height)
 
-    def _outline(self, part: Part, vertices: Array) -> None:
+    def _outline(self, part: DrawnPart, vertices: Array) -> None:
         width, style = LINES.get(part.role, (1.0, "-"))
         colour = LINE_COLOUR.get(part.role) or self.colour.get(part.link, INK)
         self.painter.lines(
@@ -293,7 +293,7 @@ class Drawing:
             zorder=ABOVE.get(part.role, 5.0) + 0.05, gid=f"{part.role} {part.owner}",
         )  # fmt: skip
 
-    def _mark(self, part: Part, vertices: Array) -> None:
+    def _mark(self, part: DrawnPart, vertices: Array) -> None:
         colour = self.colour[part.link]
         if part.role == "point":
             self.painter.marks(vertices, marker="x", s=40, color=colour, zorder=7, gid=f"point {part.owner}")
@@ -367,7 +367,7 @@ class Drawing:
         return np.concatenate(out)
 
 
-def _runs(part: Part, vertices: Array) -> list[Array]:
+def _runs(part: DrawnPart, vertices: Array) -> list[Array]:
     return [vertices[list(line)] for line in part.shape.lines]
 
 

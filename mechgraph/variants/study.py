@@ -35,9 +35,9 @@ from mechgraph.variants.numbers import AnyField, clashes, field_values, find_fie
 from mechgraph.variants.work import (
     STATUSES,
     Output,
-    Part,
     Source,
-    Task,
+    StudyPart,
+    StudyTask,
     as_rows,
     motion_of_case,
     named_outputs,
@@ -235,8 +235,8 @@ class Study(Shown):
         steps: Array,
         names: Mapping[str, Output],
         motions: Mapping[str, Motion],
-        near: Part,
-        parts: Sequence[Part],
+        near: StudyPart,
+        parts: Sequence[StudyPart],
     ) -> None:
         self._source, self._ways, self._values, self._steps, self._near = source, ways, values, steps, near
         self.motions: Mapping[str, Motion] = dict(motions)
@@ -682,9 +682,9 @@ def study(
     )
     near = np.concatenate([np.zeros((len(steps), 1)), np.diag(steps), -np.diag(steps)], axis=1) + source.start[:, None]
 
-    def task(some: slice) -> Task:
+    def task(some: slice) -> StudyTask:
         own = Motions({name: motion_of_case(motion, at[some]) for name, motion in paths.items()}, given.free)
-        return Task(source, whole[:, some], own, kept, method, redundant, engine, acting)
+        return StudyTask(source, whole[:, some], own, kept, method, redundant, engine, acting)
 
     size = max(1, min(MOST_TOGETHER, POSITIONS_TOGETHER // max(motion.shape[-1] for motion in paths.values())))
     size = min(size, FEW_ALONE) if source.one_by_one else size
@@ -753,10 +753,10 @@ def _rows_of(name: str, motion: Motion, count: int) -> Motion:
 
 
 def _all_solved(
-    tasks: Sequence[Task], executor: concurrent.futures.Executor | None, progress: Progress | None
-) -> tuple[dict[int, Part], str, Exception | None]:
+    tasks: Sequence[StudyTask], executor: concurrent.futures.Executor | None, progress: Progress | None
+) -> tuple[dict[int, StudyPart], str, Exception | None]:
     """Parts by the numbers of their tasks; why some are missing, and the error that it came from."""
-    done: dict[int, Part] = {}
+    done: dict[int, StudyPart] = {}
     try:
         for i, part in _streamed(tasks, executor):
             done[i] = part
@@ -777,7 +777,9 @@ def _all_solved(
     return done, why if missing else "", None
 
 
-def _streamed(tasks: Sequence[Task], executor: concurrent.futures.Executor | None) -> Iterator[tuple[int, Part]]:
+def _streamed(
+    tasks: Sequence[StudyTask], executor: concurrent.futures.Executor | None
+) -> Iterator[tuple[int, StudyPart]]:
     """Parts as they come: from the executor, from threads or processes of this machine where there is much to do, or from here.
 
     Threads, where the compiled kernel does nearly all of the work, for which Python's lock is released.
@@ -803,7 +805,7 @@ def _streamed(tasks: Sequence[Task], executor: concurrent.futures.Executor | Non
         yield i, solved(task)
 
 
-def _in_processes(left: dict[int, Task], workers: int) -> Iterator[tuple[int, Part]]:
+def _in_processes(left: dict[int, StudyTask], workers: int) -> Iterator[tuple[int, StudyPart]]:
     """Parts as they come from processes of this machine.
 
     Those that a process took with it when it ended are tried again, as long as others come, then each in a process of its own; those that
@@ -821,12 +823,14 @@ def _in_processes(left: dict[int, Task], workers: int) -> Iterator[tuple[int, Pa
             yield from _submitted({i: task}, pool)
 
 
-def _submitted(tasks: Mapping[int, Task], executor: concurrent.futures.Executor) -> Iterator[tuple[int, Part]]:
+def _submitted(
+    tasks: Mapping[int, StudyTask], executor: concurrent.futures.Executor
+) -> Iterator[tuple[int, StudyPart]]:
     """Parts as they come, as far as the processes of the executor live.
 
     Where one fails for a reason of the executor's own, as a cluster that gives up a task, the others are waited for.
     """
-    futures: dict[concurrent.futures.Future[Part], int] = {}
+    futures: dict[concurrent.futures.Future[StudyPart], int] = {}
     failed: BaseException | None = None
     try:
         for i, task in tasks.items():
@@ -846,7 +850,7 @@ def _submitted(tasks: Mapping[int, Task], executor: concurrent.futures.Executor)
             future.cancel()
 
 
-def _can_be_sent(task: Task) -> bool:
+def _can_be_sent(task: StudyTask) -> bool:
     """Whether a task can go to another process: functions typed at a prompt, or without a name, cannot."""
     try:
         pickle.dumps(task)

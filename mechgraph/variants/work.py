@@ -447,7 +447,7 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Task:
+class StudyTask:
     """Some variants to be solved: ``values (parameters, count)``, motions ``(1 or count, N)``, and what is kept of them."""
 
     source: Source
@@ -467,7 +467,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Part:
+class StudyPart:
     """What came of a task: outputs ``(count, ...)`` (None where no variant could be solved), messages, and for every position
     ``(count, N)`` the number of its outcome in ``STATUSES``; what makes reactions doubtful, of all variants; whether the compiled kernel
     solved them together.
@@ -479,22 +479,22 @@ class Part:
     warnings: tuple[Doubt, ...] = ()
     compiled: bool = False
 
-    def cut(self, count: int) -> tuple[Part, Part]:
+    def cut(self, count: int) -> tuple[StudyPart, StudyPart]:
         """The first ``count`` variants, and the others; what makes reactions doubtful stays with the first."""
 
-        def part(some: slice, begin: int, warnings: tuple[Doubt, ...]) -> Part:
+        def part(some: slice, begin: int, warnings: tuple[Doubt, ...]) -> StudyPart:
             outputs = None if self.outputs is None else {name: values[some] for name, values in self.outputs.items()}
             messages = {i - begin: why for i, why in self.messages.items() if i in range(len(self.status))[some]}
-            return Part(outputs, self.status[some], messages, warnings)
+            return StudyPart(outputs, self.status[some], messages, warnings)
 
         return part(slice(count), 0, self.warnings), part(slice(count, None), count, ())
 
 
-def unsolved(task: Task, why: str) -> Part:
+def unsolved(task: StudyTask, why: str) -> StudyPart:
     """A part of which nothing came."""
     count, positions = task.values.shape[1], max(motion.shape[-1] for motion in task.motions.values())
     status = np.full((count, positions), len(STATUSES) - 1, dtype=np.int8)
-    return Part(None, status, dict.fromkeys(range(count), why))
+    return StudyPart(None, status, dict.fromkeys(range(count), why))
 
 
 def worst(found: Iterable[Doubt]) -> tuple[Doubt, ...]:
@@ -518,7 +518,7 @@ def worst(found: Iterable[Doubt]) -> tuple[Doubt, ...]:
     return tuple(warning for _, warning in out.values())
 
 
-def solved(task: Task) -> Part:
+def solved(task: StudyTask) -> StudyPart:
     """Solve the variants of a task: together where they can be followed in step, alone where not."""
     count = task.values.shape[1]
     together = solve_together(
@@ -553,7 +553,7 @@ def solved(task: Task) -> Part:
             for v in found.values():
                 v[i] = np.nan
     compiled = together.solution is not None and together.solution.engine == COMPILED
-    return Part(found, numbered(status), messages, worst(warnings), compiled)
+    return StudyPart(found, numbered(status), messages, worst(warnings), compiled)
 
 
 def numbered(status: NDArray[np.str_]) -> NDArray[np.int8]:
@@ -568,7 +568,7 @@ def _writable(values: Array) -> Array:
     return np.array(values, dtype=float)
 
 
-def _solved_alone(task: Task, i: int, start: Array) -> Solution:
+def _solved_alone(task: StudyTask, i: int, start: Array) -> Solution:
     """One variant alone, from coordinates ``start (F,)`` if known; positions out of reach flagged; as a batch ``(1, N)``."""
     try:
         m = task.source.one(task.values[:, i])

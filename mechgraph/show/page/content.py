@@ -24,7 +24,7 @@ from mechgraph.quantities import unit_of
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import SHOWN_AS_ZERO, driver_value, with_unit
 from mechgraph.show.canvas import axis_label, colours
-from mechgraph.show.scene import Part, Scene, place_of_states, scene, scene_at
+from mechgraph.show.scene import DrawnPart, Scene, place_of_states, scene, scene_at
 from mechgraph.show.shapes import Shape, frame_along
 
 
@@ -117,7 +117,7 @@ class Figure:
             "frame": self.number[f"link:{pair.b}"], "at": rounded(np.asarray(pair.markers[1].point)), "rows": rows,
         }  # fmt: skip
 
-    def piece(self, part: Part) -> dict[str, Any]:
+    def piece(self, part: DrawnPart) -> dict[str, Any]:
         """A part in the frame that is handed over."""
         frame, X = self.placed(part.frame)
         shape = part.shape.moved(X[:, :3], X[:, 3])
@@ -163,7 +163,7 @@ FORCE, MOMENT, LENGTH, TIME = (1, 1, -2), (2, 1, -2), (1, 0, 0), (0, 0, 1)
 Data = dict[str, Any]
 
 
-class Cycle:
+class ShownCycle:
     """A solution at the positions of its scene."""
 
     def __init__(self, s: Solution, scene: Scene) -> None:
@@ -423,10 +423,10 @@ def view_data(report: DeterminacyReport, s: Solution | None) -> Data | None:
     """What the view is made of; None where there is nothing that can be drawn in space."""
     if report.geometry is None or len(report.mechanism.links) > MOST_LINKS:
         return None
-    return _View(report, s).data()
+    return _PageView(report, s).data()
 
 
-class _View:
+class _PageView:
     def __init__(self, report: DeterminacyReport, s: Solution | None) -> None:
         self.report, self.m = report, report.mechanism
         self.solved = s is not None and bool((np.asarray(s.status) == "ok").any())
@@ -457,7 +457,7 @@ class _View:
             *self.limited("self-stresses", self.stresses()),
         ]
         items += self.limited("advice", self.advice())
-        cycle = Cycle(self.s_shown, self.scene).data() if self.s is not None else None
+        cycle = ShownCycle(self.s_shown, self.scene).data() if self.s is not None else None
         return {"figures": self.figures, "items": items, "cycle": cycle, "note": " ".join(self.notes)}
 
     @property
@@ -495,7 +495,7 @@ class _View:
             yield self.item("The mechanism", "as it stands", f"{plain(self.m.name)} where its loops are closed.")
             return
         s = self.s_shown
-        kind = "cycle" if Cycle(s, self.scene).returns else "swing"
+        kind = "cycle" if ShownCycle(s, self.scene).returns else "swing"
         count = len(self.scene.positions)
         status = np.asarray(self.s.status).size
         lost = int(np.count_nonzero(np.asarray(self.s.status) != "ok"))
@@ -526,7 +526,7 @@ class _View:
         ]
         inside = (np.array(square) - X[:, 3]) @ X[:, :3]
         shape = Shape(inside, ((0, 1, 2, 3),), (), 1)
-        return self.figure.piece(Part("link", "", link, f"link:{link}", shape))
+        return self.figure.piece(DrawnPart("link", "", link, f"link:{link}", shape))
 
     def stresses(self) -> Iterator[Data]:
         """Every self-stress on the mechanism."""
