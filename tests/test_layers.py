@@ -5,6 +5,7 @@ has a layer.
 """
 
 import ast
+import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
