@@ -206,8 +206,6 @@ def _marker(builder: Standing, pair: Pair) -> Array:
     return own if pair.a == builder.assembly.name else compose(builder.part(pair.a).pose, own)
 
 
-LINEAR = 1e-12
-"""Part of the force by which a formula may differ from a line in distance and rate."""
 LOOKED_AT = np.array([[0.0, 1.0, 0.0, 0.7, 1.9, 0.7], [0.0, 0.0, 1.0, -1.3, 0.4, -1.3], [0.0, 0.0, 0.0, 0.0, 0.6, 2.0]])
 """Distances, rates and times at which it is looked at."""
 
@@ -235,7 +233,8 @@ def force(builder: Standing, found: Connection) -> Spring | ForceLaw | None:
     )
     stiffness, damping = float(T[1] - T[0]), float(T[2] - T[0])
     off = np.abs(T - (T[0] + stiffness * LOOKED_AT[0] + damping * LOOKED_AT[1])).max()
-    if np.isfinite(T).all() and stiffness and T[0] / stiffness <= 0 and off <= LINEAR * np.abs(T).max():
+    # part of the force by which a formula may differ from a line in distance and rate
+    if np.isfinite(T).all() and stiffness and T[0] / stiffness <= 0 and off <= 1e-12 * np.abs(T).max():
         return Spring(*ends, p, q, stiffness, float(-T[0] / stiffness), damping)
 
     def push(x: Array, v: Array, t: Array | None) -> Array:

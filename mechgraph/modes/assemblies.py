@@ -209,16 +209,12 @@ class Question:
 
 REAL_CLOSED = 1e-12
 """Closure error of what is real in the equations that are solved: some roundings."""
-PUT_BACK = 1e-9
-"""Closure error of what is real with its rods put back."""
 UNFIT = 1e-3
 """Closure error from which on a rod that has no row does not fit; between this and that of what is closed it is open whether it does."""
 GUESSES = 400
 """Random guesses where no class is known."""
 GUESSED_TURNS = 1.0
 """Turns on either side of the start within which angles are guessed."""
-ORDER = 1e-7
-"""Difference of link poses (and coordinates) below which the next number decides the order of assemblies."""
 
 BESIDE = "What can move with the drivers at rest is not counted, and there may be more of that kind."
 """What is said beside continua."""
@@ -338,7 +334,8 @@ class Finder:
         complex_ = np.abs(x.imag).max(axis=0, initial=0.0) > REAL
         system = self.question.system
         off = Configuration(system, x.real).closure
-        made, unfit = ~complex_ & (off < PUT_BACK), ~complex_ & bool(self.form.spare) & (off > UNFIT)
+        # closure error of what is real with its rods put back
+        made, unfit = ~complex_ & (off < 1e-9), ~complex_ & bool(self.form.spare) & (off > UNFIT)
         if self.form.spare:
             others = others[:, Configuration(system, others).closure < UNFIT]
         if (lost := int((~made & ~complex_ & ~unfit).sum())) > 0:
@@ -488,7 +485,8 @@ def _ordered(numbers: Array) -> list[int]:
 
     def compare(i: int, j: int) -> int:
         apart = numbers[i] - numbers[j]
-        first = int(np.argmax(np.abs(apart) > ORDER * max(1.0, float(np.abs(numbers).max()))))
+        # difference of link poses (and coordinates) below which the next number decides the order of assemblies
+        first = int(np.argmax(np.abs(apart) > 1e-7 * max(1.0, float(np.abs(numbers).max()))))
         return int(np.sign(apart[first]))
 
     return sorted(range(len(numbers)), key=cmp_to_key(compare))

@@ -48,8 +48,6 @@ Node = tuple[int, int]
 """An assembly: the number of its sample, and its own there."""
 ARRIVES = 1e-6
 """Difference of link poses up to which a piece arrives at an assembly."""
-MEETS = 1e-6
-"""Difference of driver values up to which pieces end at the same fold."""
 TOUCHES = 1e-3
 """Difference of link poses at a fold or a crossing: they grow with the root of the distance from a fold."""
 
@@ -219,7 +217,8 @@ class Map:
         for i, a in enumerate(ended):
             for b in ended[i + 1 :]:
                 apart = np.abs(a.last - b.last).max() / max(1.0, float(np.abs(a.last).max()))
-                if (a.sample, a.sense) == (b.sample, b.sense) and abs(a.end - b.end) < MEETS and apart < TOUCHES:
+                # difference of driver values up to which pieces end at the same fold
+                if (a.sample, a.sense) == (b.sample, b.sense) and abs(a.end - b.end) < 1e-6 and apart < TOUCHES:
                     out.append((a, b))
         return out
 
@@ -246,14 +245,8 @@ class Map:
         return members(components_of_edges(len(self.chains), meets))
 
 
-SAMPLES_A_TURN = 24
-"""Positions of the driver at which all assemblies are found."""
-MAP_POINTS = 720
-"""Positions in all."""
 GOLDEN, SPREADS = 0.5 * (3.0 - 5.0**0.5), 3
 """Place of the first sample, as part of the distance of two; how many such places are tried where samples lie on double points."""
-SAME_VALUE = 1e-9
-"""Difference of driver values (radians, or lengths) up to which points of several branches lie at the same one."""
 SLIDE_STROKE = 2.0
 """Range of a driven slide to both sides of the start, over L, where none is given."""
 
@@ -415,7 +408,8 @@ class Branches(Shown):
             for number, (b, way) in enumerate(zip(self.branches, ways, strict=True)):
                 at = int(np.argmin(way))
                 near = np.abs(b.prints[:, [at]] - prints).max() < ARRIVES * max(1.0, float(np.abs(prints).max()))
-                if came and near and way[at] - ahead < SAME_VALUE:
+                # difference of driver values (radians, or lengths) up to which points of several branches lie at the same one
+                if came and near and way[at] - ahead < 1e-9:
                     return number, float(b.values[at] - sense * ahead)
         return None
 
@@ -528,8 +522,8 @@ def branches(
     driver: str,
     *,
     over: tuple[float, float] | None = None,
-    samples: Annotated[int, at_least(3)] = SAMPLES_A_TURN,
-    points: Annotated[int, at_least(3)] = MAP_POINTS,
+    samples: Annotated[int, at_least(3)] = 24,
+    points: Annotated[int, at_least(3)] = 720,
     seed: Seed = 0,
     cache: bool = True,
     progress: Callable[[str], None] | None = None,

@@ -268,12 +268,6 @@ BALL = 0.05
 """Size of the increments (radians, lengths / L) within which second derivatives are bounded."""
 BOUND_ROUNDING = 1.01
 """Factor that stands for the rounding of bounds of second derivatives, and of bases that are orthonormal to rounding."""
-SINGULAR_ROWS = 1e-13
-"""Smallest singular value, as part of the largest, below which nothing is tried."""
-APART_ROUNDING = 1e-13
-"""Taken from the distance of two states for its rounding."""
-TOLD_APART = 1e-7
-"""Distance of the root up to which assemblies that are told apart have roots of their own."""
 
 
 @dataclass(frozen=True)
@@ -316,7 +310,8 @@ def certificate(here: Configuration, free: Index, passive: int, by_structure: bo
     U, sigma, Vt = np.linalg.svd(A.mid)
     how, residual = "structure" if by_structure else "checked", float(here.closure[0])
     dependent, off = s.n_rows - rank, np.inf
-    if not rank or sigma[rank - 1] > SINGULAR_ROWS * sigma[0]:
+    # smallest singular value, as part of the largest, below which nothing is tried
+    if not rank or sigma[rank - 1] > 1e-13 * sigma[0]:
         Y, independent = exact(np.diag(1.0 / sigma[:rank])), exact(U[:, :rank].T)
         off = BOUND_ROUNDING * float(
             np.linalg.norm((Y @ (independent @ A @ exact(Vt[:rank].T)) - exact(np.eye(rank))).bound)
@@ -330,7 +325,8 @@ def certificate(here: Configuration, free: Index, passive: int, by_structure: bo
     proved = bool(h <= 0.5)
     error = float((1 - np.sqrt(1 - 2 * h)) / (beta * K)) if proved and h > 0 else float(eta)
     radius = float(min(BALL, 1 / (beta * K))) if proved and h > 0 else 0.0
-    return Certificate(proved and error < TOLD_APART, float(h), error, radius, rank, dependent, how, residual)
+    # distance of the root up to which assemblies that are told apart have roots of their own
+    return Certificate(proved and error < 1e-7, float(h), error, radius, rank, dependent, how, residual)
 
 
 def told_apart(family: Family, x: Array, sure: Sequence[Certificate | None]) -> list[Certificate | None]:
@@ -352,7 +348,8 @@ def told_apart(family: Family, x: Array, sure: Sequence[Certificate | None]) -> 
             # twice the chord is no more than the angle
             2.0 * np.minimum(*(np.sqrt(((Q + sign * R) ** 2).sum(axis=0)) for sign in (1.0, -1.0))),
         ]
-        least = np.delete(np.concatenate(gaps).max(axis=0, initial=0.0) / UP - error - error[n] - APART_ROUNDING, n)
+        # taken from the distance of two states for its rounding
+        least = np.delete(np.concatenate(gaps).max(axis=0, initial=0.0) / UP - error - error[n] - 1e-13, n)
         out[i] = replace(cast("Certificate", sure[i]), apart=float(least.min()) if least.size else None)
     return out
 

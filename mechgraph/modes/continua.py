@@ -29,8 +29,6 @@ from mechgraph.modes.family import Array, Family, parts
 
 GUESSES_TOGETHER = 200
 """Guesses closed together."""
-SLIDE_SPREAD = 1.5
-"""Standard deviation of guessed slides, over L."""
 
 
 def searched(
@@ -54,7 +52,8 @@ def searched(
         if progress is not None:
             progress(f"guess {i + 1} to {i + n} of {starts}")
         dq = rng.uniform(-2 * np.pi * turns, 2 * np.pi * turns, (system.n_freedoms, n))
-        dq[~turning] = rng.normal(0.0, SLIDE_SPREAD, (int((~turning).sum()), n))
+        # standard deviation of guessed slides, over L
+        dq[~turning] = rng.normal(0.0, 1.5, (int((~turning).sum()), n))
         guess = system.advance(np.repeat(x[:, None], n, axis=1), dq)
         guess[system.single_rows[columns]] = drive[:, None]
         closed, error = close_all(system, guess, columns)
@@ -66,16 +65,10 @@ VANISHED = 1e-200
 """What stands for a curvature of zero, by which is divided."""
 SINGULAR = 1e-5
 """Smallest singular value of the closure rows, as part of the largest, below which an assembly is looked at more closely."""
-LARGE_STATE = 10.0
-"""Imaginary part, or length over L, in a state from which on small singular values are a matter of scale."""
 AWAY = 1e-2
 """Step along motions that the rows leave free, after which a continuum is still closed: closing takes back what rows hold to a rank."""
-GONE = 0.2
-"""Part of that step by which what tells assemblies apart must have changed."""
 CURVED = 1e-3
 """Step of second differences: their rounding is 1e-10."""
-INDEPENDENT_WAYS = 0.1
-"""Singular value of motions, as part of the largest, from which on they count for the dimension of a continuum."""
 
 
 def least_value(family: Family, here: Configuration) -> Array:
@@ -91,7 +84,8 @@ def irregular(family: Family, here: Configuration) -> Array:
     s = here.system
     lengths = here.x[s.single_rows[s.is_length]]
     large = np.maximum(np.abs(here.x.imag).max(axis=0, initial=0.0), np.abs(lengths).max(axis=0, initial=0.0))
-    return np.asarray((least_value(family, here) < SINGULAR) & (large <= LARGE_STATE))
+    # imaginary part, or length over L, in a state from which on small singular values are a matter of scale
+    return np.asarray((least_value(family, here) < SINGULAR) & (large <= 10.0))
 
 
 class Nearby:
@@ -131,7 +125,8 @@ class Nearby:
             self.system, self._stepped(AWAY * np.concatenate([ways, -ways], axis=1)), self.family.columns
         )
         gone = np.abs(self._prints(x) - self._prints(self.here.x)).max(axis=0, initial=0.0)
-        return x[:, (error < CLOSED) & (gone > GONE * AWAY)]
+        # part of the step by which what tells assemblies apart must have changed
+        return x[:, (error < CLOSED) & (gone > 0.2 * AWAY)]
 
     @property
     def moves(self) -> bool:
@@ -143,7 +138,8 @@ class Nearby:
         """Of the continuum here, where it does not cross others: independent motions along which it goes on."""
         ways = self._prints(self.landed) - self._prints(self.here.x)
         sigma = np.linalg.svd(ways, compute_uv=False)
-        return int((sigma > INDEPENDENT_WAYS * sigma[0]).sum()) if sigma.size else 0
+        # singular value of motions, as part of the largest, from which on they count for the dimension of a continuum
+        return int((sigma > 0.1 * sigma[0]).sum()) if sigma.size else 0
 
     @cached_property
     def _bent(self) -> tuple[complex, complex, float]:
@@ -187,8 +183,6 @@ class Nearby:
         return self.family.prints(Configuration(self.system, x))
 
 
-LOOKED_FOR = 100
-"""Random guesses from which real points of continua are looked for, the same ones for any seed."""
 SAME_PLACE = 1e-5
 """Difference of what does not move up to which two points are of one continuum."""
 MOST_STEPS_ALONG, STEP_ALONG, NEAREST_POINT = 200, 0.3, 1e-9
@@ -208,7 +202,8 @@ def continua(
 ) -> list[Found]:
     """Continua with real points, drivers at ``drive (d,)``: those to which tracks came at ``ends (nx, n)``, and those that guesses find."""
     start = family.here.x[:, :1]
-    guessed = searched(system, start[:, 0], family.columns, drive, LOOKED_FOR, 0.5, np.random.default_rng(0), progress)
+    # random guesses from which real points of continua are looked for, the same ones for any seed
+    guessed = searched(system, start[:, 0], family.columns, drive, 100, 0.5, np.random.default_rng(0), progress)
     guessed = guessed[:, irregular(family, Configuration(system, guessed))]
     guessed = guessed[:, np.argsort(np.abs(_apart(system, guessed, start)).max(axis=0), kind="stable")]
     out: list[tuple[Found, Array]] = []

@@ -348,10 +348,6 @@ def common(spaces: list[Array]) -> Array:
     return np.asarray(vectors[:, outside < SPAN])
 
 
-GEOMETRY_DIGITS, ALGEBRA_DIGITS = 9, 6
-"""Decimals of numbers that a class keeps: of markers, over L, and of the motions by which they may be moved."""
-
-
 class Labelling:
     """Links, pairs and rods of a class in canonical order."""
 
@@ -392,7 +388,8 @@ class Labelling:
     @cached_property
     def _still(self) -> Array:
         """The markers where the class is told, in the global frame, as far as it keeps them."""
-        return np.round(compose(self._gauge, self.family.target)[..., 0].real, GEOMETRY_DIGITS) + 0.0
+        # decimals of markers, over L, that a class keeps
+        return np.round(compose(self._gauge, self.family.target)[..., 0].real, 9) + 0.0
 
     @cached_property
     def _gauge(self) -> Array:
@@ -443,7 +440,8 @@ class Labelling:
             (step.holds_rotation, *((f.label, *f.twist) for f in step.freedoms)) for step in s.m.pairs[k].type.steps
         ]
         B = family.algebras[k]
-        algebra = () if family.whole else (np.round(B @ B.T, ALGEBRA_DIGITS) + 0.0).ravel().tolist()
+        # decimals that a class keeps of the motions by which markers may be moved
+        algebra = () if family.whole else (np.round(B @ B.T, 6) + 0.0).ravel().tolist()
         given, rest = ([c in of.tolist() for c in columns] for of in (family.columns, family.held))
         return (tuple(freedoms), tuple(given), tuple(rest), tuple(algebra))
 

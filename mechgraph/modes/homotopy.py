@@ -25,33 +25,14 @@ from mechgraph.pairs.factors import screw_terms, screw_values
 
 Mask = NDArray[np.bool_]
 
-FIRST_STEP = 0.02
-"""First step."""
-LARGEST_STEP = 0.25
-"""Largest step."""
-SMALLEST_STEP, LEFT_OF_WAY = 1e-7, 1e-4
-"""Smallest step, as part of what is left of the way, and the least that this counts as: steps are short before an end that is nearly
-singular."""
 ENDLESS_STATE = (25.0, 1e5, 1e3)
 """Imaginary part of an angle, length over L, and quaternion from which on an assembly is on its way to infinity."""
 SLIDE = 1e-9
 """Turn of a marker below which it slides."""
 RATES_KEPT = 4
 """Nodes from whose rates a step is predicted."""
-POLISHED = 1e-12
-"""Last Newton step at the end of a track."""
-STEP_NOISE = 3e-14
-"""Rounding of a Newton step, against the third power of the largest number in a pose (poses multiply along loops)."""
 MOST_NOISE = 1e-5
 """Rounding with which a track may end."""
-POLISHING = 6
-"""Newton steps at the end of a track, at most."""
-ARRIVED = 1e-8
-"""Last Newton step, against the size of the state, up to which a track has come to its end."""
-CALMING, CALMEST, CALM = 8, 1.0, 1e-4
-"""Steps in which passive bodies are turned there, at most, the largest of them, and that at which it ends."""
-MOST_STEPS = 2000
-"""Steps after which a track is given up."""
 
 TRACKS_TOGETHER = 600
 """Tracks followed together, at most, of several positions or loops."""
@@ -276,14 +257,16 @@ def follow(
     every = np.arange(V) if tracks is None else tracks
     out = Tracked(x.copy(), np.zeros(V), np.zeros(V, dtype=bool), np.zeros(V, dtype=bool))
     march = _March(leg, x, every, way)
-    for _ in range(MOST_STEPS):
+    # steps after which a track is given up
+    for _ in range(2000):
         if not len(march.who):
             break
         ended, infinite = march.step(care)
         for mask, flag in ((ended, out.arrived), (infinite, out.infinite)):
             flag[march.who[mask]] = True
         out.x[:, march.who], out.s[march.who] = march.x, march.s[0]
-        march.keep(~(ended | infinite | (march.h < SMALLEST_STEP * np.clip(1.0 - march.s[0], LEFT_OF_WAY, 1.0))))
+        # smallest step, as part of what is left of the way (of 1e-4 of it at least: steps are short before an end that is nearly singular)
+        march.keep(~(ended | infinite | (march.h < 1e-7 * np.clip(1.0 - march.s[0], 1e-4, 1.0))))
     done = np.flatnonzero(out.arrived)
     if done.size and polish:
         out.x[:, done], good = polished(leg, out.x[:, done], way(np.ones(1))[0][0], every[done], care.noise)
@@ -297,7 +280,7 @@ class _March:
     def __init__(self, leg: Leg, x: Array, every: Index, way: Way) -> None:
         V = x.shape[1]
         self.leg, self.way, self.every = leg, way, every
-        self.who, self.x, self.h = np.arange(V), x.copy(), np.full(V, FIRST_STEP)
+        self.who, self.x, self.h = np.arange(V), x.copy(), np.full(V, 0.02)  # the first step
         self.s, self.known = np.zeros((RATES_KEPT, V)), np.zeros(V, dtype=np.intp)
         t, dt = way(self.s[0])
         here = leg.at(self.x, t, every)
@@ -328,7 +311,8 @@ class _March:
         good &= np.isfinite(v).all(axis=0)
         order = 1.0 / (1.0 + np.minimum(self.known + 1, RATES_KEPT))
         grown = h * np.clip((care.aim / np.maximum(sizes[0], 1e-12)) ** order, 0.4, 2.0)
-        self.h = np.where(good, np.minimum(np.where(np.isfinite(grown), grown, h), LARGEST_STEP), 0.4 * h)
+        # no step is longer than 0.25
+        self.h = np.where(good, np.minimum(np.where(np.isfinite(grown), grown, h), 0.25), 0.4 * h)
         at = np.flatnonzero(good)
         for old, new in ((self.s, s), (self.v, v)):
             old[1:, ..., at] = old[:-1, ..., at]
@@ -366,7 +350,8 @@ class _March:
 
 def rounding(size: Array) -> Array:
     """Rounding to be expected of a Newton step where the largest numbers in poses are of such a ``size``."""
-    return np.asarray(STEP_NOISE * size**3)
+    # rounding of a Newton step, against the third power of the largest number in a pose (poses multiply along loops)
+    return np.asarray(3e-14 * size**3)
 
 
 def polished(leg: Leg, x: Array, t: complex, tracks: Index, most: float = MOST_NOISE) -> tuple[Array, Mask]:
@@ -375,23 +360,28 @@ def polished(leg: Leg, x: Array, t: complex, tracks: Index, most: float = MOST_N
     places = np.full(x.shape[1], t)
     with np.errstate(all="ignore"):
         here = leg.at(x, places, tracks)
-        for _ in range(CALMING if eq.idle else 0):
+        # passive bodies are turned in so many steps, at most
+        for _ in range(8 if eq.idle else 0):
             step = _calming(eq, here)
-            if eq.size(here.here.x, step).max(initial=0.0) < CALM:
+            # so small a step ends it
+            if eq.size(here.here.x, step).max(initial=0.0) < 1e-4:
                 break
             here = here.again(eq.family.system.advance(here.here.x, step))
             here = here.again(eq.family.system.advance(here.here.x, here.newton(here.idle())))
         last, idle = np.full(x.shape[1], np.inf), here.idle()
-        for i in range(POLISHING):
+        # Newton steps at the end of a track, at most
+        for i in range(6):
             here = here.again(x) if i else here
             dq = here.newton(idle)
             size = eq.size(here.here.x, dq)
             x = np.where(size < last, eq.family.system.advance(here.here.x, dq), here.here.x)
             last = np.fmin(size, last)
-            if (last < POLISHED).all():
+            # last Newton step at the end of a track
+            if (last < 1e-12).all():
                 break
         noise = np.minimum(here.noise, most)
-    return x, last < ARRIVED * np.maximum(1.0, np.abs(x).max(axis=0)) + noise
+    # last Newton step, against the size of the state, up to which a track has come to its end
+    return x, last < 1e-8 * np.maximum(1.0, np.abs(x).max(axis=0)) + noise
 
 
 def _calming(eq: Equations, here: Linear) -> Array:
@@ -404,4 +394,5 @@ def _calming(eq: Equations, here: Linear) -> Array:
     c = -(np.linalg.pinv(both, rcond=1e-6) @ here.here.x.imag.T[..., None])[..., 0]
     c = c[:, : eq.idle] + 1j * c[:, eq.idle :]
     step = np.einsum("fpt,tp->ft", moves, c)
-    return np.asarray(step * np.minimum(1.0, CALMEST / np.maximum(np.abs(step).max(axis=0, initial=0.0), 1e-300)))
+    # no step turns them further than 1
+    return np.asarray(step * np.minimum(1.0, 1.0 / np.maximum(np.abs(step).max(axis=0, initial=0.0), 1e-300)))

@@ -96,10 +96,6 @@ class BranchesData:
     circuits: Annotated[tuple[tuple[int, ...], ...], "branches of each"]
 
 
-COORDINATES = 4
-"""Most coordinates of an assembly in its table; all are in ``start`` of the mode."""
-
-
 @dataclass(frozen=True)
 class ComplexModes:
     """Assemblies that are not real: ``coordinates (n, F)`` and ``poses (n, N, 4, 4)``, complex arrays, no mechanisms."""
@@ -195,7 +191,8 @@ class Assemblies(Shown, Sequence[Mechanism]):
         single = [
             name for pair in m.pairs for name, one in zip(pair.freedom_names, pair.type.drivable, strict=True) if one
         ]
-        shown = [name for name in single if name not in self.at][:COORDINATES]
+        # most coordinates of an assembly in its table; all are in ``start`` of the mode
+        shown = [name for name in single if name not in self.at][:4]
         places = [m.freedom_names().index(name) for name in shown]
         far = float(np.abs(self.poses[:, :, :3, 3]).max(initial=0.0))
         names = [f"{name} [deg]" if m.turns(name) else name for name in shown]
@@ -309,7 +306,8 @@ def values_text(m: Mechanism, at: Mapping[str, float]) -> str:
 def in_degrees(m: Mechanism, name: str, value: float, far: float = 0.0) -> float:
     """A value of a freedom or coordinate as it is shown: turns in degrees, zero where it is rounding (of lengths beside one of ``far``)."""
     turns = m.turns(name)
-    if abs(value) <= MODES_ZERO * (1.0 if turns else far):
+    # angle (radians), or part of the largest length, that tables show as zero
+    if abs(value) <= 1e-12 * (1.0 if turns else far):
         return 0.0
     return float(np.rad2deg(value)) if turns else value
 
@@ -319,8 +317,6 @@ def unit_of(m: Mechanism, name: str) -> str:
     return " deg" if m.turns(name) else ""
 
 
-MODES_ZERO = 1e-12
-"""Angle (radians), or part of the largest length, that tables show as zero."""
 WORDS = ("proved", "tested", "searched")
 """What completeness may be, the strongest first."""
 

@@ -98,8 +98,6 @@ PLATFORMS: tuple[tuple[str, int, tuple[int, ...], int, str], ...] = (
 of the one body in common, whatever their joints on the other (nothing where it does not matter), the bound, and its source."""
 TRIADS = (6, "a coupler curve, of degree six and threefold in the circular points, meets a circle in 12 - 6 others")
 """The bound of two bodies in a plane joined by three links, and its source."""
-PLANE_MOTIONS = (3, 2)
-"""Dimensions of the group of plane motions and of its translations."""
 
 
 @dataclass(frozen=True)
@@ -193,30 +191,14 @@ def _of_triad(family: Family) -> Bound | None:
     if len(ends) != 2 or len(legs) != 3 or any(set(others) != ends for others in legs):
         return None
     groups = {(h.shape[1], h.shape[1] - span(h[:3]).shape[1]) for h in family.loop_algebras}
-    return Bound(*TRIADS) if groups == {PLANE_MOTIONS} else None
+    # dimensions of the group of plane motions and of its translations
+    return Bound(*TRIADS) if groups == {(3, 2)} else None
 
 
-SAMPLES, SAMPLES_ALONG = 48, 16
-"""Members of a pencil that are sampled first, of one with turns and of one along an isotropic direction; then as many again, until they
-tell."""
-ENOUGH, PENCILS = 5, 4
-"""Members for every pole at which a pencil that does not tell is left for another one; pencils of which one has to tell."""
 MOST_TRACKS = 24_000
 """Tracks over all of them, at most."""
-BY_POLE = 0.3
-"""Distance of samples from a pole, as part of that to the next one."""
-NEAREST = 1e-3
-"""The least that counts of the distance of two poles, as part of their size."""
 POLE_RANGE = 200.0
 """Size of ``z`` or ``1 / z`` up to which poles are sampled."""
-PENCIL_SPREAD = 1.2
-"""Standard deviation of the imaginary part of ``phi``."""
-RATIONAL = 1e-11
-"""Singular value, as part of the largest, below which the Loewner matrix of a rational function ends."""
-ENDS = 1e4
-"""Ratio of two singular values, one after the other, at which they end; where they fade it is below 300."""
-POLES_TOLD = 1e-11
-"""Singular value, as part of the largest, down to which poles are told."""
 SPARE_VALUES = 4
 """Singular values beyond the degree, at least."""
 
@@ -252,7 +234,8 @@ def trace_test(
 ) -> Trace:
     """The trace test of the assemblies ``x (nx, N)`` of a member."""
     N, tracks = x.shape[1], 0
-    for _ in range(PENCILS):
+    # pencils of which one has to tell
+    for _ in range(4):
         pencil = _Pencil(equations, base, rng)
         phi = pencil.anywhere(pencil.first, rng)
         z, f, weights = np.zeros(0, dtype=complex), np.zeros(0, dtype=complex), np.zeros(0)
@@ -265,7 +248,8 @@ def trace_test(
             if found.passed:
                 return found
             poles = _poles(z, f, weights)
-            if len(z) > ENOUGH * len(poles):
+            # members for every pole at which a pencil that does not tell is left for another one
+            if len(z) > 5 * len(poles):
                 break
             phi = _beside(poles, rng)
             phi = np.concatenate([phi, pencil.anywhere(max(pencil.first, len(z)) - len(phi), rng)])
@@ -279,8 +263,10 @@ def rational(z: Array, f: Array, weights: Array) -> Trace:
     loewner, _ = _loewner(z, f, weights)
     sigma = np.linalg.svd(loewner, compute_uv=False)
     sigma = np.concatenate([sigma[:1], sigma]) / sigma[0] if sigma[0] > 0 else np.ones(1)
+    # singular value, as part of the largest, below which the Loewner matrix of a rational function ends
+    # ratio of two singular values, one after the other, at which they end; where they fade it is below 300
     ends = 1 + np.flatnonzero(
-        (sigma[1:-SPARE_VALUES] < RATIONAL) & (sigma[1:-SPARE_VALUES] * ENDS < sigma[: -SPARE_VALUES - 1])
+        (sigma[1:-SPARE_VALUES] < 1e-11) & (sigma[1:-SPARE_VALUES] * 1e4 < sigma[: -SPARE_VALUES - 1])
     )
     if not ends.size:
         return NOT_PASSED
@@ -301,7 +287,8 @@ def _poles(z: Array, f: Array, weights: Array) -> Array:
     """The poles that values tell."""
     loewner, shifted = _loewner(z, f, weights)
     U, sigma, Vt = np.linalg.svd(loewner)
-    rank = int((sigma > POLES_TOLD * sigma[0]).sum())
+    # singular value, as part of the largest, down to which poles are told
+    rank = int((sigma > 1e-11 * sigma[0]).sum())
     left, right = U[:, :rank].conj().T, Vt[:rank].conj().T
     return np.linalg.eigvals((left @ shifted @ right) / sigma[:rank, None])
 
@@ -311,8 +298,10 @@ def _beside(poles: Array, rng: np.random.Generator) -> Array:
     poles = poles[(np.abs(poles) < POLE_RANGE) & (np.abs(poles) > 1.0 / POLE_RANGE)]
     gaps = np.abs(poles[:, None] - poles)
     np.fill_diagonal(gaps, np.abs(poles))
-    gap = np.clip(gaps.min(axis=1, initial=np.inf), NEAREST * np.abs(poles), np.abs(poles))
-    near = np.repeat(poles, 2) + BY_POLE * np.repeat(gap, 2) * np.exp(2j * np.pi * rng.random(2 * len(poles)))
+    # the least that counts of the distance of two poles, as part of their size
+    gap = np.clip(gaps.min(axis=1, initial=np.inf), 1e-3 * np.abs(poles), np.abs(poles))
+    # distance of samples from a pole, as part of that to the next one
+    near = np.repeat(poles, 2) + 0.3 * np.repeat(gap, 2) * np.exp(2j * np.pi * rng.random(2 * len(poles)))
     return np.asarray(-1j * np.log(near))
 
 
@@ -325,7 +314,9 @@ class _Pencil:
         P = len(s.m.pairs)
         self.lines = np.zeros((6, len(self.family.bearers), 1), dtype=complex)
         self.along = _isotropic(self.family)
-        self.first = SAMPLES if self.along is None else SAMPLES_ALONG
+        # members of a pencil that are sampled first, of one with turns and of one along an isotropic direction; then as many again,
+        # until they tell
+        self.first = 48 if self.along is None else 16
         for chord, algebra in zip(s.chords.tolist(), self.family.loop_algebras, strict=True):
             self.lines[:, P + chord, 0] = _line(
                 algebra if self.along is None else np.append(np.zeros(3), self.along)[:, None], rng
@@ -344,7 +335,8 @@ class _Pencil:
     @staticmethod
     def anywhere(n: int, rng: np.random.Generator) -> Array:
         """Random ``phi (n,)``."""
-        return np.asarray(rng.uniform(-np.pi, np.pi, n) + 1j * PENCIL_SPREAD * rng.normal(size=n))
+        # standard deviation of the imaginary part of ``phi``
+        return np.asarray(rng.uniform(-np.pi, np.pi, n) + 1j * 1.2 * rng.normal(size=n))
 
     def sums(self, x: Array, phi: Array) -> tuple[Array, Array, Array]:
         """``z``, the sum and weights at pairs of members ``phi (n,)`` to both of which all tracks from ``x`` come."""
@@ -412,12 +404,8 @@ MOST_FOUND = 1200
 """Assemblies of one member from which on they are not looked for any further."""
 LOOP_ROUNDS, MOST_TRACKED = 60, 60_000
 """Rounds of loops at a member, and tracks in all, after which they are not either."""
-BATCH = 48
-"""Tracks followed together at least, of as many loops as it takes."""
 CANDIDATES = 6
 """Members of which the best one is kept."""
-ATTEMPTS = 8
-"""Random members tried until one is regular."""
 ONE_ASSEMBLY = 1e-6
 """Difference of link poses, against their size, up to which two assemblies are one."""
 
@@ -488,7 +476,8 @@ def start_set(family: Family, rng: np.random.Generator, progress: Callable[[str]
     Irregular
         where random members are not closed by regular equations.
     """
-    for _ in range(ATTEMPTS):
+    # random members tried until one is regular
+    for _ in range(8):
         closed = family.random_closed(rng)
         if closed is None:
             continue
@@ -556,7 +545,8 @@ class _Group:
                 progress(f"{N} assemblies of a random member, {self.quiet} loops without a further one")
             # so many that where none brings a further one they are enough, and no fewer than are followed at the cost of one
             enough = int(np.ceil(np.log(missed / self.chance) / -np.log(N + 1.0)))
-            loops = max(min(enough, TRACKS_TOGETHER // N), BATCH // N, 1)
+            # 48 tracks are followed together at least, of as many loops as it takes
+            loops = max(min(enough, TRACKS_TOGETHER // N), 48 // N, 1)
             there = self._round(family, loops, rng)
             poses = fingerprints(family, self.base, there)
             new = distinct(poses, self.known)
@@ -604,13 +594,12 @@ def _tame(equations: Equations, base: Member, x: Array, rng: np.random.Generator
 
 PACKED = Path(__file__).with_name("start-sets.npz")
 """Start sets that come with the package, one after the other: names are ``key/array``."""
-START_SET_VERSION = 6
-"""Of the files and of what start sets mean."""
 
 
 def key(labelling: Labelling) -> str:
     """What a start set serves for: the topology; where relations are kept, the geometry too."""
-    return f"{START_SET_VERSION}-{labelling.key}"
+    # 6: the version of the files and of what start sets mean
+    return f"6-{labelling.key}"
 
 
 def kept(family: Family) -> StartSet | None:

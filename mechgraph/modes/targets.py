@@ -41,25 +41,15 @@ from mechgraph.modes.form import RodFamily, RodStep, RodSystem, behind
 from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, Equations, Leg, follow, rounding
 from mechgraph.modes.start_sets import ONE_ASSEMBLY, StartSet, distinct
 
-RUNS = 4
-"""Runs of all tracks, at most."""
 RADIUS = 0.04
 """Distance from its end at which a track is led round."""
 ARCS = 12
 """States on a turn round the end."""
-TURNS_ROUND = 6
-"""Turns after which a track must be back."""
-BACK = 1e-5
-"""Difference up to which it is back."""
-NEAR_END = 0.7
-"""Part of the way up to which a track must have come for its end to be looked for."""
 FAR_NOISE, FAR_APART = 5e-2, 0.1
 """Rounding with which tracks may end far away, at what is plainly not real; largest difference, against their size, up to which such ends
 count as one."""
 REAL_SINGULAR = 1e-3
 """Difference of link poses at which ends may be one, or real, where rows are singular, so that they are known to the root of rounding."""
-ENDLESS = 6.0
-"""Imaginary part of an angle at an end from which on the assembly lies at infinity."""
 
 
 @dataclass
@@ -118,7 +108,8 @@ def _block(family: Family, start: StartSet, goals: Member, rng: np.random.Genera
     equations = Equations(family, start.mixing)
     every = [Ends.none(len(start.x), N) for _ in range(n)]
     left = np.arange(n)
-    for run in range(RUNS):
+    # runs of all tracks, at most
+    for run in range(4):
         care = Care(noise=FAR_NOISE) if run < 2 else Care(noise=FAR_NOISE).finer
         begin, x = start.member, start.x
         if run:
@@ -156,7 +147,8 @@ def _run(leg: Leg, x: Array, care: Care) -> _TrackRun:
     out = _TrackRun(
         tracked.x, tracked.arrived.copy(), np.zeros(x.shape[1], dtype=bool), np.zeros(x.shape[1], dtype=bool)
     )
-    doubtful = np.flatnonzero(~tracked.arrived & (tracked.s > NEAR_END))
+    # part of the way up to which a track must have come for its end to be looked for
+    doubtful = np.flatnonzero(~tracked.arrived & (tracked.s > 0.7))
     if doubtful.size:
         _endgame(leg, x[:, doubtful], doubtful, care, out)
     return out
@@ -173,7 +165,8 @@ def _endgame(leg: Leg, x: Array, tracks: Index, care: Care, out: _TrackRun) -> N
     begin, total = x.copy(), np.zeros_like(x)
     first = leg.prints(begin, np.full(len(kept), 1.0 - RADIUS), tracks)
     alive = np.arange(len(kept))
-    for turn in range(1, TURNS_ROUND + 1):
+    # turns after which a track must be back
+    for turn in range(1, 7):
         for k in range(ARCS):
             if not alive.size:
                 return
@@ -185,11 +178,13 @@ def _endgame(leg: Leg, x: Array, tracks: Index, care: Care, out: _TrackRun) -> N
             return
         now = leg.prints(x[:, alive], np.full(len(alive), 1.0 - RADIUS), tracks[alive])
         gap = np.abs(now - first[:, alive]).max(axis=0) / np.maximum(1.0, np.abs(now).max(axis=0))
-        back = alive[gap < BACK]
+        # difference up to which a track is back
+        back = alive[gap < 1e-5]
         if back.size:
             wound = np.abs(eq.wound(x[:, back] - begin[:, back])) > 1.0
             mean = total[:, back] / (turn * ARCS)
-            endless = wound | eq.far(mean, ENDLESS)
+            # imaginary part of an angle at an end from which on the assembly lies at infinity
+            endless = wound | eq.far(mean, 6.0)
             out.infinite[tracks[back[endless]]] = True
             good = back[~endless]
             out.x[:, tracks[good]] = mean[:, ~endless]
@@ -532,8 +527,6 @@ REAL = 0.5 * ONE_ASSEMBLY
 """Imaginary part of link poses up to which an assembly counts as real: of two that can be told from each other it is larger."""
 MOST_FOLLOWED = 5000
 """Tracks of a group to one position, at most: beyond that only real assemblies of the groups before are gone on with."""
-FAR_MODE = 700.0
-"""Size of poses of complex assemblies of a group with which the next group is not solved: it would be known to few digits."""
 
 
 def is_real(poses: Array, error: Array) -> Array:
@@ -586,7 +579,8 @@ class Product:
     def _limit(self, count: int, rest: int) -> None:
         """Only real assemblies are gone on with where there are too many, or they lie far away."""
         many, prints = np.bincount(self.at, minlength=len(self.out)) * count > MOST_FOLLOWED, self._prints(slice(None))
-        far = np.abs(prints).max(axis=0, initial=0.0) > FAR_MODE
+        # size of poses of complex assemblies of a group with which the next group is not solved: it would be known to few digits
+        far = np.abs(prints).max(axis=0, initial=0.0) > 700.0
         going = ~(many[self.at] | far) | is_real(prints, self.error)
         for i, modes in zip(self.at[~going].tolist(), self.count[~going].tolist(), strict=True):
             self.out[i].left_out += modes * count * rest

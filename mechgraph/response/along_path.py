@@ -191,30 +191,13 @@ class _AlongSite(Site):
         self.found = self.found + self._of_freedom(name)[1] * effort
 
 
-FIRST_PART = 0.8
-"""Length of path that is tabulated first (radians, or lengths / L); every further part is twice as long as the one before."""
-AGAIN = 0.1
-"""First step where the path is taken up again."""
-PIECE = 0.64
-"""Longest piece of one series (radians, or lengths / L)."""
 POINTS = 16
 """Points of a series; even, so that none lies in the middle."""
-FASTEST = 6.0
-"""Rate of another freedom against that of the coordinate at which the table ends."""
 AROUND = 0.64
 """Length of the piece with a change point in its middle: the accelerations of states beside it lose rounding over the cube of the
 distance, 5e-12 at the nearest point of the series."""
-SERIES_TAIL = 1e-12
-"""Part of the largest coefficient that the last two of a series may have; what a smooth series leaves out behind them is far smaller."""
-COEFFICIENT_NOISE = 1e-14
-"""Rounding of what a series is made of, times the square of the condition."""
-SHORTEST_PIECE = 1e-8
-"""Shortest piece: where branches all but cross, a path turns from one towards the other within the root of what opens the crossing."""
 AT_CROSSING = 0.01
 """Distance from a change point up to which a place counts as it."""
-NOT_FALLING = 0.3
-"""Part of the coefficients before them that the last ones of a series have where they are noise: those of a smooth series of that size
-(``NOISE``, against the largest term) fall by a hundred from four to four."""
 NOISE = 1e-9
 
 
@@ -243,7 +226,8 @@ class Way:
         self.follower = Follower(path)
         self.length, self.closed = 0.0, False
         self.crossings: list[Crossing] = []
-        self._next, self._ended = FIRST_PART, False
+        # length of path that is tabulated first (radians, or lengths / L); every further part is twice as long as the one before
+        self._next, self._ended = 0.8, False
         self._pieces: list[SeriesPiece] = []
         self._starts: list[float] = []
         here = Paths([self._drives(np.zeros(2))])
@@ -305,7 +289,8 @@ class Way:
     def _march(self, goal: float, careful: bool) -> Nodes:
         """Nodes from the last one on."""
         last = self._nodes.take(np.array([-1]))
-        start, first = float(last.place[0]), AGAIN if len(self._nodes) > 1 else PATH.first
+        # first step where the path is taken up again
+        start, first = float(last.place[0]), 0.1 if len(self._nodes) > 1 else PATH.first
         paths = Paths([self._drives(np.array([start, goal]))])
         found = self.follower.follow(last.x, paths, first, last.which, careful).nodes
         return replace(found, place=start + found.place)
@@ -345,7 +330,8 @@ class Way:
         """How far the coordinate serves: to before the first node at which another freedom moves much faster."""
         nodes, singles = self._nodes, self.path.system.single_rows >= 0
         near = np.array([np.abs(nodes.place - c.place) < AT_CROSSING for c in self.crossings]).any(axis=0)
-        steep = np.flatnonzero((np.abs(nodes.Z[singles]).max(axis=(0, 1)) > FASTEST) & ~near)
+        # rate of another freedom against that of the coordinate at which the table ends
+        steep = np.flatnonzero((np.abs(nodes.Z[singles]).max(axis=(0, 1)) > 6.0) & ~near)
         return float(nodes.place[max(int(steep[0]) - 1, 0)]) if steep.size else self._reached
 
     # --- tabulating ------------------------------------------------------------------------------------------------------
@@ -377,9 +363,11 @@ class Way:
         while spans:
             again = []
             for (a, b), c, steepness, noise in zip(spans, *self._series(spans), strict=True):
+                # shortest piece: where branches all but cross, a path turns from one towards the other within the root of what opens
+                # the crossing
                 if (
                     (_coarse(c, noise) or b - a > POINTS * self._step(a, b))
-                    and b - a > SHORTEST_PIECE
+                    and b - a > 1e-8
                     and not (np.abs(middles - 0.5 * (a + b)) < 0.25 * (b - a)).any()
                 ):
                     again += [(a, 0.5 * (a + b)), (0.5 * (a + b), b)]
@@ -405,7 +393,8 @@ class Way:
         out = []
         for a, b in pairwise(np.unique(cuts).tolist()):
             whole = any(a < place < b for place in places)
-            edges = np.linspace(a, b, 1 + (1 if whole else max(1, int(np.ceil((b - a) / PIECE - 1e-9)))))
+            # longest piece of one series (radians, or lengths / L)
+            edges = np.linspace(a, b, 1 + (1 if whole else max(1, int(np.ceil((b - a) / 0.64 - 1e-9)))))
             out += list(pairwise(edges.tolist()))
         return out
 
@@ -420,7 +409,8 @@ class Way:
         T = np.polynomial.chebyshev.chebvander(nodes, POINTS - 1) * (2.0 / POINTS)
         T[:, 0] *= 0.5
         # rounding over the square of the distance from a singular position, which the condition measures
-        noise = COEFFICIENT_NOISE * condition.max(axis=1) ** 2
+        # rounding of what a series is made of, times the square of the condition
+        noise = 1e-14 * condition.max(axis=1) ** 2
         return np.einsum("pk,spq->skq", T, values), steepness.max(axis=1), noise
 
     def _tabulated_at(self, at: Array) -> tuple[Array, Array, Array]:
@@ -444,17 +434,17 @@ def _coarse(c: Array, noise: float) -> bool:
     # the mass beside itself, forces beside what gives the mass an acceleration of one as well, places beside one (radian, length / L)
     of_forces, others = np.full(OF_LOADS - 1, size[:2].max()), np.maximum(size[OF_LOADS:], 1.0)
     largest = np.concatenate([size[:1], of_forces, others])
-    rounding = (last > NOT_FALLING * late) & (last < max(NOISE, noise) * largest)
-    small = tail <= SERIES_TAIL * np.maximum(size, 1e-3 * largest)
+    # part of the coefficients before them that the last ones of a series have where they are noise: those of a smooth series of that
+    # size (``NOISE``, against the largest term) fall by a hundred from four to four
+    rounding = (last > 0.3 * late) & (last < max(NOISE, noise) * largest)
+    # part of the largest coefficient that the last two of a series may have; what a smooth series leaves out behind them is far
+    # smaller
+    small = tail <= 1e-12 * np.maximum(size, 1e-3 * largest)
     return bool(not (small | rounding).all())
 
 
-FAST = 2.0
-"""Rate of another freedom against that of the coordinate above which it becomes the coordinate."""
 FURTHEST = 4.0 * np.pi
 """Distance beyond what is tabulated to which a trial step may lead; what is further off asks for a shorter one."""
-UNEVEN = 0.37
-"""Where in its part of a turn loads are compared with those a turn later: not at the quarters, where change points often are."""
 PERIODIC = 1e-9
 """Difference of poses (and part of the largest term) after a turn of the coordinate up to which the path has come back."""
 
@@ -544,7 +534,8 @@ class Arc:
         turned = sense * (ends.x[rows, 1] - ends.x[rows, 0])
         out[rows] = s.rounds(singles, turned)
         # a smooth load may count turns, as a spring in a freedom does that winds up: then nothing comes back
-        around = self.close(self.begin + sense * self.turn * (np.arange(POINTS) + UNEVEN) / POINTS)
+        # where in its part of a turn loads are compared with those a turn later: not at the quarters, where change points often are
+        around = self.close(self.begin + sense * self.turn * (np.arange(POINTS) + 0.37) / POINTS)
         further = Configuration(s, around.here.x + sense * out[:, None])
         loads, factored = self.terms.smooth, self.path.solver.factored(further, around.f.which)
         now, then = along_one(around.here, around.f, loads), along_one(further, factored, loads)
@@ -627,7 +618,8 @@ class PathStage:
     def accepted(self, t: float, y: Array) -> bool:
         """See ``Stage``."""
         self._terms(float(y[0]))
-        return self._piece is not None and self._piece.steepness <= FAST
+        # rate of another freedom against that of the coordinate above which it becomes the coordinate
+        return self._piece is not None and self._piece.steepness <= 2.0
 
     def following(self, t: float, y: Array) -> PathStage:
         """See ``Stage``."""

@@ -51,20 +51,10 @@ from mechgraph.result.trajectory import BlockMotion, Trajectory
 
 Law = Callable[[float], tuple[float, float, float]]
 """Position, velocity and acceleration at a time."""
-PANELS = 256
-"""Panels from the beginning to the end."""
-AGREEING_CHANGE = 1e-5
-"""Part of the change in a panel up to which it agrees with the rate: what interpolated tables of both may differ by."""
 NOISE_OF_MOTION = 1e-13
 """The same of the quantity itself."""
-PANEL_HALVINGS = 24
-"""Most halvings of a panel."""
 HALVINGS_ALIKE = 6
 """Halvings in which the part by which a rate is off stays alike, in both halves, where the rate is wrong."""
-IS_JUMP = 10.0
-"""Change against what the rate says from which on it is a jump."""
-OF_SAMPLES = (0.1, 0.75)
-"""Part of the largest rate by which changes between samples may miss it; of accelerations more, as they may jump between two samples."""
 QUANTITIES = ("position", "velocity", "acceleration")
 _PLACES, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 
@@ -87,7 +77,7 @@ class _TimePanel:
 
 def differentiated(law: Law, begin: float, end: float) -> str | tuple[float, ...]:
     """Times at which the acceleration of a motion jumps, or what is wrong with its rates between two times."""
-    breaks, edges = [], np.linspace(begin, end, PANELS + 1).tolist()
+    breaks, edges = [], np.linspace(begin, end, 257).tolist()  # 256 panels
     rounding = NOISE_OF_MOTION * np.abs([law(t) for t in edges]).max(axis=0)[:2]
     for a, b in pairwise(edges):
         panel = _panel(law, a, b, rounding)
@@ -105,7 +95,8 @@ def _panel(law: Law, a: float, b: float, rounding: Array) -> _TimePanel:
     ends = np.array([law(a), law(b)])
     change, said = (ends[1] - ends[0])[:2], 0.5 * h * (_WEIGHTS @ inside)[1:]
     largest = np.abs(np.concatenate([ends, inside])).max(axis=0)
-    allowed = AGREEING_CHANGE * h * largest[1:] + rounding
+    # part of the change in a panel up to which it agrees with the rate: what interpolated tables of both may differ by
+    allowed = 1e-5 * h * largest[1:] + rounding
     part = np.abs(change - said) / np.where(allowed > 0.0, allowed, np.inf)
     k = int(np.argmax(part))
     return _TimePanel(a, b, float(part[k]), k, float(change[k]), float(said[k]), float(h * largest[k + 1]))
@@ -114,7 +105,7 @@ def _panel(law: Law, a: float, b: float, rounding: Array) -> _TimePanel:
 def _narrowed(law: Law, panel: _TimePanel, rounding: Array) -> str | list[float]:
     """What is wrong in a panel, or the time at which an acceleration jumps there, if any."""
     parts: list[float] = []
-    for _ in range(PANEL_HALVINGS):
+    for _ in range(24):  # halvings of a panel, at most
         middle = 0.5 * (panel.begin + panel.end)
         halves = [_panel(law, *ends, rounding) for ends in ((panel.begin, middle), (middle, panel.end))]
         worse = max(halves, key=lambda half: half.part)
@@ -127,7 +118,8 @@ def _narrowed(law: Law, panel: _TimePanel, rounding: Array) -> str | list[float]
                 f"its {QUANTITIES[panel.order]} changes by {panel.change:.6g} from t = {panel.begin:.9g} to {panel.end:.9g}, where its "
                 f"{QUANTITIES[panel.order + 1]} says {panel.said:.6g}; give the derivatives of the position"
             )
-    if abs(panel.change - panel.said) > IS_JUMP * panel.size:
+    # change against what the rate says from which on it is a jump
+    if abs(panel.change - panel.said) > 10.0 * panel.size:
         jump = f"jumps by {panel.change - panel.said:.6g} at t = {panel.begin:.6g}"
         return f"its {QUANTITIES[panel.order]} {jump}; give a motion that goes there"
     return [_jump(law, panel.begin, panel.end)]
@@ -146,7 +138,9 @@ def samples_fault(t: Array, rows: Array) -> str:
     """What is wrong with the rates of samples ``rows (T, 3)`` at times ``(T,)``; empty where nothing is."""
     h, change, mean = np.diff(t), np.diff(rows, axis=0), 0.5 * (rows[1:] + rows[:-1])
     said = h * mean[:, 1] - h**2 / 12.0 * change[:, 2], h * mean[:, 2]
-    for order, (integral, most) in enumerate(zip(said, OF_SAMPLES, strict=True)):
+    # part of the largest rate by which changes between samples may miss it; of accelerations more, as they may jump between two
+    # samples
+    for order, (integral, most) in enumerate(zip(said, (0.1, 0.75), strict=True)):
         off = np.abs(change[:, order] - integral)
         allowed = most * h * np.abs(rows[:, order + 1]).max() + NOISE_OF_MOTION * np.abs(rows[:, order]).max()
         i = int(np.argmax(off - allowed))
@@ -265,10 +259,6 @@ def read_motions(m: Mechanism, motions: Mapping[str, Any], times: Array, faults:
             breaks += found
     faults += [law for law in laws.values() if isinstance(law, str)]
     return Prescribed({name: law for name, law in laws.items() if not isinstance(law, str)}, breaks)
-
-
-NUDGE = 1e-7
-"""Part of a coordinate (or of one) by which it is changed for a derivative."""
 
 
 @dataclass(frozen=True)
@@ -409,7 +399,8 @@ class ChartStage:
 
     def jacobian(self, t: float, y: Array) -> Array:
         """See ``Stage``: forward differences, all evaluated in one batch."""
-        size = NUDGE * np.maximum(1.0, np.abs(y[:-1]))
+        # part of a coordinate (or of one) by which it is changed for a derivative
+        size = 1e-7 * np.maximum(1.0, np.abs(y[:-1]))
         places = y[:, None] + np.pad(np.diag(size), ((0, 1), (1, 0)))
         f = (
             self._rates(t, places)

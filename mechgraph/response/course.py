@@ -34,10 +34,6 @@ from mechgraph.result.values import ranges
 
 LOST_ENERGY = 1e-3
 """Error of the balance of energies, of the greatest one, from which on a motion in time is doubtful."""
-ROUNDING = 1e-9
-"""Energies, of the potential energy, that are rounding: nothing moves."""
-STEPS_LOOKED_AT = 100
-"""Steps at which the greatest energy of a motion is looked for."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +74,8 @@ class Energy(Shown):
         """The greatest energy, counted from the start, or work; 0 where that is rounding of the potential energy."""
         parts = self.kinetic, self.potential - self.start, self.work
         size = max(float(np.abs(part).max(initial=0.0)) for part in parts)
-        return size if size > ROUNDING * float(np.abs(self.potential).max(initial=0.0)) else 0.0
+        # energies, of the potential energy, that are rounding: nothing moves
+        return size if size > 1e-9 * float(np.abs(self.potential).max(initial=0.0)) else 0.0
 
     def document(self) -> Document:
         """Ranges over the output times."""
@@ -231,7 +228,8 @@ class Course:
     def greatest(self) -> float:
         """The greatest energy of the motion at its steps, of many at some of them."""
         ends = np.array([self.begin, *(segment.end for segment in self.integration.segments)])
-        return self.response(ends[:: max(1, len(ends) // STEPS_LOOKED_AT)]).energy.greatest
+        # steps at which the greatest energy of a motion is looked for
+        return self.response(ends[:: max(1, len(ends) // 100)]).energy.greatest
 
     def _read(self, times: Array) -> tuple[Trajectory, Array, Array, Array]:
         """The trajectory at times, with kinetic and potential energy and work, flat."""

@@ -39,14 +39,6 @@ from mechgraph.result.values import bracket, number
 
 STENCIL = ((1, 4 / 5), (2, -1 / 5), (3, 4 / 105), (4, -1 / 280))
 """Steps and weights of the first derivative by central differences of eighth order."""
-LENGTHS = 8
-"""Most lengths."""
-SHRINK = 0.25
-"""Every length against the one before."""
-SETTLED = 1e-10
-"""Difference of two derivatives, of the largest, from which on they agree as well as rounding lets them."""
-UNSETTLED = 1e-3
-"""The same above which no derivative is known."""
 CORNER = 1e-6
 """Difference of the slopes to both sides, or of the values there, of the largest, that is one where it does not fall with the length."""
 FALLS = 0.5
@@ -71,8 +63,8 @@ def settled_slopes(values: Callable[[Array], Array], n: int, first: float) -> Sl
     eye, signs = np.eye(n), [(sign * k, sign * weight) for k, weight in STENCIL for sign in (1.0, -1.0)]
     known: list[tuple[Array, Array, Array, Array]] = []
     best: tuple[Array, Array] | None = None
-    for i in range(LENGTHS):
-        h = first * SHRINK**i
+    for i in range(8):  # lengths, at most
+        h = first * 0.25**i
         f = values(np.concatenate([np.zeros((n, 1)), *(k * h * eye for k, _ in signs)], axis=1))
         if not np.isfinite(f).all():
             continue
@@ -87,14 +79,16 @@ def settled_slopes(values: Callable[[Array], Array], n: int, first: float) -> Sl
         if best is None or error.max() < best[1].max():
             # of the first two the longer one has less rounding, later on the shorter one bends less
             best = (known[0][1] if len(known) == 2 else slopes), error
-        if error.max() <= SETTLED * scale:
+        # difference of two derivatives, of the largest, from which on they agree as well as rounding lets them
+        if error.max() <= 1e-10 * scale:
             break
     if not known:
         return None
     if best is None:
         best = known[0][1], np.full(known[0][1].shape, np.inf)
     largest = max(float(np.abs(one[1]).max(initial=0.0)) for one in known) or 1.0
-    off = (best[1] > UNSETTLED * largest).any(axis=0)
+    # difference of two derivatives, of the largest, above which none is known
+    off = (best[1] > 1e-3 * largest).any(axis=0)
     if len(known) > 1:
         (*_, wide, apart), (*_, corner, jump) = known[-2], known[-1]
         off |= ((corner > FALLS * wide) & (corner > CORNER * largest)).any(axis=0)
@@ -104,10 +98,6 @@ def settled_slopes(values: Callable[[Array], Array], n: int, first: float) -> Sl
 
 STEP = 0.004
 """First length of differences (radians, lengths / L); their error and rounding are both near 1e-13 where forces bend within 0.3."""
-RATE_STEP = 0.25
-"""The same of rates (radians, lengths / L, a unit of time)."""
-NOISE_OF_FORCES = 1e-12
-"""Rounding of the differences, of the largest force."""
 
 
 @dataclass(frozen=True)
@@ -196,10 +186,12 @@ class RestPlace:
             f = self.chart.solver.factored(here, np.repeat(self.chart.which, v.shape[1]))
             return self.forces(ClosedChart(here, f, np.ones(v.shape[1], dtype=bool)), v)[0]
 
-        rates = settled_slopes(moving, n, RATE_STEP)
+        # first length of differences of rates (radians, lengths / L, a unit of time)
+        rates = settled_slopes(moving, n, 0.25)
         assert rates is not None  # the position is closed
         M = self.forces(one, np.zeros((n, 1)))[1][..., 0]
-        noise = NOISE_OF_FORCES * self.largest() + place.error
+        # rounding of the differences, of the largest force
+        noise = 1e-12 * self.largest() + place.error
         return Derivatives(place.values, M, -rates.slopes, -place.slopes, noise, place.unsettled, rates.unsettled)
 
     def solution(self) -> Solution:
@@ -225,14 +217,10 @@ LONGEST_EQUILIBRIUM_STEP = 0.3
 """Longest of them (radians, lengths / L)."""
 PUSH = 0.05
 """Length of the step by which an unstable equilibrium is left."""
-SHORTENINGS = 40
-"""Most halvings of a step that does not lead downhill, or to where the loops do not close."""
 BALANCED = 1e-12
 """Generalized force, against the largest that a load exerts on the way, that counts as none."""
 STIFF = 1e-9
 """Eigenvalue of the stiffness, against the largest, that counts as none: neither stable nor unstable."""
-GROWS = 1e-7
-"""Part of the fastest rate at which a small motion grows or dies away above which it does."""
 EndKind = Literal["stable", "nearest"]
 
 STABLE = {True: "stable", False: "unstable", None: "neither stable nor unstable to second order"}
@@ -407,7 +395,8 @@ def _step(d: Derivatives, w: Array, U: Array, balanced: float, longest: float) -
 
 def _shortened(place: RestPlace, Q: Array, step: Array, noise: float) -> tuple[float, Array, Array | None]:
     """A step, or a shorter one, along which the loads do work: the work, the step, and the state; None where there is none."""
-    for _ in range(SHORTENINGS):
+    # most halvings of a step that does not lead downhill, or to where the loops do not close
+    for _ in range(40):
         at = place.closed(step[:, None] * np.array([0.5, 1.0]))
         if at.done.all():
             middle, end = place.forces(at, np.zeros((place.n, 2)))[0].T
@@ -433,20 +422,13 @@ def _stability(d: Derivatives, kept: Array) -> bool | None:
         scipy.linalg.eigvals(np.block([[still, unit], [-K, -C]]), np.block([[unit, still], [still, M]])), dtype=complex
     )
     s = s[np.isfinite(s)]
-    slow = GROWS * float(np.abs(s).max(initial=0.0))
+    # part of the fastest rate at which a small motion grows or dies away above which it does
+    slow = 1e-7 * float(np.abs(s).max(initial=0.0))
     return False if (s.real > slow).any() else True if (s.real < -slow).all() and not d.bent else None
 
 
-UNBALANCED = 1e-6
-"""Generalized force, against the largest that a load exerts, above which a position is said to be none of equilibrium."""
 MODES_SHOWN, AMPLITUDES_SHOWN = 8, 4
 """Most motions, and of each the most amplitudes, that are shown."""
-SAME_MOTION = 1e-9
-"""Difference of the rates of two freedoms up to which they move alike, as two hinges on one line do."""
-STANDING = 1e-12
-"""Rate of a motion, of the fastest, that is none."""
-UNRESISTED = 10.0
-"""Stiffness, against its rounding, up to which there is none."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -501,7 +483,8 @@ class Linearized(Shown):
         for name in sorted(moving, key=lambda name: (name not in said, -abs(shape[name]))):
             i = names.index(name)
             rows = [self.motions[i] - sign * self.motions[j] for j in told for sign in (1.0, -1.0)]
-            if not any(np.abs(row).max() <= SAME_MOTION * np.abs(self.motions[i]).max() for row in rows):
+            # difference of the rates of two freedoms up to which they move alike, as two hinges on one line do
+            if not any(np.abs(row).max() <= 1e-9 * np.abs(self.motions[i]).max() for row in rows):
                 told.append(i)
         return [names[i] for i in told[:AMPLITUDES_SHOWN]]
 
@@ -524,7 +507,8 @@ class Linearized(Shown):
         R = scipy.linalg.null_space(self.unresisted.T) if k else np.eye(n)
         lower = -np.linalg.solve(self.M, np.concatenate([self.K @ R, self.C], axis=1))
         w, V = np.linalg.eig(np.concatenate([np.concatenate([np.zeros((n - k, n - k)), R.T], axis=1), lower]))
-        still = np.abs(w) <= STANDING * np.abs(w).max(initial=0.0)
+        # rate of a motion, of the fastest, that is none
+        still = np.abs(w) <= 1e-12 * np.abs(w).max(initial=0.0)
         w, V = w[~still], V[n - k :, ~still]
         kept = np.flatnonzero(w.imag > 0) if 2 * (w.imag > 0).sum() == len(w) else np.flatnonzero(w.imag >= 0)
         kept = kept[np.argsort(np.abs(w[kept]), kind="stable")]
@@ -598,7 +582,8 @@ def linearize(m: Mechanism, at: Mapping[str, float] | None = None, *, engine: En
     largest = max(place.largest(), float(np.abs(d.K).max()) * STEP)
     s, free, names = place.task.system, place.chart.free, m.freedom_names()
     said = []
-    if np.abs(d.Q).max() > UNBALANCED * largest:
+    # generalized force, against the largest that a load exerts, above which a position is said to be none of equilibrium
+    if np.abs(d.Q).max() > 1e-6 * largest:
         said.append(
             f"is not in equilibrium there (generalized forces of {np.abs(d.Q).max() / largest:.2g} of the largest that a load exerts); "
             "mg.equilibrium(m) finds a position that is"
@@ -628,4 +613,5 @@ def linearize(m: Mechanism, at: Mapping[str, float] | None = None, *, engine: En
 def _unresisted(K: Array, noise: Array) -> Array:
     """Orthonormal motions ``(n, k)`` of which the stiffness is rounding."""
     _, sizes, V = np.linalg.svd(K)
-    return np.asarray(V[sizes <= UNRESISTED * np.linalg.norm(noise)].T)
+    # stiffness, against its rounding, up to which there is none
+    return np.asarray(V[sizes <= 10.0 * np.linalg.norm(noise)].T)

@@ -55,14 +55,8 @@ from mechgraph.result.solution import Solution
 
 POINTS_OF_STEP = 16
 """Chebyshev points of a step."""
-FEWEST_LOOKS = 64
-"""Fewest places between them at which is looked."""
 OF_ALL = 2000
 """Places at which is looked from the beginning of a motion to its end: a pulse longer than this part of it is seen."""
-OVERLOOKED = 100.0
-"""Change of a rate, against the tolerance of a step, up to which a difference is left to the error estimate of the step."""
-SHORTER = 0.25
-"""Part of a step that was refused with which the next is tried."""
 
 _AT = np.cos(np.pi * (np.arange(POINTS_OF_STEP) + 0.5) / POINTS_OF_STEP)
 _SERIES = np.polynomial.chebyshev.chebvander(_AT, POINTS_OF_STEP - 1) * (2.0 / POINTS_OF_STEP)
@@ -76,22 +70,18 @@ def overlooked(by_time: Callable[[Array], Array], begin: float, end: float, apar
     (k,)``: changes of the rates within the tolerance.
     """
     h = end - begin
-    places = np.linspace(-1.0, 1.0, max(FEWEST_LOOKS, int(np.ceil(h / apart))) + 1)
+    # fewest places between them at which is looked
+    places = np.linspace(-1.0, 1.0, max(64, int(np.ceil(h / apart))) + 1)
     found = by_time(begin + 0.5 * h * (1.0 + np.concatenate([_AT, places])))
     smooth = (found[:, :POINTS_OF_STEP] @ _SERIES) @ np.polynomial.chebyshev.chebvander(places, POINTS_OF_STEP - 1).T
     missed = h * np.abs(found[:, POINTS_OF_STEP:] - smooth).max(axis=1)
-    return bool((missed > OVERLOOKED * allowed).any())
+    # change of a rate, against the tolerance of a step, up to which a difference is left to the error estimate of the step
+    return bool((missed > 100.0 * allowed).any())
 
 
-ACCURACY = 1e-12
-"""Part of a step to which the time of an event is found."""
-LOOKS = 8
-"""Parts of a step at whose ends a height is looked at."""
 BESIDE_ENDS = 1e-5
 """Part of a step beside its ends at which is looked too, so that a height that turns in the first or last part is seen to."""
-TURN_FOUND = 1e-9
-"""Part of a step to which the place of a turn is found; the height there is found to the square of it."""
-WATCHED_IN_STEP = np.union1d(np.linspace(0.0, 1.0, LOOKS + 1), [BESIDE_ENDS, 1.0 - BESIDE_ENDS])
+WATCHED_IN_STEP = np.union1d(np.linspace(0.0, 1.0, 9), [BESIDE_ENDS, 1.0 - BESIDE_ENDS])
 """Places of looks at events in a step of length 1."""
 LOOKS_IN_STEP = np.union1d(WATCHED_IN_STEP, 0.5 ** np.arange(4, 20))
 """Parts of a step at which stops are looked at: closely behind its beginning, where a freedom may have just left its stop."""
@@ -172,11 +162,12 @@ def with_turns(height: Callable[[Array], Array], t: Array, h: Array) -> tuple[Ar
         if size[i] == size[i - 1] == size[i + 1]:
             continue
         side = float(np.sign(h[i]))
+        # part of a step to which the place of a turn is found; the height there is found to the square of it
         found = scipy.optimize.minimize_scalar(
             lambda at, side=side: side * float(height(np.array([at]))[0]),
             bounds=(t[i - 1], t[i + 1]),
             method="bounded",
-            options={"xatol": TURN_FOUND * (t[i + 1] - t[i - 1])},
+            options={"xatol": 1e-9 * (t[i + 1] - t[i - 1])},
         )
         if found.fun < 0.0:
             times.append(np.array([found.x]))
@@ -187,8 +178,9 @@ def with_turns(height: Callable[[Array], Array], t: Array, h: Array) -> tuple[Ar
 
 def first_root(height: Callable[[Array], Array], begin: float, end: float) -> float:
     """The time between two at which a height of opposite signs there is zero."""
+    # part of a step to which the time of an event is found
     root = scipy.optimize.brentq(
-        lambda t: float(height(np.array([t]))[0]), begin, end, xtol=ACCURACY * (end - begin), rtol=1e-15
+        lambda t: float(height(np.array([t]))[0]), begin, end, xtol=1e-12 * (end - begin), rtol=1e-15
     )
     return float(root)
 
@@ -205,12 +197,6 @@ def read_events(m: Mechanism, events: Any, faults: list[str]) -> tuple[Event, ..
 EXPLICIT = ("RK23", "RK45", "DOP853")
 LOOK = 500
 """Steps after which the length of steps is looked at."""
-TOLD_FROM = 100_000
-"""Steps to come from which on the user is told: minutes."""
-SHORTEST = 1e-13
-"""Part of the time below which a step is rounding."""
-GIVEN_UP_FROM = 1e8
-"""Steps to come from which on the motion is given up: hours and days."""
 
 
 class Stage(Protocol):
@@ -322,7 +308,8 @@ class Integration:
                     # trial steps may be far too long; what overflows there is taken back
                     with np.errstate(over="ignore", invalid="ignore"):
                         message = stepper.step()
-                    rounding = stepper.t - t <= SHORTEST * max(abs(t), abs(stepper.t))
+                    # part of the time below which a step is rounding
+                    rounding = stepper.t - t <= 1e-13 * max(abs(t), abs(stepper.t))
                     known = bool(np.isfinite(stepper.y).all())
                     if stepper.status == "failed" or (rounding and not known):
                         raise Stopped(
@@ -330,7 +317,8 @@ class Integration:
                             "only links without inertia move; for stiff loads use method='Radau'".strip()
                         )
                     if not known or (not rounding and self._missed(stage, t, stepper)):
-                        h = SHORTER * (stepper.t - t)
+                        # part of a step that was refused with which the next is tried
+                        h = 0.25 * (stepper.t - t)
                         break
                     self.work.steps += 1
                     self.segments.append(Segment(t, stepper.t, stage, stepper.dense_output(), work))
@@ -382,9 +370,11 @@ class Integration:
             f"at the length of the last {LOOK} steps of {self.method}, some {left:.0e} more lead to t = {end:g}; where loads are stiff, "
             "method='Radau' takes far fewer. Loads that jump, as dry friction does, want to be smoothed"
         )
-        if left > GIVEN_UP_FROM:
+        # steps to come from which on the motion is given up: hours and days
+        if left > 1e8:
             raise Stopped(message)
-        if left > TOLD_FROM and not self._told:
+        # steps to come from which on the user is told: minutes
+        if left > 100_000 and not self._told:
             self._told = True
             warnings.warn(f"{message}. An interrupt keeps what there is", MechgraphWarning, stacklevel=2)
 
@@ -410,8 +400,6 @@ class Integration:
             yield places, first.stage, y, work
 
 
-IMMOVABLE = 1e-12
-"""Rate of a freedom for unit rates of the independent ones below which these do not move it."""
 TOUCHING = 1e-9
 """Gap (radians, lengths / L) up to which a stop counts as closed."""
 LOWEST = 1e-9
@@ -598,7 +586,8 @@ class _Free:
         self.sign = np.array([limit.sign for limit in closed])
         self.Z = found.columns.Z[..., 0]
         G = self.sign[:, None] * self.Z[self.columns]
-        self.moves = np.abs(G).max(axis=1, initial=0.0) > IMMOVABLE
+        # rate of a freedom for unit rates of the independent ones below which these do not move it
+        self.moves = np.abs(G).max(axis=1, initial=0.0) > 1e-12
         self.impulse_to_rate, left = np.zeros(G.T.shape), np.zeros(G.T.shape)
         for i in np.flatnonzero(self.moves):
             (self.impulse_to_rate[:, [i]], left[:, [i]]) = accelerations(self.mass, G[i][:, None])

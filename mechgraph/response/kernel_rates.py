@@ -108,10 +108,6 @@ class KernelRates:
         return EvaluatedRates(self._out[:-2].copy(), steepness, condition, found)
 
 
-MOST_NODES = 256
-"""Nodes of a path that are found at once."""
-
-
 class KernelPath:
     """The tables of a mechanism of mobility 1, by the coordinate of one freedom, with the library that evaluates them."""
 
@@ -123,7 +119,8 @@ class KernelPath:
         """Distances ``(n,)`` and states ``(nx, n)`` of the nodes of certified steps from a closed state ``x (nx,)`` towards a place of
         the coordinate; up to there, or to where a step is refused.
         """
-        out = np.empty((MOST_NODES, 1 + len(x)))
+        # nodes of a path that are found at once
+        out = np.empty((256, 1 + len(x)))
         known = (*self._tables, self._memory, np.ascontiguousarray(x))
         n = self._library.mgk_nodes(*map(pointer, known), ctypes.c_double(end), ctypes.c_int(len(out)), pointer(out))
         return out[:n, 0], out[:n, 1:].T

@@ -59,18 +59,8 @@ from mechgraph.model.loads import Load
 STEEPEST = 3.0
 """Largest rate of a freedom for unit rates of the independent ones, against that where the chart was laid out, before a new one is; and
 the same of a condition that is poor."""
-MOST_TURNED = 1.0
-"""Angle of an independent rotation from where the chart was laid out above which a new one is."""
-CLOSING_STEPS = 12
-"""Most Newton steps to a closed state."""
 LAST_STEP = 1e-13
 """Newton step from which on a state counts as closed; the step before it was a millionth, so that only rounding is left."""
-NOISE_OF_STEP = 1e-15
-"""The same of a step that is rounding, as a part of the condition."""
-LOST = 1.0
-"""Correction above which closing is given up: the step was too long."""
-UNMOVED_BY_SPIN = 1e-9
-"""Rate of a freedom in a unit passive motion below which it has no part in it."""
 
 
 class Stopped(Exception):
@@ -140,7 +130,8 @@ class Chart:
 
     def worn(self, steepness: float, condition: float, u: Array) -> bool:
         """Whether another chart should take over at a state with coordinates ``u (n,)``, so steep and of this condition."""
-        far = self.turns and np.abs(u[self._singles < 0]).max(initial=0.0) > MOST_TURNED
+        # angle of an independent rotation from where the chart was laid out above which a new one is
+        far = self.turns and np.abs(u[self._singles < 0]).max(initial=0.0) > 1.0
         poor = not condition < max(PATH.doubtful, STEEPEST * self.condition)
         return bool(far or poor or steepness > STEEPEST * self.steepness)
 
@@ -165,7 +156,8 @@ class Chart:
         single = self._singles >= 0
         x[self._singles[single]] = self.x0[self._singles[single], None] + u[single]
         total, before = np.zeros(x.shape[1]), np.full(x.shape[1], np.inf)
-        for _ in range(CLOSING_STEPS):
+        # Newton steps to a closed state, at most
+        for _ in range(12):
             here = Configuration(s, x)
             f = self.solver.factored(here, np.repeat(self.which, here.T))
             step = f.solve(-here.residual[:, None])[:, 0]
@@ -180,11 +172,12 @@ class Chart:
                 size = np.maximum(size, np.abs(u - y[self.free]).max(axis=0, initial=0.0))
             total = total + size
             with np.errstate(invalid="ignore"):
-                # below what is asked for, or twice below what rounding allows where the condition is poor
-                most = np.maximum(10 * LAST_STEP, NOISE_OF_STEP * f.condition)
+                # below what is asked for, or twice below what rounding (1e-15) allows where the condition is poor
+                most = np.maximum(10 * LAST_STEP, 1e-15 * f.condition)
                 closed = (size <= LAST_STEP) | ((size <= most) & (before <= most))
             before = size
-            if closed.all() or not np.isfinite(size).all() or (total > LOST).any():
+            # correction above which closing is given up: the step was too long
+            if closed.all() or not np.isfinite(size).all() or (total > 1.0).any():
                 break
             x = s.advance(x, step)
         return ClosedChart(here, f, closed & (here.closure <= PATH.accepted), self.held)
@@ -200,7 +193,8 @@ def _leading(null: Array) -> Index:
 def _apart(null: Array, held: tuple[PassiveMotion, ...]) -> tuple[Index, Index]:
     """Freedoms that stand for the passive motions among ``null (F, n)``, and those for the others, which no passive motion moves."""
     passive = np.stack([motion.rates / np.linalg.norm(motion.rates) for motion in held], axis=1)
-    still = np.flatnonzero(np.abs(passive).max(axis=1) < UNMOVED_BY_SPIN)
+    # rate of a freedom in a unit passive motion below which it has no part in it
+    still = np.flatnonzero(np.abs(passive).max(axis=1) < 1e-9)
     count = null.shape[1] - len(held)
     moving = still[_leading(null[still])[:count]]
     if np.linalg.matrix_rank(null[moving]) < count:
@@ -211,8 +205,6 @@ def _apart(null: Array, held: tuple[PassiveMotion, ...]) -> tuple[Index, Index]:
 
 
 SIX = np.arange(6)
-SOUND = 1e-7
-"""Smallest pivot, against unit rows, from which on a factorization is trusted; below, motions may have no inertia."""
 
 
 def saddle_accelerations(
@@ -246,7 +238,8 @@ def saddle_accelerations(
         factors = Factors(A)
     except RuntimeError:  # exactly singular
         return None
-    if np.abs(factors.lu.U.diagonal()).min() < SOUND:
+    # smallest pivot, against unit rows, from which on a factorization is trusted; below, motions may have no inertia
+    if np.abs(factors.lu.U.diagonal()).min() < 1e-7:
         return None
     b = np.concatenate([loads[:, tree.children].T.ravel(), forces, np.zeros(6 * N)]) / size
     x = factors.solve(b)
@@ -271,10 +264,6 @@ def _tree_twists(tree: Tree, pair_of: Index, S: Array) -> scipy.sparse.csr_array
 
 MASSLESS = 1e-12
 """Eigenvalue of the mass matrix, of which the diagonal is one, below which a motion has no inertia."""
-RESISTED = 1e-9
-"""Pivot (squared) of the same matrix above which every motion has inertia."""
-NUMBERS = 5_000_000
-"""Numbers in an array of twists."""
 SPARSE_FROM = 8000
 """Freedoms times links from which on the sparse form is faster than the full mass matrix (measured on open chains)."""
 UNOPPOSED = 1e-9
@@ -324,7 +313,8 @@ NO_INERTIA = (
 
 def positions_together(system: System, n: int) -> int:
     """Positions evaluated together, so that the twists of all links for ``n`` motions do not take much memory."""
-    return max(1, min(BLOCK, NUMBERS // (6 * len(system.m.links) * max(n, 1))))
+    # numbers in an array of twists
+    return max(1, min(BLOCK, 5_000_000 // (6 * len(system.m.links) * max(n, 1))))
 
 
 def link_twists(here: Configuration, Z: Array) -> Array:
@@ -488,7 +478,8 @@ def accelerations(mass: Array, force: Array) -> tuple[Array, Array]:
         pivots = np.linalg.cholesky(unit)
     except np.linalg.LinAlgError:
         pivots = np.zeros_like(unit)
-    if (np.einsum("...ii->...i", pivots) ** 2 > RESISTED).all():
+    # pivot (squared) of the mass matrix above which every motion has inertia
+    if (np.einsum("...ii->...i", pivots) ** 2 > 1e-9).all():
         return (np.linalg.solve(unit, Q / size[..., None]) / size[..., None])[..., 0].T, np.zeros_like(force)
     w, U = np.linalg.eigh(unit)
     kept = (w > MASSLESS * w[:, -1:])[..., None]

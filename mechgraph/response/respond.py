@@ -60,9 +60,6 @@ from mechgraph.response.integration import (
 from mechgraph.response.kernel_rates import library_for
 from mechgraph.response.motion_equations import Columns, Loads, Stopped, stopping
 
-AGREEING = 1e-9
-"""Part of the given rates by which they may miss the closure before they contradict it."""
-
 
 def read_start(
     m: Mechanism, start: Mapping[str, Any], given: Prescribed, begin: float, faults: list[str]
@@ -138,7 +135,8 @@ def start_rates(m: Mechanism, task: Task, x: Array, rates: Mapping[str, float], 
         return np.zeros(s.n_freedoms)
     a = np.linalg.lstsq(N[columns], wanted, rcond=MOTIONS.dependent)[0]
     left = np.abs(N[columns] @ a - wanted)
-    if left.max() > AGREEING * max(1.0, float(np.abs(wanted).max())):
+    # part of the given rates by which they may miss the closure before they contradict it
+    if left.max() > 1e-9 * max(1.0, float(np.abs(wanted).max())):
         rank = rank_of(singular_values(N[columns]), MOTIONS.dependent)
         held = " with the passive freedoms at rest" if task.held else ""
         closed = ", ".join(f"{n} {v:.6g}" for n, v in zip(names, (N[columns] @ a).tolist(), strict=True))
@@ -172,16 +170,6 @@ def _at_rest(task: Task, x: Array) -> Array:
     return np.asarray(scipy.linalg.orth(Z))
 
 
-TINY_STEP = 1e-5
-"""Part of the time of a motion below which a step is one of those that chatter."""
-IN_A_ROW = 12
-"""Such steps, one after the other, after which the laws are looked at."""
-NEARER_RATES = 1e-4
-"""Part of the rates at which a law is asked again: what jumps does so however near to zero they are."""
-JUMPS = 0.5
-"""Part of the difference of the forces to both sides that is left then."""
-
-
 class SeenMotion(Protocol):
     """What is seen of a motion."""
 
@@ -205,11 +193,13 @@ class Chatter:
         Stopped
             where a law makes steps chatter.
         """
-        if not self.laws or end - begin > TINY_STEP * self.span:
+        # part of the time of a motion below which a step is one of those that chatter
+        if not self.laws or end - begin > 1e-5 * self.span:
             self._ends = []
             return
         self._ends.append(end)
-        if len(self._ends) < IN_A_ROW:
+        # short steps, one after the other, after which the laws are looked at
+        if len(self._ends) < 12:
             return
         site, self._ends = self.motion.site(np.array(self._ends)), []
         for law in self.laws:
@@ -217,9 +207,11 @@ class Chatter:
             if (np.diff(np.sign(v)) != 0).sum() < 2:
                 continue
             fast = np.abs(v).max()
-            both = (np.full(len(v), rate) for rate in (fast, NEARER_RATES * fast))
+            # part of the rates at which a law is asked again: what jumps does so however near to zero they are
+            both = (np.full(len(v), rate) for rate in (fast, 1e-4 * fast))
             wide, near = (law.force(site, x, rate) - law.force(site, x, -rate) for rate in both)
-            if np.abs(near).min() > JUMPS * np.abs(wide).max():
+            # part of the difference of the forces to both sides that a jump leaves at these rates
+            if np.abs(near).min() > 0.5 * np.abs(wide).max():
                 raise Stopped(
                     f"{law.where}its force jumps by {abs(near[-1]):.4g} where its rate changes sign, as dry friction does; at "
                     f"t = {end:.6g}, x = {x[-1]:.6g}, it holds what it acts on, and steps chatter about a rate of zero. A force law "
@@ -228,8 +220,6 @@ class Chatter:
 
 
 OnStopName = Literal["raise", "return"]
-CROWDED = 1000
-"""Impacts and releases, each ``SOON`` after the one before, after which the motion is given up."""
 SOON = 1e-9
 """The same as a part of the time that is left."""
 
@@ -453,7 +443,8 @@ def _occurrences(
                 break
         if met is None:
             return
-        if crowd > CROWDED:
+        # impacts and releases, each ``SOON`` after the one before, after which the motion is given up
+        if crowd > 1000:
             raise Stopped("impacts and releases of stops follow each other without end")
         at = np.array([met])
         t, x, dq = met, course.positions(at)[:, 0], course.rates(at)[0, :, 0]

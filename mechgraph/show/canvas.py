@@ -305,8 +305,6 @@ def inside(ax: Any) -> Array:
 
 LARGE = 40
 """Nodes from which on one layout is taken, unseen; from four times as many on that of springs, which is faster."""
-CLEAR = 0.15
-"""Distance of a line from a node that is not its end, over that of neighbours, below which they clash."""
 
 
 def places(names: Iterable[str], edges: Iterable[tuple[str, str]]) -> dict[str, Array]:
@@ -349,7 +347,8 @@ def _clashes(graph: nx.Graph[int], at: dict[int, Array]) -> int:
             if name not in (a, b):
                 along = at[b] - at[a]
                 u = np.clip((at[name] - at[a]) @ along / (along @ along), 0.0, 1.0)
-                count += bool(np.linalg.norm(at[a] + u * along - at[name]) < CLEAR)
+                # distance of a line from a node that is not its end, over that of neighbours, below which they clash
+                count += bool(np.linalg.norm(at[a] + u * along - at[name]) < 0.15)
     return count
 
 
@@ -375,14 +374,6 @@ RINGS = (1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 8.0)
 ANGLES = np.linspace(0.0, 2 * np.pi, 24, endpoint=False) + 0.3
 FORBIDDEN = 1e4
 """Cost of covering another text, or of reaching beyond the axes, over that of covering one point of the drawing."""
-STEADY = 1.2
-"""Cost of moving a text by its height from where it stood before, over that of covering one point of the drawing."""
-LEGEND_WIDTH = 0.45
-"""Part of the width of the axes that the columns of a legend may take; lines beyond are counted."""
-LOW, BROAD = 8, 0.25
-"""Lines up to which a legend may stand below, and its width over that of the axes from which it does."""
-LEADER = 2.4
-"""Distance over the nearest from which on a fine line leads from the point to its text."""
 
 
 @dataclass
@@ -458,13 +449,15 @@ class Arrangement(Artist):
         sizes = np.array([_size(text, renderer) for text in self._legend])
         height = float(sizes[:, 1].max()) + 2.0 * unit
         width, n = float(sizes[:, 0].max()), len(sizes)
-        if n <= LOW and width > BROAD * (box[1, 0] - box[0, 0]):
+        # a legend of few lines stands below where it is broad
+        if n <= 8 and width > 0.25 * (box[1, 0] - box[0, 0]):
             for row, text in enumerate(reversed(self._legend)):
                 text.set_position((box[0, 0], box[0, 1] + row * height))
             box[0, 1] += (n + 1) * height
             return box
         rows = max(int((box[1, 1] - box[0, 1]) / height), 1)
-        left = box[1, 0] - LEGEND_WIDTH * (box[1, 0] - box[0, 0])
+        # part of the width of the axes that the columns of a legend may take; lines beyond are counted
+        left = box[1, 0] - 0.45 * (box[1, 0] - box[0, 0])
         columns: list[range] = []
         for i in range(0, n, rows):
             column = range(i, min(i + rows, n))
@@ -525,7 +518,8 @@ class Arrangement(Artist):
             self._places[placed.text.get_text()] = (corner - point) / unit
             placed.text.set_position(tuple(corner + unit))
             boxes.append(np.array([corner, corner + size]))
-            far = ring >= LEADER
+            # distance over the nearest from which on a fine line leads from the point to its text
+            far = ring >= 2.4
             end = np.clip(point, corner, corner + size)
             placed.leader.set_data([point[0], end[0]] if far else [], [point[1], end[1]] if far else [])
 
@@ -583,7 +577,8 @@ def _best(
     high = low + size
     cost = 0.35 * (rings - 1.0) + 0.02 * (1.0 - d[:, 0]) + 0.02 * (1.0 - d[:, 1])
     if kept is not None:
-        cost += STEADY * np.minimum(np.linalg.norm(low - kept, axis=1) / float(size[1]), 2.0)
+        # cost of moving a text by its height from where it stood before, over that of covering one point of the drawing
+        cost += 1.2 * np.minimum(np.linalg.norm(low - kept, axis=1) / float(size[1]), 2.0)
     beyond = np.maximum(box[0] - low, 0.0).sum(axis=1) + np.maximum(high - box[1], 0.0).sum(axis=1)
     cost += FORBIDDEN * (beyond > 0) * (1.0 + beyond)
     if boxes:

@@ -23,8 +23,6 @@ from mechgraph.result.values import MaterialPoint
 from mechgraph.show.canvas import HATCH, INK, MUTED, PALETTE, REACTION, Axes, axis_label, new_axes, plain, said
 from mechgraph.show.scene import DrawnPose, known_force, place_of
 
-TICKS = (10, 15, 30, 45, 60, 90, 180, 360)
-"""Distances of ticks of angles, degrees."""
 STRIP = 0.07
 """Height of a hatched strip over that of the axes."""
 
@@ -88,7 +86,8 @@ def lay_out(ax: Any, x: Abscissa, label: str) -> None:
     if x.degrees and known.size and np.ptp(known) > 60:
         from matplotlib.ticker import MultipleLocator
 
-        step = next((d for d in TICKS if np.ptp(known) / d <= 8), 360)
+        # distances of ticks of angles, degrees
+        step = next((d for d in (10, 15, 30, 45, 60, 90, 180, 360) if np.ptp(known) / d <= 8), 360)
         ax.xaxis.set_major_locator(MultipleLocator(step))
 
 
@@ -580,10 +579,6 @@ def polar_force(s: Solution, pair: str, *, on: Literal["a", "b"] = "a", ax: Axes
     return ax
 
 
-FINE = 400
-"""Points that the path of a response has at least."""
-STILL = 1e-6
-"""Path of a point over the longest below which it stands still."""
 RANK = {"position": 0, "velocity": 1, "acceleration": 2}
 
 
@@ -697,7 +692,8 @@ def finely(s: Solution) -> Solution:
     """A response at times between its outputs too, so that its paths are curves."""
     if not isinstance(s, Response) or len(s.t) < 2:
         return s
-    between = np.linspace(0.0, 1.0, max(2, -(-FINE // (len(s.t) - 1)) + 1))[:-1]
+    # points that the path of a response has at least
+    between = np.linspace(0.0, 1.0, max(2, -(-400 // (len(s.t) - 1)) + 1))[:-1]
     return s.at(np.append((s.t[:-1, None] + np.diff(s.t)[:, None] * between).ravel(), s.t[-1]))
 
 
@@ -707,7 +703,8 @@ def _names(s: Solution, points: str | Iterable[str] | None) -> list[str]:
     m = s.mechanism
     named = [f"{k.name}.{name}" for k in m.links for name in k.points if k.name != m.frame]
     strokes = {p.name: np.ptp(motion_of(s, p.name).position.reshape(-1, 3)[_solved(s)], axis=0).max() for p in m.pairs}
-    moving = [name for name, stroke in strokes.items() if stroke > STILL * max(strokes.values())]
+    # path of a point over the longest below which it stands still
+    moving = [name for name, stroke in strokes.items() if stroke > 1e-6 * max(strokes.values())]
     return named or moving or [m.pairs[0].name]
 
 

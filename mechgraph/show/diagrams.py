@@ -41,8 +41,6 @@ from mechgraph.show.curves import Abscissa, lay_out
 from mechgraph.show.skeleton import draw_skeleton
 from mechgraph.variants.study import Study
 
-STRAND, BULGE = 0.035, 0.22
-"""Distance of the strands of an edge in several loops, and of edges between the same two links, over that of neighbours."""
 LETTER, CLEARED = (0.045, 0.11), 1.3
 """Width and height of a letter of the text on a line, over the length of a line; clearance over its size that is enough."""
 LEGEND_LETTERS = 34
@@ -90,7 +88,8 @@ def draw_graph(m: Mechanism, *, ax: Axes = None) -> Any:
         tangents = np.gradient(curve, axis=0)
         across = np.stack([-tangents[:, 1], tangents[:, 0]], axis=1) / np.linalg.norm(tangents, axis=1, keepdims=True)
         for place, i in enumerate(within or [-1]):
-            shift = STRAND * (place - 0.5 * (max(len(within), 1) - 1))
+            # distance of the strands of an edge in several loops, over that of neighbours
+            shift = 0.035 * (place - 0.5 * (max(len(within), 1) - 1))
             colour = PALETTE[i % len(PALETTE)] if i >= 0 else FAINT
             canvas.line(curve + shift * across, colour, f"pair {pair}")
         canvas.keep_free(curve)
@@ -128,7 +127,8 @@ def _edges(m: Mechanism, at: dict[str, Array]) -> Iterator[tuple[str, Array]]:
         p, q = (at[name] for name in sorted((pair.a, pair.b)))
         side = same.index(pair.name) - 0.5 * (len(same) - 1)
         across = np.array([p[1] - q[1], q[0] - p[0]])
-        yield pair.name, (1 - u) * p + u * q + 4 * u * (1 - u) * BULGE * side * across
+        # distance of edges between the same two links, over that of neighbours
+        yield pair.name, (1 - u) * p + u * q + 4 * u * (1 - u) * 0.22 * side * across
 
 
 def on_lines(curves: Mapping[str, Array], texts: Mapping[str, str], dots: Array) -> dict[str, Array]:
@@ -365,12 +365,6 @@ CELL = 1.5
 """Width and height of a chain (inches)."""
 
 
-PLACES_SEED, MOVES_TRIED, REACHES = 3, 6, (2.0, 1.5, 1.01, 0.5, 0.3, 0.2, 0.1)
-"""Tries to move a joint, in rounds of such reach (lengths of links): above one only while links cross, then for even lengths."""
-EVEN = 0.12
-"""Spread of the lengths without a crossing from which on no other start is tried."""
-RUN_OVER = 0.2
-"""Distance of a link from a joint of others below which it runs over it."""
 MARKERS, OTHER = {"R": "o", "P": "s"}, "D"
 """Shapes of turning and sliding joints; of other types, with their symbol inside."""
 MARKER_SIZE = {"o": 14, "s": 20, "D": 60}
@@ -463,7 +457,8 @@ def _joint_places(count: int, joints_of: list[list[int]]) -> Array:
     beside = np.array([(e, k) for e, (a, b, _) in enumerate(edges) for k in range(count) if k not in (a, b)])
     starts = [at, *(radius * np.array([np.cos(turns), np.sin(turns)]).T for radius, turns in _rings(joints_of, count))]
     best = _untangled(starts[0], first, other, beside)
-    for start in starts[1:] if best[1] > EVEN else ():
+    # spread of the lengths without a crossing from which on no other start is tried
+    for start in starts[1:] if best[1] > 0.12 else ():
         best = min(best, _untangled(start, first, other, beside), key=lambda found: found[1])
     return best[0]
 
@@ -481,14 +476,15 @@ def _rings(joints_of: list[list[int]], count: int) -> Iterator[tuple[float, Arra
 
 def _untangled(at: Array, edges: Index, apart: Index, beside: Index) -> tuple[Array, float]:
     """Places after moves of one joint at a time that cost less, to places nearby and to places between its neighbours; the cost."""
-    rng = np.random.default_rng(PLACES_SEED)
+    rng = np.random.default_rng(3)
     near = [np.unique(edges[(edges == k).any(axis=1)]) for k in range(len(at))]
     cost = _cost(at, edges, apart, beside)
-    for reach in REACHES:
+    # rounds of tries to move a joint so far (lengths of links): above one only while links cross, then for even lengths
+    for reach in (2.0, 1.5, 1.01, 0.5, 0.3, 0.2, 0.1):
         for k in range(len(at)):
             if cost < 1.0 < reach:
                 break  # nothing crosses: only short moves, for even lengths
-            for i, step in enumerate(reach * rng.normal(size=(MOVES_TRIED, 2))):
+            for i, step in enumerate(reach * rng.normal(size=(6, 2))):
                 trial = at.copy()
                 trial[k] = (at[k] if i % 2 else at[near[k][near[k] != k]].mean(axis=0)) + step
                 new = _cost(trial, edges, apart, beside)
@@ -509,15 +505,12 @@ def _cost(at: Array, edges: Index, apart: Index, beside: Index) -> float:
     along, point = (q - p)[beside[:, 0]], at[beside[:, 1]]
     start = p[beside[:, 0]]
     u = np.clip(((point - start) * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-9), 0.0, 1.0)
-    over = int((np.linalg.norm(start + u[:, None] * along - point, axis=1) < RUN_OVER).sum())
+    # distance of a link from a joint of others below which it runs over it
+    over = int((np.linalg.norm(start + u[:, None] * along - point, axis=1) < 0.2).sum())
     length = np.log(np.maximum(np.linalg.norm(q - p, axis=1), 1e-3))
     spread = float((length * length).mean())
     return crossings + over + spread / (1.0 + spread)
 
-
-BANDS = ((0.00135, 0.99865), (0.05, 0.95), (0.25, 0.75))
-"""Quantiles between which bands are drawn: three standard deviations of a normal distribution to each side, nine tenths, half."""
-MOST_BARS = 20
 
 BinsName = Literal["auto", "fd", "doane", "scott", "stone", "rice", "sturges", "sqrt"]
 """Rules of ``numpy.histogram_bin_edges``."""
@@ -638,7 +631,8 @@ def study_bands(study: Study, output: str, *, over: str | None = None, part: int
     ax = new_axes() if ax is None else ax
     some = np.isfinite(picked.values).any(axis=0)
     filled = np.where(some, picked.values, 0.0)
-    for (low, high), alpha in zip(BANDS, (0.16, 0.26, 0.4), strict=True):
+    # quantiles between which bands are drawn: three standard deviations of a normal distribution to each side, nine tenths, half
+    for (low, high), alpha in zip(((0.00135, 0.99865), (0.05, 0.95), (0.25, 0.75)), (0.16, 0.26, 0.4), strict=True):
         ends = np.where(some, np.nanquantile(filled, (low, high), axis=0), np.nan)
         ax.fill_between(
             x.values[0], *ends, color=PALETTE[0], alpha=alpha, lw=0, label=f"{100 * low:g} to {100 * high:g} %"
@@ -697,7 +691,7 @@ def study_tornado(
     at = picked.checked(position) if position is not None else int(np.nanargmax(np.abs(itself)))
     moves = {name: np.atleast_2d(picked.entry(move))[:, at] if picked.placed else picked.entry(move).reshape(2)
              for name, move in study.moves(output).items()}  # fmt: skip
-    order = sorted(moves, key=lambda name: -float(np.abs(np.nan_to_num(moves[name])).max()))[:MOST_BARS]
+    order = sorted(moves, key=lambda name: -float(np.abs(np.nan_to_num(moves[name])).max()))[:20]
     ax = new_axes((6.4, 1.5 + 0.36 * len(order))) if ax is None else ax
     for i, name in enumerate(order):
         for end, colour in zip(moves[name], (PALETTE[0], PALETTE[1]), strict=True):
@@ -791,10 +785,6 @@ def _driver(study: Study, over: str | None, count: int) -> Abscissa:
     return Abscissa(rows[name][None], axis_label(name, unit_of(m.units, (1, 0, 0))))
 
 
-MOST_SHOWN = 16
-"""Most assemblies drawn side by side."""
-
-
 def draw_assemblies(modes: Assemblies) -> Any:
     """The skeletons of all assemblies side by side, numbered, then a point of every continuum; the figure.
 
@@ -806,7 +796,8 @@ def draw_assemblies(modes: Assemblies) -> Any:
     drawn = [*zip(modes.modes, modes.kinds, strict=True), *((one.point, "continuum") for one in modes.continua)]
     if not drawn:
         raise DeclarationError(f"picture of {modes.mechanism.name!r}", ["there is no real assembly to draw"])
-    shown = drawn[:MOST_SHOWN]
+    # most assemblies drawn side by side
+    shown = drawn[:16]
     columns = int(np.ceil(np.sqrt(len(shown))))
     rows = -(-len(shown) // columns)
     probe = draw_skeleton(shown[0][0])

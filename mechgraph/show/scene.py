@@ -143,8 +143,6 @@ def scene_at(
 
 FLAT_THICKNESS = 1e-6
 """Thickness over extent below which a mechanism is drawn as a plane one, and a link as a plate; points closer than that are one."""
-SYMBOL = 0.026
-"""Half width of a symbol over the extent of the mechanism, where pairs leave room for it."""
 
 Role = Literal[
     "link",
@@ -229,7 +227,8 @@ class DrawnPose:
         self.everything = np.concatenate([*self.points.values(), *of_links])
         self.normal = self._plane()
         self.size = float(np.linalg.norm(np.ptp(self.everything, axis=0))) or 1.0
-        self.symbol = SYMBOL * self.size
+        # half width of a symbol over the extent of the mechanism, where pairs leave room for it
+        self.symbol = 0.026 * self.size
         weights = (np.asarray(load.acceleration, dtype=float) for load in m.loads if isinstance(load, Gravity))
         self.gravity = next((g for g in weights if g.any()), None)
 
@@ -318,10 +317,6 @@ def plane_normal(points: Array) -> Array | None:
     return np.asarray(Vt[2] * np.sign(Vt[2][np.argmax(np.abs(Vt[2]))])) if flat else None
 
 
-ROD, EDGE = 0.3, 0.2
-"""Radii of rods, and of the edges of plates, over the size of a symbol."""
-
-
 def links(stage: DrawnPose) -> Iterator[DrawnPart]:
     """Links as what they join: a rod between two points, a plate or a body between more; mass centres and points of interest."""
     for link in stage.m.links:
@@ -350,7 +345,8 @@ def _body(stage: DrawnPose, link: str, corners: list[Array]) -> Iterator[DrawnPa
     faces, edges = hull(points)
     if faces:
         yield DrawnPart("plate", link, link, frame, Shape(points, faces))
-    radius = (EDGE if faces else ROD) * stage.symbol
+    # radii of rods, and of the edges of plates, over the size of a symbol
+    radius = (0.2 if faces else 0.3) * stage.symbol
     yield DrawnPart("link", link, link, frame, shapes.together([rod(points[i], points[j], radius) for i, j in edges]))
 
 
@@ -451,10 +447,6 @@ def labels(stage: DrawnPose) -> Iterator[Label]:
 
 LONGEST_ARROW = 0.2
 """Length of the longest force arrow over the extent."""
-SHORTEST_ARROW = 0.25
-"""Length of the shortest arrow of a load over the longest: direction matters more than size there."""
-NOTHING = 1e-9
-"""Force over the largest below which no arrow is drawn."""
 
 LAW_SHAPES: dict[str, tuple[Shape, Shape]] = {
     "spring": (shapes.coil(), shapes.spiral()),
@@ -488,7 +480,9 @@ def loads(stage: DrawnPose, solution: Solution | None, positions: Any) -> Iterat
         kind = [np.linalg.norm(other.vector, axis=1) for other in acting if other.turns == one.turns]
         longest = max(float(np.nanmax(v, initial=0.0)) for v in kind) or 1.0
         share = np.linalg.norm(one.vector, axis=1) / longest
-        share = np.where(share > NOTHING, np.maximum(share, SHORTEST_ARROW), np.nan)
+        # length of the shortest arrow of a load over the longest: direction matters more than size there
+        # force over the largest below which no arrow is drawn
+        share = np.where(share > 1e-9, np.maximum(share, 0.25), np.nan)
         frame = f"load:{one.load}:{'moment' if one.turns else 'force'}"
         if one.turns:
             length = width = 2.5 * stage.symbol * share

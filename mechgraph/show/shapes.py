@@ -17,8 +17,6 @@ GUIDE, BODY, PIN = 0.95, 0.62, 0.24
 """Radii of guides, of what runs in them, and of pins, over the size of a symbol."""
 PAD = 1.6
 """How far a guide or plate goes beyond the stroke."""
-PARALLEL_SINE = 1e-6
-"""Sine below which two directions are parallel."""
 
 Role = Literal["guide", "body", "dark", "axis"]
 
@@ -155,7 +153,8 @@ def _drum(
 
 
 def _parallel(u: Array, v: Array) -> bool:
-    return float(np.linalg.norm(np.cross(u, v))) < PARALLEL_SINE
+    # sine below which two directions are parallel
+    return float(np.linalg.norm(np.cross(u, v))) < 1e-6
 
 
 ROUND = 16

@@ -44,10 +44,6 @@ from mechgraph.show.canvas import (
 from mechgraph.show.curves import finely
 from mechgraph.show.scene import DrawnPart, Scene, scene
 
-NAMES_IN_DRAWING = 12
-"""Pairs up to which all names stand in the drawing; beyond, numbers stand there and a legend beside it says what they are."""
-GHOST = 0.3
-"""Opacity of the other positions."""
 BODY = "#f2f4f7"
 LINES = {"axis": (0.9, (0, (8, 2, 1.5, 2))), "tie": (0.9, (0, (2, 2))), "spring": (1.3, "-"), "load": (2.2, "-"),
          "drive": (1.8, "-"), "reaction": (2.4, "-"), "foot": (0.8, "-")}  # fmt: skip
@@ -227,8 +223,9 @@ class Drawing:
         for part in self.scene.parts:
             if part.role == "link" and positions:
                 runs = [run for t in positions for run in _runs(part, self.scene.vertices(part, t))]
+                # opacity of the other positions
                 self.painter.lines(
-                    runs, colors=self.colour[part.link], linewidths=1.2, alpha=GHOST, zorder=1.0, gid="ghosts"
+                    runs, colors=self.colour[part.link], linewidths=1.2, alpha=0.3, zorder=1.0, gid="ghosts"
                 )
 
     def traces(self, traces: bool | Sequence[str], course: Scene) -> None:
@@ -338,7 +335,8 @@ class Drawing:
 
     def _names(self, arranged: Any, t: int) -> None:
         m, lines = self.scene.mechanism, []
-        numbered = len(m.pairs) > NAMES_IN_DRAWING
+        # pairs up to which all names stand in the drawing; beyond, numbers stand there and a legend beside it says what they are
+        numbered = len(m.pairs) > 12
         for label in self.scene.labels:
             text, colour = label.text, self.colour.get(label.link, INK)
             if numbered and label.kind == "pair":
@@ -370,11 +368,6 @@ class Drawing:
 def _runs(part: DrawnPart, vertices: Array) -> list[Array]:
     return [vertices[list(line)] for line in part.shape.lines]
 
-
-MOST_FRAMES = 72
-"""Frames of a film unless they are asked for: the positions are thinned out to so many."""
-SHOWN = 12
-"""Positions from which the extent of a film is taken."""
 
 Frames = Callable[[], Iterator[Any]]
 
@@ -455,7 +448,8 @@ def _chosen(found: Scene, frames: int | Sequence[int] | None) -> list[int]:
     """Numbers of the drawn positions that are frames."""
     count, where = len(found.positions), f"film of {found.mechanism.name!r}"
     if frames is None or isinstance(frames, int):
-        n = min(count, MOST_FRAMES) if frames is None else frames
+        # frames of a film unless they are asked for: the positions are thinned out to so many
+        n = min(count, 72) if frames is None else frames
         if n < 1:
             raise DeclarationError(where, [wrong(frames, "frames", "a positive number")])
         return np.linspace(0, count - 1, n).round().astype(int).tolist()
@@ -487,7 +481,8 @@ class _Film:
         # every frame alike, and drawn once: without a layout that measures it first
         self.ax.figure.set_layout_engine("none")
         self.ax.set_position((0.0, 0.0, 1.0, 1.0))
-        some = np.unique(np.linspace(0, len(chosen) - 1, SHOWN).round().astype(int))
+        # positions from which the extent of a film is taken
+        some = np.unique(np.linspace(0, len(chosen) - 1, 12).round().astype(int))
         self.extent: Array = np.concatenate([found.all_vertices(chosen[i]) for i in some])
         self.places: dict[str, Array] = {}
 

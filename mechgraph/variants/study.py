@@ -577,17 +577,11 @@ class Study(Shown):
 
 POSITIONS_TOGETHER = 60_000
 """Positions of all variants that are solved together: bounds the memory."""
-MOST_TOGETHER = 500
-"""Variants that are followed together: their arrays stay in the cache."""
 FEW_ALONE = 20
 """Variants in a part where each is solved alone: so few that all processors have some."""
-DIFFERENCE = 1e-4
-"""Step of the central differences of the sensitivities, as a part of the spread of the parameter."""
 
 MOST_VARIANTS = 10_000_000
 """Largest study: its outputs are kept in memory."""
-SMALLEST = 1e-6
-"""Smallest step of a difference, as a part of the parameter (of one, where that is zero)."""
 
 Progress = Callable[[int, int], None]
 
@@ -674,11 +668,9 @@ def study(
         raise DeclarationError("study", [f"a grid of {count:.3g} variants: at most {MOST_VARIANTS} are solved"])
     values = SAMPLINGS[sampling](list(ways.values()), int(n), np.random.default_rng(seed))
     paths = {name: _rows_of(name, motion, values.shape[1]) for name, motion in given.items()}
+    # steps of central differences: a part of the spread of the parameter, and no less than a part of it (of one, where it is zero)
     steps = np.array(
-        [
-            max(DIFFERENCE * spread(way), SMALLEST * (abs(p) or 1.0))
-            for way, p in zip(ways.values(), source.start, strict=True)
-        ]
+        [max(1e-4 * spread(way), 1e-6 * (abs(p) or 1.0)) for way, p in zip(ways.values(), source.start, strict=True)]
     )
     near = np.concatenate([np.zeros((len(steps), 1)), np.diag(steps), -np.diag(steps)], axis=1) + source.start[:, None]
 
@@ -686,7 +678,8 @@ def study(
         own = Motions({name: motion_of_case(motion, at[some]) for name, motion in paths.items()}, given.free)
         return StudyTask(source, whole[:, some], own, kept, method, redundant, engine, acting)
 
-    size = max(1, min(MOST_TOGETHER, POSITIONS_TOGETHER // max(motion.shape[-1] for motion in paths.values())))
+    # variants that are followed together: their arrays stay in the cache
+    size = max(1, min(500, POSITIONS_TOGETHER // max(motion.shape[-1] for motion in paths.values())))
     size = min(size, FEW_ALONE) if source.one_by_one else size
     # those near the mechanism itself and the first ones together: of few positions a part takes calls, not numbers
     few, whole = near.shape[1], np.concatenate([near, values], axis=1)

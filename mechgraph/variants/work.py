@@ -236,7 +236,8 @@ class NumbersPath(DriverPath):
         """The system with the numbers of variants ``(n,)``, each at its part of the way; those of the last calls are kept."""
         key = part.tobytes() + variants.tobytes()
         if key not in self._known:
-            self._known = dict([*self._known.items()][1 - SYSTEMS :])
+            # four systems are kept: a difference asks for two, and Newton's method for both of them again
+            self._known = dict([*self._known.items()][-3:])
             self._known[key] = self.system_of(self._numbers_at(part, variants))
         return self._known[key]
 
@@ -276,17 +277,14 @@ class NumbersPath(DriverPath):
         here, there = (Configuration(self.system_at(np.full(V, part), np.arange(V)), x) for part in (0.0, 1.0))
         way = np.nan_to_num(np.abs(there.residual - here.residual).max(axis=0, initial=0.0))
         form = self.solver.chosen(here.part(np.arange(1)), np.full(1, -1))  # all begin in the mechanism itself
-        self._step = NUMBERS_STEP / np.where(way > 0, np.clip(way, NUMBERS_STEP / LONGEST_STEP, 1.0), 1.0)
+        # the longest step for that, in parts of the way, where the numbers change by less on the whole of it
+        self._step = NUMBERS_STEP / np.where(way > 0, np.clip(way, NUMBERS_STEP / 1e-3, 1.0), 1.0)
         paths = Paths([np.array([[0.0, float(ok)]]) for ok in valid])
         return Follower(self, leads=False).follow(x, paths, first=1.0, which=np.repeat(form, V))
 
 
-SYSTEMS = 4
-"""Systems that are kept: a difference asks for two, and Newton's method for both of them again."""
 NUMBERS_STEP = 1e-7
 """What the numbers change by in that difference (radians, lengths / L): half the digits are left, which a prediction does not miss."""
-LONGEST_STEP = 1e-3
-"""The longest step for that, in parts of the way, where the numbers change by less on the whole of it."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -41,8 +41,6 @@ def rounded(values: Array) -> list[float]:
 
 OBLIQUE = (0.6, -1.0, 0.55)
 """Direction from which a spatial mechanism is seen, in upright axes."""
-ROOM = 6.0
-"""Room about what is drawn, for names and arrows, over the half width of a symbol."""
 LEFT_OUT = {"reaction"}
 """Parts that the page draws itself, from numbers."""
 
@@ -80,10 +78,11 @@ class Figure:
         screen[1] = np.cross(look, screen[0])
         seen = points @ screen.T
         low, high = seen.min(axis=0), seen.max(axis=0)
+        # room about what is drawn, for names and arrows, over the half width of a symbol
         return {
             "name": plain(self.m.name),
             "size": float(scene.size),
-            "span": rounded(high[:2] - low[:2] + ROOM * scene.symbol),
+            "span": rounded(high[:2] - low[:2] + 6.0 * scene.symbol),
             "symbol": float(scene.symbol),
             "center": rounded(screen.T @ (low + high) / 2),
             "up": rounded(scene.upright[:, 2]),
@@ -406,8 +405,6 @@ MOST_LINKS = 250
 """Links up to which a mechanism is drawn in space."""
 MOST_ITEMS, LEAST_ITEMS = 24, 4
 """Freedoms, self-stresses and advice, each, that are shown of a small mechanism, and of any."""
-DRAWN = 1000
-"""Links that are drawn in all of these together, about."""
 LONGEST_TITLE = 48
 """Letters of a self-stress by which it is chosen; all of it stands below the picture."""
 MOST_POSITIONS = 1500
@@ -471,7 +468,8 @@ class _PageView:
             "self-stresses": len(self.report.self_stresses),
             "advice": len(self.report.advice),
         }[what]
-        most = max(LEAST_ITEMS, min(MOST_ITEMS, DRAWN // len(self.m.links)))
+        # links that are drawn in all of these together, about
+        most = max(LEAST_ITEMS, min(MOST_ITEMS, 1000 // len(self.m.links)))
         for number, item in enumerate(items):
             if number == most:
                 self.notes.append(f"Of {total} {what} the first {most} are shown.")
@@ -597,14 +595,8 @@ def _told(m: Mechanism, stress: SelfStress, L: float) -> str:
 REACH = 0.35
 """How far a freedom is followed to either side (radians, or lengths / L), in so many steps."""
 STEPS_A_MODE = 12
-LEAST = 3
-"""Steps that must be closed for a motion to count as one."""
 KEPT = 0.3
 """Part of a step that must be left once the loops are closed."""
-SHAKEN = 0.12
-"""How far an infinitesimal motion is drawn."""
-PICTURES_A_TURN = 48
-"""Positions of a full turn."""
 
 
 @dataclass(frozen=True)
@@ -642,7 +634,8 @@ def wiggles(report: DeterminacyReport) -> Iterator[Wiggle]:
     for passive, found in zip(g.freedoms.passive, report.passive, strict=True):
         rate = float(np.linalg.norm(passive.twist[:3])) if found.turns else 0.0
         if rate:
-            along = np.linspace(0, 2 * np.pi / rate, PICTURES_A_TURN + 1)
+            # positions of a full turn
+            along = np.linspace(0, 2 * np.pi / rate, 48 + 1)
         else:
             along = REACH * np.linspace(-1, 1, 2 * STEPS_A_MODE + 1)
         x = g.system.advance(g.x[:, None], passive.rates[:, None] * along)
@@ -671,8 +664,10 @@ def _followed(g: Geometry, group: str, title: str, text: str, rates: Array, rest
     """A motion with the freedoms ``rest`` at rest, to both sides; infinitesimal, without closing, where it cannot be followed."""
     v = rates / np.abs(rates).max()
     sides = [_side(g, sign * v, rest) for sign in (-1.0, 1.0)]
-    if max(map(len, sides)) < LEAST:
-        x = g.system.advance(g.x[:, None], v[:, None] * SHAKEN * np.linspace(-1, 1, 2 * STEPS_A_MODE + 1))
+    # steps that must be closed for a motion to count as one
+    if max(map(len, sides)) < 3:
+        # how far an infinitesimal motion is drawn
+        x = g.system.advance(g.x[:, None], v[:, None] * 0.12 * np.linspace(-1, 1, 2 * STEPS_A_MODE + 1))
         return Wiggle(
             group, title, f"{text}. Infinitesimal only: beyond it the loops open, as they are drawn here", x, "swing"
         )

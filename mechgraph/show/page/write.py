@@ -123,10 +123,6 @@ def _rows(
         yield "study", repr(study)
 
 
-OUTPUTS = 4
-"""Outputs of a study of which pictures are made."""
-PAIRS_LABELLED = 40
-"""Pairs up to which names stand in the still picture: finding room for them takes long."""
 RC: dict[Any, Any] = {"svg.hashsalt": "mechgraph", "svg.fonttype": "none", "text.parse_math": False}
 """The same file at every call; names as text in the reader's fonts, none of them a formula."""
 
@@ -137,7 +133,8 @@ Pictures = list[tuple[str, str]]
 
 def stills(m: Mechanism, s: Solution | None) -> Pictures:
     """The mechanism where it begins, what its drivers supply, and from what to what its reactions range."""
-    out = [(m.name, _picture(lambda: draw_skeleton(m if s is None else s, labels=len(m.pairs) <= PAIRS_LABELLED)))]
+    # pairs up to which names stand in the still picture: finding room for them takes long
+    out = [(m.name, _picture(lambda: draw_skeleton(m if s is None else s, labels=len(m.pairs) <= 40)))]
     if s is None or not s.has_forces:
         return out
     if s.mechanism.drives:
@@ -155,7 +152,8 @@ def pictures_of_graph(m: Mechanism) -> Pictures:
 def pictures_of_study(study: Study) -> Pictures:
     """How the first outputs spread, and what moves them; of those with several entries that of greatest size."""
     out = []
-    for name in list(study.outputs)[:OUTPUTS]:
+    # outputs of a study of which pictures are made
+    for name in list(study.outputs)[:4]:
         nominal = np.abs(np.nan_to_num(study.nominal[name]))
         placed = study.outputs[name].ndim > 1 and study.outputs[name].shape[1] == study.status.shape[1]
         entries = nominal.ndim - placed
@@ -213,8 +211,6 @@ def _blocks(study: Study) -> Iterator[Block]:
 
 STYLED = re.compile(r' style="text-align: (left|right|center)"| border="1"')
 """What the page's own style sheet does instead: its policy allows no style beside it."""
-MOST_UNKNOWNS = 300
-"""Unknowns up to which the equations stand in components too: some 0.6 MB."""
 TOO_LARGE = "It has more links than are drawn in space."
 START = "mechgraphView.start();"
 
@@ -327,7 +323,8 @@ def _content(m: Mechanism, report: DeterminacyReport, s: Solution | None, study:
 def _equations(m: Mechanism) -> Document:
     """All equations; of a large mechanism without their components."""
     f = formulate(m)
-    return Document("", f.document(components=len(f.unknowns) <= MOST_UNKNOWNS).blocks)
+    # unknowns up to which the equations stand in components too: some 0.6 MB
+    return Document("", f.document(components=len(f.unknowns) <= 300).blocks)
 
 
 def _judged(r: DeterminacyReport) -> tuple[str, str]:
