@@ -5,7 +5,6 @@ has a layer.
 """
 
 import ast
-import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,8 @@
 """Tolerances, each with its reason: one frozen object, of which the running call reads what it was asked with.
 
-``RANKS``, ``MOTIONS``, ``STRESSES``, ``CHECKS`` and ``PATH`` are the parts of the object that applies to the running call: the default
-one, or the one that its mechanism carries (see ``memo.Remembers``). They are read where they are needed, never when a module is loaded.
+``RANKS``, ``MOTIONS``, ``STRESSES``, ``CHECKS``, ``PATH``, ``MODES`` and ``RESPONSE`` are the parts of the object that applies to
+the running call: the default one, or the one that its mechanism carries (see ``memo.Remembers``). They are read where they are needed,
+never when a module is loaded.
 """
 
 # annotations are read at run time here: they hold the reasons
@@ -300,6 +301,150 @@ class PathTolerances:
 
 
 @dataclass(frozen=True)
+class ModeTolerances:
+    """Finding all assemblies and following their branches (see ``modes``)."""
+
+    span: Annotated[float, "Part of a twist outside a span up to which it lies in it."] = 1e-6
+    member_closed: Annotated[float, "Closure error up to which a member of a class counts as closed."] = 1e-9
+    generic: Annotated[
+        float, "Singular value, as part of the largest, below which it counts as zero at random members."
+    ] = 1e-7
+    vanished: Annotated[float, "What stands for a curvature of zero, by which is divided."] = 1e-200
+    singular: Annotated[
+        float,
+        "Smallest singular value of the closure rows, as part of the largest, below which an assembly is looked at more "
+        "closely.",
+    ] = 1e-5
+    away: Annotated[
+        float,
+        "Step along motions that the rows leave free, after which a continuum is still closed: closing takes back what rows "
+        "hold to a rank.",
+    ] = 1e-2
+    curved: Annotated[float, "Step of second differences: their rounding is 1e-10."] = 1e-3
+    same_place: Annotated[float, "Difference of what does not move up to which two points are of one continuum."] = 1e-5
+    slide: Annotated[float, "Turn of a marker below which it slides."] = 1e-9
+    most_noise: Annotated[float, "Rounding with which a track may end."] = 1e-5
+    pole_range: Annotated[float, "Size of ``z`` or ``1 / z`` up to which poles are sampled."] = 200.0
+    one_assembly: Annotated[
+        float, "Difference of link poses, against their size, up to which two assemblies are one."
+    ] = 1e-6
+    radius: Annotated[float, "Distance from its end at which a track is led round."] = 0.04
+    real_singular: Annotated[
+        float,
+        "Difference of link poses at which ends may be one, or real, where rows are singular, so that they are known to the "
+        "root of rounding.",
+    ] = 1e-3
+    known_moved: Annotated[
+        float,
+        "Change of what is known (radians, lengths over L) at which a group must still be a member of its class.",
+    ] = 0.3
+    ball: Annotated[
+        float, "Size of the increments (radians, lengths / L) within which second derivatives are bounded."
+    ] = 0.05
+    bound_rounding: Annotated[
+        float,
+        "Factor that stands for the rounding of bounds of second derivatives, and of bases that are orthonormal to rounding.",
+    ] = 1.01
+    off_dead_point: Annotated[
+        float,
+        "Motion (radians, or lengths over L) of what moves most from a singular start to where the class is read.",
+    ] = 0.3
+    real_closed: Annotated[float, "Closure error of what is real in the equations that are solved: some roundings."] = (
+        1e-12
+    )
+    unfit: Annotated[
+        float,
+        "Closure error from which on a rod that has no row does not fit; between this and that of what is closed it is open "
+        "whether it does.",
+    ] = 1e-3
+    arrives: Annotated[float, "Difference of link poses up to which a piece arrives at an assembly."] = 1e-6
+    touches: Annotated[
+        float,
+        "Difference of link poses at a fold or a crossing: they grow with the root of the distance from a fold.",
+    ] = 1e-3
+    slide_stroke: Annotated[
+        float, "Range of a driven slide to both sides of the start, over L, where none is given."
+    ] = 2.0
+
+
+@dataclass(frozen=True)
+class ResponseTolerances:
+    """Motion in time, equilibria and small motions (see ``response``)."""
+
+    steepest: Annotated[
+        float,
+        "Largest rate of a freedom for unit rates of the independent ones, against that where the chart was laid out, before a "
+        "new one is; so of a condition that is poor.",
+    ] = 3.0
+    last_step: Annotated[
+        float,
+        "Newton step from which on a state counts as closed; the step before it was a millionth, so that only rounding is "
+        "left.",
+    ] = 1e-13
+    massless: Annotated[
+        float, "Eigenvalue of the mass matrix, of which the diagonal is one, below which a motion has no inertia."
+    ] = 1e-12
+    unopposed: Annotated[
+        float, "Part of the largest generalized force below which none acts along a motion without inertia."
+    ] = 1e-9
+    noise_of_motion: Annotated[float, "Part of a prescribed position or rate that is rounding of it."] = 1e-13
+    halvings_alike: Annotated[
+        int,
+        "Halvings in which the part by which a rate is off stays alike, in both halves, where the rate is wrong.",
+    ] = 6
+    around_crossing: Annotated[
+        float,
+        "Length of the piece with a change point in its middle: the accelerations of states beside it lose rounding over the "
+        "cube of the distance, 5e-12 at the nearest point of the series.",
+    ] = 0.64
+    at_crossing: Annotated[float, "Distance from a change point up to which a place counts as it."] = 0.01
+    periodic: Annotated[
+        float,
+        "Difference of poses (and part of the largest term) after a turn of the coordinate up to which the path has come back.",
+    ] = 1e-9
+    beside_ends: Annotated[
+        float,
+        "Part of a step beside its ends at which is looked too, so that a height that turns in the first or last part is seen "
+        "to.",
+    ] = 1e-5
+    look: Annotated[int, "Steps after which the length of steps is looked at."] = 500
+    touching: Annotated[float, "Gap (radians, lengths / L) up to which a stop counts as closed."] = 1e-9
+    lowest: Annotated[
+        float,
+        "Height (radians, lengths / L) of a rebound below which the freedom rests on its stop; what it loses is of that order.",
+    ] = 1e-9
+    soon: Annotated[
+        float, "Part of the time that is left within which impacts and releases follow each other at once."
+    ] = 1e-9
+    lost_energy: Annotated[
+        float,
+        "Error of the balance of energies, of the greatest one, from which on a motion in time is doubtful.",
+    ] = 1e-3
+    corner: Annotated[
+        float,
+        "Difference of the slopes to both sides, or of the values there, of the largest, that is one where it does not fall "
+        "with the length.",
+    ] = 1e-6
+    falls: Annotated[
+        float, "Part of such a difference that is left at the next length where it falls: a quarter of what is smooth."
+    ] = 0.5
+    first_difference: Annotated[
+        float,
+        "First length of differences (radians, lengths / L); their error and rounding are both near 1e-13 where forces bend "
+        "within 0.3.",
+    ] = 0.004
+    equilibrium_steps: Annotated[int, "Most steps to an equilibrium."] = 60
+    longest_equilibrium_step: Annotated[float, "Longest step to an equilibrium (radians, lengths / L)."] = 0.3
+    push: Annotated[float, "Length of the step by which an unstable equilibrium is left."] = 0.05
+    balanced: Annotated[
+        float, "Generalized force, against the largest that a load exerts on the way, that counts as none."
+    ] = 1e-12
+    stiff: Annotated[
+        float, "Eigenvalue of the stiffness, against the largest, that counts as none: neither stable nor unstable."
+    ] = 1e-9
+
+
+@dataclass(frozen=True)
 class ShapeTolerances:
     """When what is declared of shapes and places counts as met. Lengths over the extent of the shape, angles in radians."""
 
@@ -328,6 +473,8 @@ PARTS: dict[str, type] = {
     "stress": StressTolerances,
     "check": CheckTolerances,
     "path": PathTolerances,
+    "modes": ModeTolerances,
+    "response": ResponseTolerances,
 }
 
 
@@ -351,7 +498,7 @@ class Tolerances:
 
     Parameters
     ----------
-    rank, motion, stress, check, path : mapping of str to float, optional
+    rank, motion, stress, check, path, modes, response : mapping of str to float, optional
         Numbers other than the default ones, by their names. Dimensionless: angles in radians, lengths over the length of the mechanism.
 
     Raises
@@ -374,6 +521,8 @@ class Tolerances:
     stress: StressTolerances = field(default_factory=StressTolerances)
     check: CheckTolerances = field(default_factory=CheckTolerances)
     path: PathTolerances = field(default_factory=PathTolerances)
+    modes: ModeTolerances = field(default_factory=ModeTolerances)
+    response: ResponseTolerances = field(default_factory=ResponseTolerances)
     _wanted: ClassVar[str] = "Tolerances, as mg.Tolerances(rank={'loop': 1e-6})"
 
     def __post_init__(self) -> None:
@@ -441,3 +590,5 @@ MOTIONS = cast(MotionTolerances, _Asked("motion"))
 STRESSES = cast(StressTolerances, _Asked("stress"))
 CHECKS = cast(CheckTolerances, _Asked("check"))
 PATH = cast(PathTolerances, _Asked("path"))
+MODES = cast(ModeTolerances, _Asked("modes"))
+RESPONSE = cast(ResponseTolerances, _Asked("response"))

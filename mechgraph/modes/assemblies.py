@@ -20,30 +20,17 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import Index
-from mechgraph.maths.tolerances import Tolerances
+from mechgraph.maths.tolerances import MODES, Tolerances
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.certificate import TINY, Certificate, certificate, told_apart
 from mechgraph.modes.continua import Found, Nearby, continua, irregular, least_value, searched
-from mechgraph.modes.family import NO_NUMBERS, SPAN, Array, Family, at_rest
+from mechgraph.modes.family import NO_NUMBERS, Array, Family, at_rest
 from mechgraph.modes.form import EquationForm, RodChain, Whole, WithoutRods, rods_of
 from mechgraph.modes.result import Assemblies, AssembliesOver, ComplexModes, Continuum, weakest
-from mechgraph.modes.start_sets import ONE_ASSEMBLY, Irregular, StartSet, bound, distinct, keep, kept, start_set
-from mechgraph.modes.targets import (
-    MOST_FOLLOWED,
-    REAL,
-    REAL_SINGULAR,
-    Ends,
-    EquationGroup,
-    Product,
-    Undivided,
-    groups_of,
-    is_real,
-)
+from mechgraph.modes.start_sets import Irregular, StartSet, bound, distinct, keep, kept, start_set
+from mechgraph.modes.targets import MOST_FOLLOWED, REAL, Ends, EquationGroup, Product, Undivided, groups_of, is_real
 from mechgraph.quantities import Count, Positive, door
 from mechgraph.quantities import Index as Seed
-
-OFF_DEAD_POINT = 0.3
-"""Motion (radians, or lengths over L) of what moves most from a singular start to where the class is read."""
 
 
 class Question:
@@ -97,10 +84,10 @@ class Question:
         Other members of the class need not have such a motion; that of a rod between balls they all have.
         """
         s, out = self.system, []
-        for k in np.flatnonzero((s.single_rows >= 0) & (np.abs(idle) > SPAN).any(axis=1)).tolist():
+        for k in np.flatnonzero((s.single_rows >= 0) & (np.abs(idle) > MODES.span).any(axis=1)).tolist():
             part = idle[k] @ idle[k]
             if (
-                part > SPAN**2
+                part > MODES.span**2
                 and Configuration(s, s.advance(self.start.x, idle @ idle[[k]].T / part)).closure[0] < CLOSED
             ):
                 out.append(k)
@@ -164,11 +151,11 @@ class Question:
         """Closed positions a little away from the start either way: drivers moved, those too that stand still there, or free to move."""
         x0, motions, still = self.start.x, self.freedoms.null, self.columns[self.freedoms.still(self.columns)]
         rates = motions @ np.random.default_rng(0).normal(size=motions.shape[1])
-        rates *= OFF_DEAD_POINT / max(float(np.abs(rates).max(initial=0.0)), SPAN)
+        rates *= MODES.off_dead_point / max(float(np.abs(rates).max(initial=0.0)), MODES.span)
         for held in (self.columns, NO_NUMBERS):
             for sign in (1.0, -1.0):
                 dq = sign * rates[:, None]
-                dq[still] = sign * OFF_DEAD_POINT * bool(held.size)
+                dq[still] = sign * MODES.off_dead_point * bool(held.size)
                 x, error = close_all(self.system, self.system.advance(x0, dq), held)
                 if error[0] < CLOSED:
                     yield Configuration(self.system, x)
@@ -207,10 +194,6 @@ class Question:
         return q.T
 
 
-REAL_CLOSED = 1e-12
-"""Closure error of what is real in the equations that are solved: some roundings."""
-UNFIT = 1e-3
-"""Closure error from which on a rod that has no row does not fit; between this and that of what is closed it is open whether it does."""
 GUESSES = 400
 """Random guesses where no class is known."""
 GUESSED_TURNS = 1.0
@@ -309,7 +292,7 @@ class Finder:
         )
         system = q.system
         # those that are singular are known to the root of rounding only
-        least = np.where(irregular(self.family, Configuration(system, x)), REAL_SINGULAR, ONE_ASSEMBLY)
+        least = np.where(irregular(self.family, Configuration(system, x)), MODES.real_singular, MODES.one_assembly)
         x = x[:, distinct(q.family.prints(Configuration(system, x)), None, least)]
         moving = np.array([Nearby(q.family, system, x[:, [i]]).moves for i in range(x.shape[1])], dtype=bool)
         more = continua(q.family, system, x[:, moving], drive, self.progress) if moving.any() else []
@@ -322,7 +305,7 @@ class Finder:
         system, real = self.form.at(i), np.flatnonzero(is_real(found.poses, found.error))
         solved, error = close_all(system, found.x[:, real].real, self.family.columns)
         # two that meet at a place that is not real are next to one another there
-        real, solved = real[error < REAL_CLOSED], solved[:, error < REAL_CLOSED]
+        real, solved = real[error < MODES.real_closed], solved[:, error < MODES.real_closed]
         solved, once = self._distinct(solved, i), solved.shape[1]
         word, evidence = _completeness(found, self.groups, self.starts)
         if solved.shape[1] < once:
@@ -335,9 +318,9 @@ class Finder:
         system = self.question.system
         off = Configuration(system, x.real).closure
         # closure error of what is real with its rods put back
-        made, unfit = ~complex_ & (off < 1e-9), ~complex_ & bool(self.form.spare) & (off > UNFIT)
+        made, unfit = ~complex_ & (off < 1e-9), ~complex_ & bool(self.form.spare) & (off > MODES.unfit)
         if self.form.spare:
-            others = others[:, Configuration(system, others).closure < UNFIT]
+            others = others[:, Configuration(system, others).closure < MODES.unfit]
         if (lost := int((~made & ~complex_ & ~unfit).sum())) > 0:
             word, evidence = "searched", (*evidence, f"Of {counted(lost, 'mode')} the rods could not be put back.")
         others = np.concatenate([others, x[:, complex_]], axis=1)
@@ -406,7 +389,7 @@ class Finder:
         condition = float(1.0 / max(least_value(family, here)[0], TINY))
         sure = certificate(here, family.free, family.passive.shape[1], not self.fault)
         # what is proved is regular, be it ever so close to a double point; so is what is far from any other
-        if (sure is not None and sure.proved) or Nearby(family, system, x).gap > ONE_ASSEMBLY:
+        if (sure is not None and sure.proved) or Nearby(family, system, x).gap > MODES.one_assembly:
             return "regular", condition, sure
         return "double", np.inf, None
 

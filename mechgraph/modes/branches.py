@@ -27,6 +27,7 @@ from mechgraph.kinematics.solver import closure_solver, engine_for
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Index
 from mechgraph.maths.singular_point import passed
+from mechgraph.maths.tolerances import MODES
 from mechgraph.maths.tracker import End
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.assemblies import Finder, Question
@@ -46,10 +47,6 @@ from mechgraph.quantities import at_least, door, is_numeric, wrong
 
 Node = tuple[int, int]
 """An assembly: the number of its sample, and its own there."""
-ARRIVES = 1e-6
-"""Difference of link poses up to which a piece arrives at an assembly."""
-TOUCHES = 1e-3
-"""Difference of link poses at a fold or a crossing: they grow with the root of the distance from a fold."""
 
 
 @dataclass
@@ -147,7 +144,7 @@ class Tracer:
             j = (piece.sample + piece.sense) % len(self.states)
             here = self._prints(piece.x[:, -1:])
             gaps = np.abs(self.prints[j] - here).max(axis=0, initial=0.0)
-            if gaps.size and gaps.min() < ARRIVES * max(1.0, float(np.abs(here).max())):
+            if gaps.size and gaps.min() < MODES.arrives * max(1.0, float(np.abs(here).max())):
                 piece.arrives = int(np.argmin(gaps))
             return
         piece.end, state = reach[track]
@@ -218,7 +215,7 @@ class Map:
             for b in ended[i + 1 :]:
                 apart = np.abs(a.last - b.last).max() / max(1.0, float(np.abs(a.last).max()))
                 # difference of driver values up to which pieces end at the same fold
-                if (a.sample, a.sense) == (b.sample, b.sense) and abs(a.end - b.end) < 1e-6 and apart < TOUCHES:
+                if (a.sample, a.sense) == (b.sample, b.sense) and abs(a.end - b.end) < 1e-6 and apart < MODES.touches:
                     out.append((a, b))
         return out
 
@@ -228,7 +225,7 @@ class Map:
         for piece, value, at in crossed:
             for known, pieces, there in out:
                 turns = (value - known) / (2 * np.pi)
-                if abs(turns - round(turns)) < TOUCHES and np.abs(at - there).max() < TOUCHES * max(
+                if abs(turns - round(turns)) < MODES.touches and np.abs(at - there).max() < MODES.touches * max(
                     1.0, float(np.abs(at).max())
                 ):
                     pieces.append(piece)
@@ -247,8 +244,6 @@ class Map:
 
 GOLDEN, SPREADS = 0.5 * (3.0 - 5.0**0.5), 3
 """Place of the first sample, as part of the distance of two; how many such places are tried where samples lie on double points."""
-SLIDE_STROKE = 2.0
-"""Range of a driven slide to both sides of the start, over L, where none is given."""
 
 
 @dataclass(frozen=True)
@@ -389,7 +384,7 @@ class Branches(Shown):
         s, place, turns = q.system, q.names.index(self.driver), self.mechanism.turns(self.driver)
         given = s.state_of(s.start_coordinates(start)[:, None])[:, 0]
         x, error = close(s, given, q.columns)
-        if error > CLOSED or np.abs(s.difference(x[:, None], given[:, None])).max() > TOUCHES:
+        if error > CLOSED or np.abs(s.difference(x[:, None], given[:, None])).max() > MODES.touches:
             return None
         goal = x[s.single_rows[q.columns]]
         value = float(goal[place] * q.unit[place])
@@ -407,7 +402,7 @@ class Branches(Shown):
             prints = q.family.prints(Configuration(s, there[:, None]))
             for number, (b, way) in enumerate(zip(self.branches, ways, strict=True)):
                 at = int(np.argmin(way))
-                near = np.abs(b.prints[:, [at]] - prints).max() < ARRIVES * max(1.0, float(np.abs(prints).max()))
+                near = np.abs(b.prints[:, [at]] - prints).max() < MODES.arrives * max(1.0, float(np.abs(prints).max()))
                 # difference of driver values (radians, or lengths) up to which points of several branches lie at the same one
                 if came and near and way[at] - ahead < 1e-9:
                     return number, float(b.values[at] - sense * ahead)
@@ -579,7 +574,7 @@ class _Mapper:
         place, L = probe.names.index(driver), probe.system.par.L
         self.begin = float(probe.declared.x[probe.family.rows[place], 0] * probe.unit[place])
         self.closed = over is None and m.turns(driver)
-        around = (self.begin - SLIDE_STROKE * L, self.begin + SLIDE_STROKE * L)
+        around = (self.begin - MODES.slide_stroke * L, self.begin + MODES.slide_stroke * L)
         self.low, self.high = (self.begin, self.begin + 2 * np.pi) if self.closed else over or around
         self.count = samples
         self.between = max(1, round(points / samples))

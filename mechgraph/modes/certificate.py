@@ -13,9 +13,9 @@ A certificate of a real assembly: the theorem of Newton and Kantorovich on the i
 Of every loop, product ``M(u)`` of the motions along it, ``f = (vee (R - R^T) / 2, p)`` about its middle vanishes where it is closed and,
 within half a turn, nowhere else. Both ``f`` and its derivative come with bounds of all rounding (see ``balls``). With ``A`` the independent
 combinations of rows on the complement of the passive motions, ``beta >= |A^-1|``, ``eta >= |A^-1 f|``, and ``K`` a bound of the second
-derivatives within ``BALL``:
+derivatives within ``MODES.ball``:
 
-    beta K eta <= 1/2  =>  one root, within (1 - sqrt(1 - 2 beta K eta)) / (beta K), and no other within min(BALL, 1 / (beta K)).
+    beta K eta <= 1/2  =>  one root, within (1 - sqrt(1 - 2 beta K eta)) / (beta K), and no other within min(ball, 1 / (beta K)).
 
 ``beta``: with ``Y`` a computed inverse, ``|A^-1| <= |Y| / (1 - |1 - Y A|)`` for every ``A`` within its bounds. ``K``: the second
 derivative along a unit ``u`` is that of a product of motions, ``sum_i u_i^2 s_i s_i + 2 sum_(i < j) u_i u_j s_i s_j``, so that with
@@ -24,7 +24,7 @@ derivative along a unit ``u`` is that of a product of motions, ``sum_i u_i^2 s_i
     |f''|^2 <= sum_i |w_i|^2 h_i^2 + 2 sum_(i < j) |w_i|^2 h_j^2 <= 2 (sum |w_i|^2) (sum h_j^2).
 
 Of a rod, ``f = ((p_b - p_a)^2 - l^2) / 2``: ``|f''| <= g^2 + sqrt(2) |w| g |p_b - p_a|`` with ``g`` the speeds of ``p_b`` and ``|w|`` the
-turns, both summed as squares. All grow by no more than ``exp(2 BALL sqrt(m))`` over the reach (``m`` freedoms). These are sums of positive
+turns, both summed as squares. All grow by no more than ``exp(2 ball sqrt(m))`` over the reach (``m`` freedoms). These are sums of positive
 numbers, of which rounding takes less than a part in 1e12: 1 % is added. Sources: Ortega and Rheinboldt, Iterative Solution of Nonlinear
 Equations in Several Variables, 1970, section 12.6; Rump, Acta Numerica 19, 2010, section 10.
 """
@@ -39,6 +39,7 @@ import numpy as np
 
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Index, cross, rotate
+from mechgraph.maths.tolerances import MODES
 from mechgraph.modes.family import Array, Family
 from mechgraph.modes.form import RodSystem
 from mechgraph.pairs.factors import ConstantScrew, Rotation, screw_terms
@@ -264,12 +265,6 @@ def _turn(quaternion: Array, factor: Rotation) -> Ball:
     return Ball(out, rad)
 
 
-BALL = 0.05
-"""Size of the increments (radians, lengths / L) within which second derivatives are bounded."""
-BOUND_ROUNDING = 1.01
-"""Factor that stands for the rounding of bounds of second derivatives, and of bases that are orthonormal to rounding."""
-
-
 @dataclass(frozen=True)
 class Certificate:
     """What is proved of a regular real assembly.
@@ -313,18 +308,18 @@ def certificate(here: Configuration, free: Index, passive: int, by_structure: bo
     # smallest singular value, as part of the largest, below which nothing is tried
     if not rank or sigma[rank - 1] > 1e-13 * sigma[0]:
         Y, independent = exact(np.diag(1.0 / sigma[:rank])), exact(U[:, :rank].T)
-        off = BOUND_ROUNDING * float(
+        off = MODES.bound_rounding * float(
             np.linalg.norm((Y @ (independent @ A @ exact(Vt[:rank].T)) - exact(np.eye(rank))).bound)
         )
     if off >= 1.0:
         return Certificate(False, np.inf, np.inf, 0.0, rank, dependent, "checked", residual)
-    beta = BOUND_ROUNDING / (sigma[rank - 1] * (1.0 - off)) if rank else 0.0
-    eta = BOUND_ROUNDING * float(np.linalg.norm((Y @ (independent @ f)).bound)) / (1.0 - off)
-    K = BOUND_ROUNDING * curvature(here)
+    beta = MODES.bound_rounding / (sigma[rank - 1] * (1.0 - off)) if rank else 0.0
+    eta = MODES.bound_rounding * float(np.linalg.norm((Y @ (independent @ f)).bound)) / (1.0 - off)
+    K = MODES.bound_rounding * curvature(here)
     h = beta * K * eta
     proved = bool(h <= 0.5)
     error = float((1 - np.sqrt(1 - 2 * h)) / (beta * K)) if proved and h > 0 else float(eta)
-    radius = float(min(BALL, 1 / (beta * K))) if proved and h > 0 else 0.0
+    radius = float(min(MODES.ball, 1 / (beta * K))) if proved and h > 0 else 0.0
     # distance of the root up to which assemblies that are told apart have roots of their own
     return Certificate(proved and error < 1e-7, float(h), error, radius, rank, dependent, how, residual)
 
@@ -383,11 +378,11 @@ def _columns_of_rods(s: RodSystem) -> list[Index]:
 
 
 def curvature(here: Configuration) -> float:
-    """A bound of the second derivatives of the rows of all loops and rods within ``BALL``."""
+    """A bound of the second derivatives of the rows of all loops and rods within ``MODES.ball``."""
     s, S, total = here.system, here.S[:, :, 0], 0.0
     for loop, (columns, _) in enumerate(s.loop_columns):
         turn, arm, grown = _sizes(S[:, columns], here.middles[:, loop, 0])
-        gap = BALL * grown * np.sqrt((turn**2 + arm**2).sum())
+        gap = MODES.ball * grown * np.sqrt((turn**2 + arm**2).sum())
         h2 = turn**2 + (grown * arm + turn * gap) ** 2
         total += 2.0 * float((turn**2).sum() * h2.sum())
     if isinstance(s, RodSystem):
@@ -395,14 +390,18 @@ def curvature(here: Configuration) -> float:
         for rod, columns in enumerate(_columns_of_rods(s)):
             end = rotate(here.poses[:, :3, k.b[rod]], k.at_b[:, rod]) + here.poses[:, 3, k.b[rod]]
             turn, arm, grown = _sizes(S[:, columns], end[:, 0])
-            gone = BALL * grown * np.sqrt((arm**2).sum())
+            gone = MODES.ball * grown * np.sqrt((arm**2).sum())
             speed, length = np.sqrt(((arm + turn * gone) ** 2).sum()), np.sqrt((W[3:, rod] ** 2).sum()) + gone
             total += float(speed**2 + np.sqrt(2.0 * (turn**2).sum()) * speed * length) ** 2
     return float(np.sqrt(total))
 
 
 def _sizes(S: Array, point: Array) -> tuple[Array, Array, float]:
-    """Sizes ``|w|, |v|`` of twists ``S (6, n)`` about a ``point (3,)``, and how far these grow within ``BALL``."""
+    """Sizes ``|w|, |v|`` of twists ``S (6, n)`` about a ``point (3,)``, and how far these grow within ``MODES.ball``."""
     w = S[:3]
     v = S[3:] + cross(w, np.repeat(point[:, None], w.shape[1], axis=1))
-    return np.sqrt((w * w).sum(axis=0)), np.sqrt((v * v).sum(axis=0)), float(np.exp(2 * BALL * np.sqrt(w.shape[1])))
+    return (
+        np.sqrt((w * w).sum(axis=0)),
+        np.sqrt((v * v).sum(axis=0)),
+        float(np.exp(2 * MODES.ball * np.sqrt(w.shape[1]))),
+    )

@@ -25,6 +25,7 @@ from mechgraph.kinematics.reach import BEYOND_END, beyond
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Index
+from mechgraph.maths.tolerances import MODES
 from mechgraph.modes.family import Array, Family, parts
 
 GUESSES_TOGETHER = 200
@@ -61,22 +62,12 @@ def searched(
     return np.concatenate(found, axis=1)
 
 
-VANISHED = 1e-200
-"""What stands for a curvature of zero, by which is divided."""
-SINGULAR = 1e-5
-"""Smallest singular value of the closure rows, as part of the largest, below which an assembly is looked at more closely."""
-AWAY = 1e-2
-"""Step along motions that the rows leave free, after which a continuum is still closed: closing takes back what rows hold to a rank."""
-CURVED = 1e-3
-"""Step of second differences: their rounding is 1e-10."""
-
-
 def least_value(family: Family, here: Configuration) -> Array:
     """Smallest singular values ``(T,)`` of the closure rows beside those of passive motions, as parts of the largest."""
     if not family.unknowns:
         return np.ones(here.T)
     sigma = np.linalg.svd(here.J[:, family.free].transpose(2, 0, 1), compute_uv=False)
-    return np.asarray(np.maximum(parts(sigma)[:, family.unknowns - 1], VANISHED))
+    return np.asarray(np.maximum(parts(sigma)[:, family.unknowns - 1], MODES.vanished))
 
 
 def irregular(family: Family, here: Configuration) -> Array:
@@ -85,7 +76,7 @@ def irregular(family: Family, here: Configuration) -> Array:
     lengths = here.x[s.single_rows[s.is_length]]
     large = np.maximum(np.abs(here.x.imag).max(axis=0, initial=0.0), np.abs(lengths).max(axis=0, initial=0.0))
     # imaginary part, or length over L, in a state from which on small singular values are a matter of scale
-    return np.asarray((least_value(family, here) < SINGULAR) & (large <= 10.0))
+    return np.asarray((least_value(family, here) < MODES.singular) & (large <= 10.0))
 
 
 class Nearby:
@@ -96,7 +87,7 @@ class Nearby:
         self._U, sigma, Vt = np.linalg.svd(self.here.J[:, family.free, 0])
         size = parts(sigma)
         wanted = family.unknowns
-        self.rank = min(int((size > SINGULAR).sum()), wanted)
+        self.rank = min(int((size > MODES.singular).sum()), wanted)
         self._left = Vt[self.rank :].conj().T
 
     @property
@@ -107,7 +98,9 @@ class Nearby:
     @cached_property
     def motions(self) -> Array:
         """Motions ``(free, k)`` of largest rate 1 that the rows leave free, or nearly so, beside passive ones, which tell nothing apart."""
-        rates = self._prints(self._stepped(CURVED * self._left)) - self._prints(self._stepped(-CURVED * self._left))
+        rates = self._prints(self._stepped(MODES.curved * self._left)) - self._prints(
+            self._stepped(-MODES.curved * self._left)
+        )
         told = np.linalg.svd(rates)[2][: self.family.unknowns - self.rank]
         out = self._left @ told.conj().T
         return np.asarray(out / np.abs(out).max(axis=0))
@@ -122,11 +115,11 @@ class Nearby:
         ways = self.motions @ mixed
         ways = ways / np.abs(ways).max(axis=0)
         x, error = close_all(
-            self.system, self._stepped(AWAY * np.concatenate([ways, -ways], axis=1)), self.family.columns
+            self.system, self._stepped(MODES.away * np.concatenate([ways, -ways], axis=1)), self.family.columns
         )
         gone = np.abs(self._prints(x) - self._prints(self.here.x)).max(axis=0, initial=0.0)
         # part of the step by which what tells assemblies apart must have changed
-        return x[:, (error < CLOSED) & (gone > 0.2 * AWAY)]
+        return x[:, (error < CLOSED) & (gone > 0.2 * MODES.away)]
 
     @property
     def moves(self) -> bool:
@@ -145,11 +138,13 @@ class Nearby:
     def _bent(self) -> tuple[complex, complex, float]:
         """What the rows leave open, its rate and ``kappa`` along the only motion, each in the direction of rows that these two have."""
         dq = self.motions
-        ahead, back = (Configuration(self.system, self._stepped(sign * CURVED * dq)).residual[:, 0] for sign in (1, -1))
+        ahead, back = (
+            Configuration(self.system, self._stepped(sign * MODES.curved * dq)).residual[:, 0] for sign in (1, -1)
+        )
         f = self.here.residual[:, 0]
         across = self._U[:, self.rank :].conj().T
-        kappa = across @ (ahead + back - 2 * f) / CURVED**2
-        size = max(float(np.linalg.norm(kappa)), VANISHED)
+        kappa = across @ (ahead + back - 2 * f) / MODES.curved**2
+        size = max(float(np.linalg.norm(kappa)), MODES.vanished)
         u = kappa.conj() / size
         rates = self.here.J[:, self.family.free, 0] @ dq[:, 0]
         return complex(u @ (across @ f)), complex(u @ (across @ rates)), size
@@ -183,8 +178,6 @@ class Nearby:
         return self.family.prints(Configuration(self.system, x))
 
 
-SAME_PLACE = 1e-5
-"""Difference of what does not move up to which two points are of one continuum."""
 MOST_STEPS_ALONG, STEP_ALONG, NEAREST_POINT = 200, 0.3, 1e-9
 """Steps along a continuum to its point nearest to the start, at most; the largest; and that at which it ends."""
 
@@ -228,7 +221,7 @@ def _one(a: Found, at_rest: Array, b: Found, at_rest_b: Array) -> bool:
     """Whether the same freedoms move and all else is at the same place."""
     if a.dimension != b.dimension or (a.moves != b.moves).any():
         return False
-    return bool(np.nanmax(np.abs(at_rest - at_rest_b), initial=0.0) < SAME_PLACE)
+    return bool(np.nanmax(np.abs(at_rest - at_rest_b), initial=0.0) < MODES.same_place)
 
 
 def _along(about: Nearby) -> Array:
@@ -287,8 +280,8 @@ def _described(about: Nearby) -> tuple[Found, Array]:
     beside = [Nearby(family, system, landed[:, [i]]) for i in range(landed.shape[1])]
     least = min(len(one.motions.T) for one in beside)
     ways = np.concatenate([_along(one) for one in beside if len(one.motions.T) == least], axis=1)
-    moves = np.abs(ways).max(axis=1) > SAME_PLACE
+    moves = np.abs(ways).max(axis=1) > MODES.same_place
     here, there = (family.prints(Configuration(system, of)) for of in (about.here.x, landed))
-    still = np.abs(there - here).max(axis=1) < SAME_PLACE
+    still = np.abs(there - here).max(axis=1) < MODES.same_place
     found = Found(about.here.x[:, 0], min(one.dimension for one in beside), moves)
     return found, np.where(still, here[:, 0], np.nan)

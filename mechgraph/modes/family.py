@@ -37,18 +37,13 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Index, compose, cross_twist, finite_twist, inverse, move_twist, multiplied, pose_exp
+from mechgraph.maths.tolerances import MODES
 from mechgraph.pairs.pair_type import PairType
 
-SPAN = 1e-6
-"""Part of a twist outside a span up to which it lies in it."""
 Array = NDArray[Any]
 """Numbers, real or complex."""
-MEMBER_CLOSED = 1e-9
-"""Closure error up to which a member of a class counts as closed."""
 NO_NUMBERS: Index = np.zeros(0, dtype=np.intp)
 """No freedoms, no links."""
-GENERIC = 1e-7
-"""Singular value, as part of the largest, below which it counts as zero at random members."""
 
 
 @dataclass(frozen=True)
@@ -148,7 +143,7 @@ class Family:
         if self.system.moving_batches:
             return "a pair guides along a curve"
         S = self.here.S[:, :, 0]
-        if np.abs((S[:3] * S[3:]).sum(axis=0)).max(initial=0.0) > SPAN:
+        if np.abs((S[:3] * S[3:]).sum(axis=0)).max(initial=0.0) > MODES.span:
             return "helical pairs make the closure transcendental"
         if self.unknowns != self.rank or not self.independent:
             return "its closure rows depend on each other by relations that no known class keeps"
@@ -164,14 +159,14 @@ class Family:
         """Links that no passive motion moves, and that are not parts of rods."""
         V = [self.here.link_twists(rates[:, None]) for rates in self.idle.T]
         links = np.arange(len(self.system.m.links))
-        still = np.abs(V).max(axis=(0, 1, 3)) < SPAN if V else np.ones(len(links), dtype=bool)
+        still = np.abs(V).max(axis=(0, 1, 3)) < MODES.span if V else np.ones(len(links), dtype=bool)
         return links[still & ~np.isin(links, self._rods)]
 
     @cached_property
     def periods(self) -> Array:
         """By how much freedoms ``(F,)`` grow until all is as it was: turns, closed curves; infinite for slides and helical motions."""
         S = self.here.S[:, :, 0]
-        helical = ~self.system.is_length & (np.abs((S[:3] * S[3:]).sum(axis=0)) > SPAN)
+        helical = ~self.system.is_length & (np.abs((S[:3] * S[3:]).sum(axis=0)) > MODES.span)
         return np.where(helical, np.inf, self.system.periods)
 
     @cached_property
@@ -179,7 +174,7 @@ class Family:
         """State rows of freedoms that come back and of those that do not, which no passive motion changes, and that are not in rods."""
         s = self.system
         inside = np.isin(s.a, self._rods) | np.isin(s.b, self._rods)
-        still = (s.single_rows >= 0) & (np.abs(self.idle).max(axis=1, initial=0.0) < SPAN)
+        still = (s.single_rows >= 0) & (np.abs(self.idle).max(axis=1, initial=0.0) < MODES.span)
         still &= ~inside[s.pair_of_freedom]
         back = np.isfinite(self.periods)
         return s.single_rows[still & back], s.single_rows[still & ~back]
@@ -190,7 +185,7 @@ class Family:
         if self.system.rotations is None:
             return np.zeros((4, 0), dtype=np.intp)
         columns, rows = self.system.rotations
-        still = np.abs(self.idle).max(axis=1, initial=0.0) < SPAN
+        still = np.abs(self.idle).max(axis=1, initial=0.0) < MODES.span
         return rows[:, still[columns].all(axis=0)]
 
     def prints(self, here: Configuration) -> Array:
@@ -281,7 +276,7 @@ class Family:
             markers[:, :, P + chords] = compose(inverse(T), moved)
         found = Member(markers, self.drive_of(markers, x))
         closed = Configuration(self.system_of(found), x)
-        if not closed.closure[0] < MEMBER_CLOSED or not self.within(markers, P + chords):
+        if not closed.closure[0] < MODES.member_closed or not self.within(markers, P + chords):
             return None
         return found, x[:, 0]
 
@@ -292,7 +287,7 @@ class Family:
         e = move_twist(self.here.poses[:, :, self.bearers[at]], e)[:, :, 0]
         for i, k in enumerate((at % len(self.system.m.pairs)).tolist()):
             basis = self.algebras[k]
-            if np.abs(e[:, i] - basis @ (basis.T @ e[:, i])).max() > 1e3 * MEMBER_CLOSED * max(
+            if np.abs(e[:, i] - basis @ (basis.T @ e[:, i])).max() > 1e3 * MODES.member_closed * max(
                 1.0, np.abs(e[:, i]).max()
             ):
                 return False
@@ -324,7 +319,7 @@ def at_rest(motions: Array, held: Index) -> Array:
     if not held.size:
         return motions
     _, sigma, Vt = np.linalg.svd(motions[held])
-    return np.asarray(motions @ Vt[int((sigma > SPAN).sum()) :].T)
+    return np.asarray(motions @ Vt[int((sigma > MODES.span).sum()) :].T)
 
 
 def parts(sigma: Array) -> Array:
@@ -337,7 +332,7 @@ def span(S: Array) -> Array:
     if not S.size:
         return np.zeros((6, 0))
     U, s, _ = np.linalg.svd(S, full_matrices=False)
-    return np.asarray(U[:, s > SPAN * max(1.0, s[0])])
+    return np.asarray(U[:, s > MODES.span * max(1.0, s[0])])
 
 
 def common(spaces: list[Array]) -> Array:
@@ -345,7 +340,7 @@ def common(spaces: list[Array]) -> Array:
     if not spaces:
         return np.zeros((6, 0))
     outside, vectors = np.linalg.eigh(sum(np.eye(6) - B @ B.T for B in spaces))
-    return np.asarray(vectors[:, outside < SPAN])
+    return np.asarray(vectors[:, outside < MODES.span])
 
 
 class Labelling:
@@ -504,4 +499,4 @@ def _same_back(row: PairType) -> bool:
         return True
     S = np.array([f.twist for f in row.freedoms]).reshape(-1, 6).T
     n = S.shape[1]
-    return bool(np.abs(cross_twist(np.repeat(S, n, axis=1), np.tile(S, (1, n)))).max(initial=0.0) < SPAN)
+    return bool(np.abs(cross_twist(np.repeat(S, n, axis=1), np.tile(S, (1, n)))).max(initial=0.0) < MODES.span)

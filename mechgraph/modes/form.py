@@ -46,11 +46,11 @@ from mechgraph.maths.se3 import (
     quaternion_product,
     rotate,
 )
-from mechgraph.maths.tolerances import RANKS
+from mechgraph.maths.tolerances import MODES, RANKS
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Pair
 from mechgraph.model.parameters import Parameters
-from mechgraph.modes.family import SPAN, Array, Family
+from mechgraph.modes.family import Array, Family
 from mechgraph.pairs import kinematics
 from mechgraph.pairs.pair_type import PairType
 
@@ -150,7 +150,7 @@ class RodFamily(Family):
             return np.asarray(np.argmax(self._same[:, None] == self._same, axis=1))
         k = self.system.points
         links, at = np.concatenate([k.a, k.b]), np.concatenate([k.at_a, k.at_b], axis=1)[:, :, 0]
-        same = (np.abs(at[:, :, None] - at[:, None]).max(axis=0) < SPAN) & (links[:, None] == links)
+        same = (np.abs(at[:, :, None] - at[:, None]).max(axis=0) < MODES.span) & (links[:, None] == links)
         return np.asarray(np.argmax(same, axis=0))
 
     @property
@@ -335,7 +335,7 @@ def _points(row: PairType) -> bool:
     return (
         len(row.steps) == len(row.freedoms) == 2
         and not twists[:, 3:].any()
-        and bool(np.linalg.norm(np.cross(*twists[:, :3])) > SPAN)
+        and bool(np.linalg.norm(np.cross(*twists[:, :3])) > MODES.span)
     )
 
 
@@ -478,7 +478,7 @@ class WithoutRods:
             for k, link in enumerate(self.afloat.tolist(), len(self.pairs)):
                 at = slice(s.first_column[k], s.first_column[k + 1])
                 out[at, i] = np.linalg.solve(here.S[:, at, 0], V[:, link])
-        return out[:, np.abs(out).max(axis=0, initial=0.0) > SPAN]
+        return out[:, np.abs(out).max(axis=0, initial=0.0) > MODES.span]
 
     def lifted(self, x: Array, position: int) -> Array:
         """States of the mechanism: balls and turns of the rods put back one after the other."""
@@ -532,7 +532,7 @@ def _ball(of: Array, to: Array, begin: Array) -> Array:
     across = _unit(cross(a, np.eye(3)[np.argmin(np.abs(a), axis=0)].T.astype(complex)))
     least = np.concatenate([(1.0 + cosine)[None], cross(a, u)]) / np.sqrt(2.0 * (1.0 + cosine))
     half = np.concatenate([np.zeros_like(cosine)[None], across])
-    return quaternion_product(np.where(np.abs(1.0 + cosine) < SPAN, half, least), begin)
+    return quaternion_product(np.where(np.abs(1.0 + cosine) < MODES.span, half, least), begin)
 
 
 def _two_turns(row: PairType, of: Array, to: Array, begin: Array) -> Array:

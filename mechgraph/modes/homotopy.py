@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Index, finite_twist, homogeneous, move_twist, multiplied, quaternion_product
+from mechgraph.maths.tolerances import MODES
 from mechgraph.modes.family import Array, Family, Member
 from mechgraph.pairs.factors import screw_terms, screw_values
 
@@ -27,12 +28,8 @@ Mask = NDArray[np.bool_]
 
 ENDLESS_STATE = (25.0, 1e5, 1e3)
 """Imaginary part of an angle, length over L, and quaternion from which on an assembly is on its way to infinity."""
-SLIDE = 1e-9
-"""Turn of a marker below which it slides."""
 RATES_KEPT = 4
 """Nodes from whose rates a step is predicted."""
-MOST_NOISE = 1e-5
-"""Rounding with which a track may end."""
 
 TRACKS_TOGETHER = 600
 """Tracks followed together, at most, of several positions or loops."""
@@ -102,7 +99,7 @@ class Leg:
         R = multiplied(last[:, :3], first[:, :3].swapaxes(0, 1))
         eta = finite_twist(R, last[:, 3], first[:, 3])
         turn = np.sqrt((eta[:3] * eta[:3]).sum(axis=0))
-        slides = np.abs(turn) < SLIDE
+        slides = np.abs(turn) < MODES.slide
         self._turn = np.where(slides, 1.0, turn)
         unit = eta / self._turn
         unit[:3] = np.where(slides, 0.0, unit[:3])
@@ -232,7 +229,7 @@ class Care:
 
     aim: float = 1e-2
     most: float = 5e-2
-    noise: float = MOST_NOISE
+    noise: float = MODES.most_noise
 
     @property
     def finer(self) -> Care:
@@ -354,7 +351,7 @@ def rounding(size: Array) -> Array:
     return np.asarray(3e-14 * size**3)
 
 
-def polished(leg: Leg, x: Array, t: complex, tracks: Index, most: float = MOST_NOISE) -> tuple[Array, Mask]:
+def polished(leg: Leg, x: Array, t: complex, tracks: Index, most: float = MODES.most_noise) -> tuple[Array, Mask]:
     """States closed by Newton to rounding at one ``t``, passive bodies turned to where they are least imaginary; which closed."""
     eq = leg.equations
     places = np.full(x.shape[1], t)

@@ -60,7 +60,8 @@ from mechgraph.graph.linkgraph import components_of_edges
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import compose, pose_exp
-from mechgraph.modes.family import GENERIC, MEMBER_CLOSED, SPAN, Array, Family, Labelling, Member, common, span
+from mechgraph.maths.tolerances import MODES
+from mechgraph.modes.family import Array, Family, Labelling, Member, common, span
 from mechgraph.modes.form import RodFamily
 from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, Equations, Leg, Linear, follow
 
@@ -197,8 +198,6 @@ def _of_triad(family: Family) -> Bound | None:
 
 MOST_TRACKS = 24_000
 """Tracks over all of them, at most."""
-POLE_RANGE = 200.0
-"""Size of ``z`` or ``1 / z`` up to which poles are sampled."""
 SPARE_VALUES = 4
 """Singular values beyond the degree, at least."""
 
@@ -295,7 +294,7 @@ def _poles(z: Array, f: Array, weights: Array) -> Array:
 
 def _beside(poles: Array, rng: np.random.Generator) -> Array:
     """Two ``phi`` beside every pole that is not far away."""
-    poles = poles[(np.abs(poles) < POLE_RANGE) & (np.abs(poles) > 1.0 / POLE_RANGE)]
+    poles = poles[(np.abs(poles) < MODES.pole_range) & (np.abs(poles) > 1.0 / MODES.pole_range)]
     gaps = np.abs(poles[:, None] - poles)
     np.fill_diagonal(gaps, np.abs(poles))
     # the least that counts of the distance of two poles, as part of their size
@@ -327,7 +326,7 @@ class _Pencil:
 
     def members(self, phi: Array) -> Member:
         """Members at ``phi (n,)``; a line without a turn is a direction, along which it goes by ``z - 1``, as squares of rods do."""
-        slides = np.abs(self.lines[:3]).max(axis=0) < SPAN
+        slides = np.abs(self.lines[:3]).max(axis=0) < MODES.span
         turned = self.lines * np.where(slides, np.exp(1j * phi) - 1.0, phi)
         markers = compose(pose_exp(self.family.in_links(turned)), self.base.markers)
         return Member(markers, self.base.drive + self.drive * (np.exp(1j * phi) - 1.0))
@@ -373,13 +372,13 @@ def _isotropic(family: Family) -> Array | None:
     if family.points or family.idle.shape[1] or not plane or shared.shape[1] != 3:
         return None
     _, turns, Vt = np.linalg.svd(shared[:3])
-    return (shared @ Vt[1:].T)[3:] @ [1.0, 1.0j] if (turns > SPAN).sum() == 1 else None
+    return (shared @ Vt[1:].T)[3:] @ [1.0, 1.0j] if (turns > MODES.span).sum() == 1 else None
 
 
 def _line(algebra: Array, rng: np.random.Generator) -> Array:
     """A random turn ``(6,)`` about a line in an algebra ``(6, k)``; a direction where it has no turns."""
     w, v = (algebra @ (rng.normal(size=(algebra.shape[1], 2)) @ [1.0, 0.5j])).reshape(2, 3)
-    if np.abs(w).max() < SPAN:
+    if np.abs(w).max() < MODES.span:
         return np.concatenate([w, v])
     return np.asarray(np.concatenate([w, v - w * (w @ v) / (w @ w)]) / np.sqrt(w @ w))
 
@@ -406,8 +405,6 @@ LOOP_ROUNDS, MOST_TRACKED = 60, 60_000
 """Rounds of loops at a member, and tracks in all, after which they are not either."""
 CANDIDATES = 6
 """Members of which the best one is kept."""
-ONE_ASSEMBLY = 1e-6
-"""Difference of link poses, against their size, up to which two assemblies are one."""
 
 
 class Irregular(Exception):
@@ -442,7 +439,7 @@ class StartSet:
             return False
         here = Configuration(family.system_of(self.member), self.x)
         size = np.maximum(1.0, np.abs(here.poses).max(axis=(0, 1, 2)))
-        return bool((here.closure < MEMBER_CLOSED * size).all())
+        return bool((here.closure < MODES.member_closed * size).all())
 
 
 def fingerprints(family: Family, member: Member, x: Array) -> Array:
@@ -461,7 +458,7 @@ def distinct(poses: Array, known: Array | None = None, least: Array | None = Non
         if not np.isfinite(p).all():
             continue
         size = max(1.0, float(np.abs(p).max()))
-        one = ONE_ASSEMBLY if least is None else least[i]
+        one = MODES.one_assembly if least is None else least[i]
         if all(np.abs(p - q).max() > one * size for q in have):
             have.append(p)
             out.append(i)
@@ -485,7 +482,7 @@ def start_set(family: Family, rng: np.random.Generator, progress: Callable[[str]
         equations = Equations(family, family.mixing(rng))
         leg = Leg(equations, member, member)
         here = leg.at(x[:, None], np.zeros(1), np.zeros(1, dtype=np.intp))
-        if rank_of(singular_values(here.J[:, :, 0]), GENERIC) == family.rank and not _told_by_idle(family, here):
+        if rank_of(singular_values(here.J[:, :, 0]), MODES.generic) == family.rank and not _told_by_idle(family, here):
             return _permuted(equations, member, x, rng, progress)
     raise Irregular
 
@@ -497,7 +494,9 @@ def _told_by_idle(family: Family, here: Linear) -> bool:
     rates[family.free] = idle.T
     moved = [here.here.link_twists(rate[:, None])[:, family.settled_links] for rate in rates.T]
     single = np.flatnonzero(np.isin(s.single_rows, np.concatenate(family.settled_rows)))
-    return bool(np.abs(np.array(moved)).max(initial=0.0) > SPAN or np.abs(rates[single]).max(initial=0.0) > SPAN)
+    return bool(
+        np.abs(np.array(moved)).max(initial=0.0) > MODES.span or np.abs(rates[single]).max(initial=0.0) > MODES.span
+    )
 
 
 def _permuted(

@@ -32,24 +32,20 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Index, compose, identity
-from mechgraph.maths.tolerances import RANKS
+from mechgraph.maths.tolerances import MODES, RANKS
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Pair
 from mechgraph.modes.continua import Nearby, irregular, least_value
-from mechgraph.modes.family import SPAN, Array, Family, Member, generated
+from mechgraph.modes.family import Array, Family, Member, generated
 from mechgraph.modes.form import RodFamily, RodStep, RodSystem, behind
 from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, Equations, Leg, follow, rounding
-from mechgraph.modes.start_sets import ONE_ASSEMBLY, StartSet, distinct
+from mechgraph.modes.start_sets import StartSet, distinct
 
-RADIUS = 0.04
-"""Distance from its end at which a track is led round."""
 ARCS = 12
 """States on a turn round the end."""
 FAR_NOISE, FAR_APART = 5e-2, 0.1
 """Rounding with which tracks may end far away, at what is plainly not real; largest difference, against their size, up to which such ends
 count as one."""
-REAL_SINGULAR = 1e-3
-"""Difference of link poses at which ends may be one, or real, where rows are singular, so that they are known to the root of rounding."""
 
 
 @dataclass
@@ -158,12 +154,17 @@ def _endgame(leg: Leg, x: Array, tracks: Index, care: Care, out: _TrackRun) -> N
     """Tracks from their starts to a distance from the end, and round it until they are back."""
     eq = leg.equations
     near = follow(
-        leg, x, care, lambda s: (s * (1.0 - RADIUS), np.full(s.shape, 1.0 - RADIUS)), tracks=tracks, polish=False
+        leg,
+        x,
+        care,
+        lambda s: (s * (1.0 - MODES.radius), np.full(s.shape, 1.0 - MODES.radius)),
+        tracks=tracks,
+        polish=False,
     )
     kept = np.flatnonzero(near.arrived)
     tracks, x = tracks[kept], near.x[:, kept]
     begin, total = x.copy(), np.zeros_like(x)
-    first = leg.prints(begin, np.full(len(kept), 1.0 - RADIUS), tracks)
+    first = leg.prints(begin, np.full(len(kept), 1.0 - MODES.radius), tracks)
     alive = np.arange(len(kept))
     # turns after which a track must be back
     for turn in range(1, 7):
@@ -176,7 +177,7 @@ def _endgame(leg: Leg, x: Array, tracks: Index, care: Care, out: _TrackRun) -> N
             alive = alive[tracked.arrived]
         if not alive.size:
             return
-        now = leg.prints(x[:, alive], np.full(len(alive), 1.0 - RADIUS), tracks[alive])
+        now = leg.prints(x[:, alive], np.full(len(alive), 1.0 - MODES.radius), tracks[alive])
         gap = np.abs(now - first[:, alive]).max(axis=0) / np.maximum(1.0, np.abs(now).max(axis=0))
         # difference up to which a track is back
         back = alive[gap < 1e-5]
@@ -198,7 +199,7 @@ def _arc(k: int) -> Callable[[Array], tuple[Array, Array]]:
     """The part ``k`` of the circle round the end."""
 
     def way(s: Array) -> tuple[Array, Array]:
-        turn = RADIUS * np.exp(2j * np.pi * (k + s) / ARCS)
+        turn = MODES.radius * np.exp(2j * np.pi * (k + s) / ARCS)
         return 1.0 - turn, -2j * np.pi / ARCS * turn
 
     return way
@@ -213,7 +214,7 @@ def _account(family: Family, at: Member, known: Ends, run: _TrackRun, lost_befor
     once = own[distinct(told.poses[:, own], None, told.least[own])]
     points, N = np.concatenate([once, np.flatnonzero(told.meet)]), run.x.shape[1] + lost_before
     met, lost = len(own) - len(once), N - len(own) - int(told.meet.sum()) - int(told.moving.sum()) - infinite
-    least = np.where(told.meet[points], REAL_SINGULAR, told.least[points])
+    least = np.where(told.meet[points], MODES.real_singular, told.least[points])
     new = distinct(told.poses[:, points], known.poses if known.runs else None, least)
     confirmed = known.runs > 0 and not new.size and infinite == known.infinite
     if not known.runs or lost + met <= known.lost + known.met:
@@ -240,7 +241,7 @@ class _Told:
         # an end that is known to few digits counts where it cannot be a real assembly, which would be missed
         size = np.maximum(1.0, np.abs(self.poses).max(axis=0, initial=0.0))
         unreal = np.abs(self.poses.imag).max(axis=0, initial=0.0) > FAR_APART * size
-        self.regular &= (self.least == ONE_ASSEMBLY) | unreal
+        self.regular &= (self.least == MODES.one_assembly) | unreal
         some = np.flatnonzero(run.singular)
         closed, error = close_all(self.system, self.x[:, some], family.columns)
         self.doubtful, some = int((error >= CLOSED).sum()), some[error < CLOSED]
@@ -256,18 +257,18 @@ class _Told:
         left = weak[~self.moving[weak]]
         while left.size:
             apart = np.abs(self.poses[:, left] - self.poses[:, left[:1]]).max(axis=0)
-            mine = left[apart <= REAL_SINGULAR * np.maximum(1.0, np.abs(self.poses[:, left[0]]).max())]
+            mine = left[apart <= MODES.real_singular * np.maximum(1.0, np.abs(self.poses[:, left[0]]).max())]
             self._resolve(mine, next((near[i] for i in mine.tolist() if not self.regular[i]), None))
             left = np.setdiff1d(left, mine)
         self._print()
         self.error = np.where(
-            self.meet, REAL_SINGULAR, rounding(size) / least_value(family, Configuration(self.system, self.x))
+            self.meet, MODES.real_singular, rounding(size) / least_value(family, Configuration(self.system, self.x))
         )
 
     def _print(self) -> None:
         self.poses = self.family.prints(Configuration(self.system, self.x))
         self.least = np.clip(
-            rounding(np.maximum(1.0, np.abs(self.poses).max(axis=0, initial=0.0))), ONE_ASSEMBLY, FAR_APART
+            rounding(np.maximum(1.0, np.abs(self.poses).max(axis=0, initial=0.0))), MODES.one_assembly, FAR_APART
         )
 
     def _resolve(self, mine: Index, about: Nearby | None) -> None:
@@ -275,14 +276,10 @@ class _Told:
         if about is None:
             if len(distinct(self.poses[:, mine])) == len(mine):
                 return
-        elif about.gap > ONE_ASSEMBLY and len(mine) <= 2:
+        elif about.gap > MODES.one_assembly and len(mine) <= 2:
             self.x[:, mine], self.regular[mine] = about.both()[:, : len(mine)], True
             return
         self.regular[mine], self.meet[mine[0]] = False, len(mine)
-
-
-KNOWN_MOVED = 0.3
-"""Change of what is known (radians, lengths over L) at which a group must still be a member of its class."""
 
 
 class Undivided:
@@ -377,7 +374,7 @@ class EquationGroup:
         if family.whole:
             return True
         rng, s = np.random.default_rng(0), self.whole.system
-        dq = rng.uniform(-KNOWN_MOVED, KNOWN_MOVED, (s.n_freedoms, 1))
+        dq = rng.uniform(-MODES.known_moved, MODES.known_moved, (s.n_freedoms, 1))
         markers = self._carried(s.advance(self.whole.here.x, dq))
         return family.within(markers, np.arange(2 * len(self.pairs)))
 
@@ -389,9 +386,9 @@ class EquationGroup:
         if not rates.shape[1]:
             return rates[kept]
         _, sigma, Vt = np.linalg.svd(rates[others])
-        own = (rates @ Vt[int((sigma > SPAN).sum()) :].T)[kept]
+        own = (rates @ Vt[int((sigma > MODES.span).sum()) :].T)[kept]
         U, sigma, _ = np.linalg.svd(own, full_matrices=False)
-        return np.asarray(U[:, sigma > SPAN])
+        return np.asarray(U[:, sigma > MODES.span])
 
     def _class(self, columns: Index, idle: Array, held: Index) -> Family:
         """The class, told where the whole is."""
@@ -502,7 +499,7 @@ def _constraints(family: Family) -> Constraints:
             out.append(Constraint(len(out), {a: -(w @ T)[None], b: (w @ T)[None]}))
     for rates in family.passive.T:
         V = here.link_twists(rates[:, None])[:, :, 0]
-        moved = {i: (v @ T)[None] for i, v in enumerate(V.T) if np.abs(v).max() > SPAN}
+        moved = {i: (v @ T)[None] for i, v in enumerate(V.T) if np.abs(v).max() > MODES.span}
         # against a neighbour that rests
         rests = next(b if a in moved else a for a, b in s.graph.ends if (a in moved) != (b in moved))
         moved[rests] = -np.sum(list(moved.values()), axis=0)
@@ -523,7 +520,7 @@ def _merged(rows: Constraints, body: Index) -> Constraints:
     return Constraints(out, rows.b)
 
 
-REAL = 0.5 * ONE_ASSEMBLY
+REAL = 0.5 * MODES.one_assembly
 """Imaginary part of link poses up to which an assembly counts as real: of two that can be told from each other it is larger."""
 MOST_FOLLOWED = 5000
 """Tracks of a group to one position, at most: beyond that only real assemblies of the groups before are gone on with."""
@@ -532,7 +529,7 @@ MOST_FOLLOWED = 5000
 def is_real(poses: Array, error: Array) -> Array:
     """Which assemblies count as real, by what tells them apart ``(n, V)``, of which they may be off by an ``error (V,)``."""
     size = np.maximum(1.0, np.abs(poses).max(axis=0, initial=0.0))
-    return np.asarray(np.abs(poses.imag).max(axis=0, initial=0.0) / size < np.clip(error, REAL, REAL_SINGULAR))
+    return np.asarray(np.abs(poses.imag).max(axis=0, initial=0.0) / size < np.clip(error, REAL, MODES.real_singular))
 
 
 class Product:
@@ -601,7 +598,7 @@ class Product:
             x.append(group.put(self.x[:, j], np.concatenate([one.x, one.moving], axis=1)))
             count, error = (
                 np.append(one.count, np.ones(k, dtype=np.intp)),
-                np.append(one.error, np.full(k, REAL_SINGULAR)),
+                np.append(one.error, np.full(k, MODES.real_singular)),
             )
             moving = self.moving[j] | (np.arange(len(count)) >= len(one.count))
             parts.append((np.full(len(count), place), here * count, np.maximum(error, self.error[j]), moving))

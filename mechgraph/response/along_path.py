@@ -52,13 +52,13 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Array, Index, cross, rotate
 from mechgraph.maths.singular_point import WINDOW, Crossing, leapt, passed
-from mechgraph.maths.tolerances import PATH
+from mechgraph.maths.tolerances import PATH, RESPONSE
 from mechgraph.maths.track import Interpolation, Nodes, Paths
 from mechgraph.maths.tracker import End, Follower
 from mechgraph.model.loads import Load
 from mechgraph.response.charts import Task
 from mechgraph.response.kernel_rates import KernelPath
-from mechgraph.response.motion_equations import MASSLESS, ClosedChart, Loads, Stopped, along_one
+from mechgraph.response.motion_equations import ClosedChart, Loads, Stopped, along_one
 
 OF_LOADS = 4
 """Tabulated terms of the loads that depend on the place, and on rates linearly: see ``along_one``."""
@@ -193,12 +193,6 @@ class _AlongSite(Site):
 
 POINTS = 16
 """Points of a series; even, so that none lies in the middle."""
-AROUND = 0.64
-"""Length of the piece with a change point in its middle: the accelerations of states beside it lose rounding over the cube of the
-distance, 5e-12 at the nearest point of the series."""
-AT_CROSSING = 0.01
-"""Distance from a change point up to which a place counts as it."""
-NOISE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -245,11 +239,15 @@ class Way:
         """Tabulate the next part, up to ``most`` at first."""
         place = min(self.length + self._next, most)
         self._next *= 2.0
-        self._follow(place + AROUND / 2)
+        self._follow(place + RESPONSE.around_crossing / 2)
         # a part does not end beside a change point
-        while near := [c.place for c in self.crossings if abs(place - c.place) < AROUND / 2 - AT_CROSSING]:
-            place = max(near) + AROUND / 2
-            self._follow(place + AROUND / 2)
+        while near := [
+            c.place
+            for c in self.crossings
+            if abs(place - c.place) < RESPONSE.around_crossing / 2 - RESPONSE.at_crossing
+        ]:
+            place = max(near) + RESPONSE.around_crossing / 2
+            self._follow(place + RESPONSE.around_crossing / 2)
         known = self._known()
         self.closed = place > known
         place = min(place, known)
@@ -329,7 +327,7 @@ class Way:
     def _known(self) -> float:
         """How far the coordinate serves: to before the first node at which another freedom moves much faster."""
         nodes, singles = self._nodes, self.path.system.single_rows >= 0
-        near = np.array([np.abs(nodes.place - c.place) < AT_CROSSING for c in self.crossings]).any(axis=0)
+        near = np.array([np.abs(nodes.place - c.place) < RESPONSE.at_crossing for c in self.crossings]).any(axis=0)
         # rate of another freedom against that of the coordinate at which the table ends
         steep = np.flatnonzero((np.abs(nodes.Z[singles]).max(axis=(0, 1)) > 6.0) & ~near)
         return float(nodes.place[max(int(steep[0]) - 1, 0)]) if steep.size else self._reached
@@ -388,7 +386,9 @@ class Way:
         places = sorted(c.place for c in self.crossings if begin < c.place < end)
         cuts = [begin, end]
         for i, place in enumerate(places):
-            room = min(place - begin, end - place, *np.abs(np.delete(places, i) - place) / 2, AROUND / 2)
+            room = min(
+                place - begin, end - place, *np.abs(np.delete(places, i) - place) / 2, RESPONSE.around_crossing / 2
+            )
             cuts += [place - room, place + room]
         out = []
         for a, b in pairwise(np.unique(cuts).tolist()):
@@ -435,8 +435,8 @@ def _coarse(c: Array, noise: float) -> bool:
     of_forces, others = np.full(OF_LOADS - 1, size[:2].max()), np.maximum(size[OF_LOADS:], 1.0)
     largest = np.concatenate([size[:1], of_forces, others])
     # part of the coefficients before them that the last ones of a series have where they are noise: those of a smooth series of that
-    # size (``NOISE``, against the largest term) fall by a hundred from four to four
-    rounding = (last > 0.3 * late) & (last < max(NOISE, noise) * largest)
+    # size (1e-9, against the largest term) fall by a hundred from four to four
+    rounding = (last > 0.3 * late) & (last < max(1e-9, noise) * largest)
     # part of the largest coefficient that the last two of a series may have; what a smooth series leaves out behind them is far
     # smaller
     small = tail <= 1e-12 * np.maximum(size, 1e-3 * largest)
@@ -445,8 +445,6 @@ def _coarse(c: Array, noise: float) -> bool:
 
 FURTHEST = 4.0 * np.pi
 """Distance beyond what is tabulated to which a trial step may lead; what is further off asks for a shorter one."""
-PERIODIC = 1e-9
-"""Difference of poses (and part of the largest term) after a turn of the coordinate up to which the path has come back."""
 
 AT_DEAD_POINT = (
     "only links without inertia move in this position, as a massless crank at its dead point does, and nothing decides how they go "
@@ -526,7 +524,7 @@ class Arc:
         """How the state has advanced after a turn of the coordinate, where all links and loads are back; None where they are not."""
         s = self.task.system
         ends = self.close(self.begin + sense * self.turn * np.array([0.0, 1.0])).here
-        if np.abs(ends.poses[..., 1] - ends.poses[..., 0]).max() > PERIODIC:
+        if np.abs(ends.poses[..., 1] - ends.poses[..., 0]).max() > RESPONSE.periodic:
             return None
         out = np.zeros(s.n_state)
         singles = np.flatnonzero(s.single_rows >= 0)
@@ -539,7 +537,7 @@ class Arc:
         further = Configuration(s, around.here.x + sense * out[:, None])
         loads, factored = self.terms.smooth, self.path.solver.factored(further, around.f.which)
         now, then = along_one(around.here, around.f, loads), along_one(further, factored, loads)
-        return out if np.abs(now - then).max() <= PERIODIC * np.abs(now).max() else None
+        return out if np.abs(now - then).max() <= RESPONSE.periodic * np.abs(now).max() else None
 
 
 class PathStage:
@@ -553,7 +551,7 @@ class PathStage:
         self._piece: SeriesPiece | None = None
         self._turns = 0.0
         self._mass, smooth, *_ = (terms := self._terms(u)).tolist()
-        if self._piece is not None and self._mass <= MASSLESS * np.abs(self._piece.series[:, 0]).sum():
+        if self._piece is not None and self._mass <= RESPONSE.massless * np.abs(self._piece.series[:, 0]).sum():
             raise Stopped(AT_DEAD_POINT)
         stored, rest = self._forces(terms, v, np.array([t]))
         self.energy = 0.5 * self._mass * v * v + abs(smooth + float(stored[0] + rest[0])) or 1.0

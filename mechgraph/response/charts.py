@@ -32,6 +32,7 @@ from mechgraph.kinematics.rates import PassiveMotion, Rates, Velocities
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Array, Index
+from mechgraph.maths.tolerances import RESPONSE
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
@@ -51,10 +52,6 @@ from mechgraph.result.trajectory import BlockMotion, Trajectory
 
 Law = Callable[[float], tuple[float, float, float]]
 """Position, velocity and acceleration at a time."""
-NOISE_OF_MOTION = 1e-13
-"""The same of the quantity itself."""
-HALVINGS_ALIKE = 6
-"""Halvings in which the part by which a rate is off stays alike, in both halves, where the rate is wrong."""
 QUANTITIES = ("position", "velocity", "acceleration")
 _PLACES, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 
@@ -78,7 +75,7 @@ class _TimePanel:
 def differentiated(law: Law, begin: float, end: float) -> str | tuple[float, ...]:
     """Times at which the acceleration of a motion jumps, or what is wrong with its rates between two times."""
     breaks, edges = [], np.linspace(begin, end, 257).tolist()  # 256 panels
-    rounding = NOISE_OF_MOTION * np.abs([law(t) for t in edges]).max(axis=0)[:2]
+    rounding = RESPONSE.noise_of_motion * np.abs([law(t) for t in edges]).max(axis=0)[:2]
     for a, b in pairwise(edges):
         panel = _panel(law, a, b, rounding)
         if panel.part > 1.0:
@@ -113,7 +110,7 @@ def _narrowed(law: Law, panel: _TimePanel, rounding: Array) -> str | list[float]
             return []
         parts = [*parts, worse.part] if min(half.part for half in halves) > 1.0 else []
         panel = worse
-        if len(parts) > HALVINGS_ALIKE and parts[-1] > 0.5 * parts[-1 - HALVINGS_ALIKE]:
+        if len(parts) > RESPONSE.halvings_alike and parts[-1] > 0.5 * parts[-1 - RESPONSE.halvings_alike]:
             return (
                 f"its {QUANTITIES[panel.order]} changes by {panel.change:.6g} from t = {panel.begin:.9g} to {panel.end:.9g}, where its "
                 f"{QUANTITIES[panel.order + 1]} says {panel.said:.6g}; give the derivatives of the position"
@@ -142,7 +139,7 @@ def samples_fault(t: Array, rows: Array) -> str:
     # samples
     for order, (integral, most) in enumerate(zip(said, (0.1, 0.75), strict=True)):
         off = np.abs(change[:, order] - integral)
-        allowed = most * h * np.abs(rows[:, order + 1]).max() + NOISE_OF_MOTION * np.abs(rows[:, order]).max()
+        allowed = most * h * np.abs(rows[:, order + 1]).max() + RESPONSE.noise_of_motion * np.abs(rows[:, order]).max()
         i = int(np.argmax(off - allowed))
         if off[i] > allowed[i]:
             return (

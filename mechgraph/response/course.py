@@ -21,6 +21,7 @@ from mechgraph.kinematics.motion_path import in_blocks
 from mechgraph.kinematics.rates import Velocities
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Array, Index
+from mechgraph.maths.tolerances import RESPONSE
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import declared
 from mechgraph.quantities import real_array, wrong
@@ -31,9 +32,6 @@ from mechgraph.result.solution import Solution
 from mechgraph.result.summary import SolutionData, solution_data, summary
 from mechgraph.result.trajectory import Trajectory
 from mechgraph.result.values import ranges
-
-LOST_ENERGY = 1e-3
-"""Error of the balance of energies, of the greatest one, from which on a motion in time is doubtful."""
 
 
 @dataclass(frozen=True)
@@ -119,11 +117,11 @@ class Response(Solution):
     def _energy_lost(self) -> EnergyLost | None:
         off = np.abs(self.energy.balance)
         largest = float(np.nan_to_num(off).max(initial=0.0))
-        if largest <= LOST_ENERGY * self.energy.greatest:
+        if largest <= RESPONSE.lost_energy * self.energy.greatest:
             return None
         # times asked for may be few and of little energy: what is lost counts beside the whole motion too
         whole = self._course.greatest
-        if largest <= LOST_ENERGY * whole or not whole:
+        if largest <= RESPONSE.lost_energy * whole or not whole:
             return None
         return EnergyLost(largest / whole, float(np.asarray(self.t)[off > 0.5 * largest].min()))
 

@@ -30,19 +30,16 @@ from mechgraph.kinematics.assembly import assembled_at, named_columns
 from mechgraph.kinematics.rates import Velocities
 from mechgraph.kinematics.solver import EngineName, engine_for
 from mechgraph.maths.se3 import Array
+from mechgraph.maths.tolerances import RESPONSE
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import door, unit_of
 from mechgraph.response.charts import OVER_POSITIONS, Prescribed, Task, trajectory_of
-from mechgraph.response.motion_equations import MASSLESS, Chart, ClosedChart, Columns, Loads, applied, in_unit_inertias
+from mechgraph.response.motion_equations import Chart, ClosedChart, Columns, Loads, applied, in_unit_inertias
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import bracket, number
 
 STENCIL = ((1, 4 / 5), (2, -1 / 5), (3, 4 / 105), (4, -1 / 280))
 """Steps and weights of the first derivative by central differences of eighth order."""
-CORNER = 1e-6
-"""Difference of the slopes to both sides, or of the values there, of the largest, that is one where it does not fall with the length."""
-FALLS = 0.5
-"""Part of it that is left at the next length where it falls: a quarter of what is smooth."""
 
 
 @dataclass(frozen=True)
@@ -91,13 +88,9 @@ def settled_slopes(values: Callable[[Array], Array], n: int, first: float) -> Sl
     off = (best[1] > 1e-3 * largest).any(axis=0)
     if len(known) > 1:
         (*_, wide, apart), (*_, corner, jump) = known[-2], known[-1]
-        off |= ((corner > FALLS * wide) & (corner > CORNER * largest)).any(axis=0)
-        off |= ((jump > FALLS * apart) & (jump > CORNER * first * largest)).any(axis=0)
+        off |= ((corner > RESPONSE.falls * wide) & (corner > RESPONSE.corner * largest)).any(axis=0)
+        off |= ((jump > RESPONSE.falls * apart) & (jump > RESPONSE.corner * first * largest)).any(axis=0)
     return Slopes(known[0][0], best[0], best[1], tuple(np.flatnonzero(off).tolist()))
-
-
-STEP = 0.004
-"""First length of differences (radians, lengths / L); their error and rounding are both near 1e-13 where forces bend within 0.3."""
 
 
 @dataclass(frozen=True)
@@ -176,7 +169,7 @@ class RestPlace:
             at = self.closed(u)
             return np.where(at.done, self.forces(at, np.zeros(u.shape))[0], np.nan)
 
-        place = settled_slopes(at_rest, n, STEP)
+        place = settled_slopes(at_rest, n, RESPONSE.first_difference)
         if place is None:
             raise ResponseError(f"mechanism {self.m.name!r}: the loops do not close beside this position")
         one = self.closed(np.zeros((n, 1)))
@@ -211,16 +204,6 @@ def _still(value: float, t: float) -> tuple[float, float, float]:
     return value, 0.0, 0.0
 
 
-EQUILIBRIUM_STEPS = 60
-"""Most steps to an equilibrium."""
-LONGEST_EQUILIBRIUM_STEP = 0.3
-"""Longest of them (radians, lengths / L)."""
-PUSH = 0.05
-"""Length of the step by which an unstable equilibrium is left."""
-BALANCED = 1e-12
-"""Generalized force, against the largest that a load exerts on the way, that counts as none."""
-STIFF = 1e-9
-"""Eigenvalue of the stiffness, against the largest, that counts as none: neither stable nor unstable."""
 EndKind = Literal["stable", "nearest"]
 
 STABLE = {True: "stable", False: "unstable", None: "neither stable nor unstable to second order"}
@@ -325,30 +308,30 @@ def equilibrium(
 
 
 def _largest(d: Derivatives) -> float:
-    return max(float(np.abs(d.Q).max()), float(np.abs(d.K).max()) * STEP)
+    return max(float(np.abs(d.Q).max()), float(np.abs(d.K).max()) * RESPONSE.first_difference)
 
 
 def _left(d: Derivatives) -> str:
     return (
-        f" near start in {EQUILIBRIUM_STEPS} steps or fewer; generalized forces of {np.abs(d.Q).max():.3g} are left (internal units). "
-        "Give another start; loads that drive it on and on have none"
+        f" near start in {RESPONSE.equilibrium_steps} steps or fewer; generalized forces of "
+        f"{np.abs(d.Q).max():.3g} are left (internal units). Give another start; loads that drive it on and on have none"
     )
 
 
 def _newton(place: RestPlace) -> Derivatives | str:
     """Newton to where the forces balance, or why it does not come there."""
     largest = 0.0
-    for _ in range(EQUILIBRIUM_STEPS):
+    for _ in range(RESPONSE.equilibrium_steps):
         d = place.derivatives()
         largest = max(largest, _largest(d))
-        if np.abs(d.Q).max() <= BALANCED * largest or not largest:
+        if np.abs(d.Q).max() <= RESPONSE.balanced * largest or not largest:
             return d
         step: Array = np.asarray(np.linalg.lstsq(d.K, d.Q, rcond=1e-12)[0], dtype=float)
         size = float(np.abs(step).max())
         if not size:
             return _left(d)
         for part in (1.0, 0.1):
-            closed = place.closed(step[:, None] * part * min(1.0, LONGEST_EQUILIBRIUM_STEP / size))
+            closed = place.closed(step[:, None] * part * min(1.0, RESPONSE.longest_equilibrium_step / size))
             if closed.done[0]:
                 break
         else:
@@ -359,30 +342,30 @@ def _newton(place: RestPlace) -> Derivatives | str:
 
 def _downhill(place: RestPlace) -> Derivatives | str:
     """Steps along which the loads do work, to where they balance and every small step costs some; or why it does not come there."""
-    largest, longest = 0.0, LONGEST_EQUILIBRIUM_STEP
-    for _ in range(EQUILIBRIUM_STEPS):
+    largest, longest = 0.0, RESPONSE.longest_equilibrium_step
+    for _ in range(RESPONSE.equilibrium_steps):
         d = place.derivatives()
         largest = max(largest, _largest(d))
         w, U = np.linalg.eigh(0.5 * (d.K + d.K.T))
-        balanced = BALANCED * largest
+        balanced = RESPONSE.balanced * largest
         if np.abs(d.Q).max() <= balanced or not largest:
-            if not w[0] < -STIFF * float(np.abs(w).max()):
+            if not w[0] < -RESPONSE.stiff * float(np.abs(w).max()):
                 return d
-            ways = [PUSH * U[:, 0], -PUSH * U[:, 0]]
+            ways = [RESPONSE.push * U[:, 0], -RESPONSE.push * U[:, 0]]
         else:
             ways = [_step(d, w, U, balanced, longest)]
         tried = [_shortened(place, d.Q, way, balanced) for way in ways]
         work, step, x = max(tried, key=lambda one: one[0])
         if x is None:
             return ": the motion towards it is stopped by the loops"
-        longest = min(LONGEST_EQUILIBRIUM_STEP, 4.0 * float(np.abs(step).max()))
+        longest = min(RESPONSE.longest_equilibrium_step, 4.0 * float(np.abs(step).max()))
         place.go(x)
     return _left(d)
 
 
 def _step(d: Derivatives, w: Array, U: Array, balanced: float, longest: float) -> Array:
     """Newton's step where the energy curves upwards; elsewhere along the curvatures with their signs turned, which leads downwards."""
-    if w[0] > STIFF * w[-1]:
+    if w[0] > RESPONSE.stiff * w[-1]:
         step = np.linalg.solve(d.K, d.Q)
     else:
         q, size = U.T @ d.Q, np.abs(w)
@@ -413,8 +396,8 @@ def _stability(d: Derivatives, kept: Array) -> bool | None:
     if not len(K):
         return True
     w = np.linalg.eigvalsh(0.5 * (K + K.T))
-    flat = STIFF * float(np.abs(w).max(initial=0.0))
-    if np.abs(K - K.T).max() <= flat and np.linalg.eigvalsh(0.5 * (C + C.T))[0] >= -STIFF * np.abs(C).max():
+    flat = RESPONSE.stiff * float(np.abs(w).max(initial=0.0))
+    if np.abs(K - K.T).max() <= flat and np.linalg.eigvalsh(0.5 * (C + C.T))[0] >= -RESPONSE.stiff * np.abs(C).max():
         return False if w[0] < -flat else None if d.bent or w[0] <= flat else True
     n = len(K)
     still, unit = np.zeros((n, n)), np.eye(n)
@@ -575,11 +558,11 @@ def linearize(m: Mechanism, at: Mapping[str, float] | None = None, *, engine: En
     """
     place = RestPlace(m, "linearize", at, engine)
     d = place.derivatives()
-    if np.linalg.eigvalsh(in_unit_inertias(d.M)).min() <= MASSLESS:
+    if np.linalg.eigvalsh(in_unit_inertias(d.M)).min() <= RESPONSE.massless:
         raise DeclarationError(
             f"linearize {m.name!r}", ["has a motion without inertia; give mass or inertia to what moves so"]
         )
-    largest = max(place.largest(), float(np.abs(d.K).max()) * STEP)
+    largest = max(place.largest(), float(np.abs(d.K).max()) * RESPONSE.first_difference)
     s, free, names = place.task.system, place.chart.free, m.freedom_names()
     said = []
     # generalized force, against the largest that a load exerts, above which a position is said to be none of equilibrium

@@ -38,19 +38,12 @@ from numpy.typing import NDArray
 from mechgraph.errors import MechgraphWarning, counted
 from mechgraph.force.loads import kinetic_energy
 from mechgraph.maths.se3 import Array, Index
+from mechgraph.maths.tolerances import RESPONSE
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.response_setup import WHATS, Event, Stop
 from mechgraph.quantities import items_of, real_array, shown, wrong
 from mechgraph.response.charts import Prescribed, Task
-from mechgraph.response.motion_equations import (
-    NO_INERTIA,
-    UNOPPOSED,
-    ClosedChart,
-    Stopped,
-    accelerations,
-    moved,
-    stopping,
-)
+from mechgraph.response.motion_equations import NO_INERTIA, ClosedChart, Stopped, accelerations, moved, stopping
 from mechgraph.result.solution import Solution
 
 POINTS_OF_STEP = 16
@@ -79,9 +72,7 @@ def overlooked(by_time: Callable[[Array], Array], begin: float, end: float, apar
     return bool((missed > 100.0 * allowed).any())
 
 
-BESIDE_ENDS = 1e-5
-"""Part of a step beside its ends at which is looked too, so that a height that turns in the first or last part is seen to."""
-WATCHED_IN_STEP = np.union1d(np.linspace(0.0, 1.0, 9), [BESIDE_ENDS, 1.0 - BESIDE_ENDS])
+WATCHED_IN_STEP = np.union1d(np.linspace(0.0, 1.0, 9), [RESPONSE.beside_ends, 1.0 - RESPONSE.beside_ends])
 """Places of looks at events in a step of length 1."""
 LOOKS_IN_STEP = np.union1d(WATCHED_IN_STEP, 0.5 ** np.arange(4, 20))
 """Parts of a step at which stops are looked at: closely behind its beginning, where a freedom may have just left its stop."""
@@ -195,8 +186,6 @@ def read_events(m: Mechanism, events: Any, faults: list[str]) -> tuple[Event, ..
 
 
 EXPLICIT = ("RK23", "RK45", "DOP853")
-LOOK = 500
-"""Steps after which the length of steps is looked at."""
 
 
 class Stage(Protocol):
@@ -362,13 +351,13 @@ class Integration:
 
     def _look(self, end: float) -> None:
         """Say where steps have become so short that loads are likely stiff, and a long wait certain; give up where there is no end."""
-        if self.method not in EXPLICIT or self.work.steps % LOOK:
+        if self.method not in EXPLICIT or self.work.steps % RESPONSE.look:
             return
         t = self.segments[-1].end
-        left = (end - t) * LOOK / (t - self.segments[-LOOK].begin)
+        left = (end - t) * RESPONSE.look / (t - self.segments[-RESPONSE.look].begin)
         message = (
-            f"at the length of the last {LOOK} steps of {self.method}, some {left:.0e} more lead to t = {end:g}; where loads are stiff, "
-            "method='Radau' takes far fewer. Loads that jump, as dry friction does, want to be smoothed"
+            f"at the length of the last {RESPONSE.look} steps of {self.method}, some {left:.0e} more lead to t = {end:g}; "
+            "where loads are stiff, method='Radau' takes far fewer. Loads that jump, as dry friction does, want to be smoothed"
         )
         # steps to come from which on the motion is given up: hours and days
         if left > 1e8:
@@ -398,12 +387,6 @@ class Integration:
                 y[:, mine] = segment.dense(t[places[mine]])
                 work[mine] = segment.work + y[-1, mine]
             yield places, first.stage, y, work
-
-
-TOUCHING = 1e-9
-"""Gap (radians, lengths / L) up to which a stop counts as closed."""
-LOWEST = 1e-9
-"""Height (radians, lengths / L) of a rebound below which the freedom rests on its stop; what it loses is of that order."""
 
 
 def read_stops(m: Mechanism, stops: Any, faults: list[str]) -> tuple[Stop, ...]:
@@ -502,7 +485,7 @@ class Stops:
         return found + [
             f"start of {limit.stop.freedom!r}: is beyond its {limit.name} stop at {limit.user:g}; give a start within its limits"
             for limit in self.limits
-            if limit.sign * (x[limit.row] - limit.value) < -TOUCHING
+            if limit.sign * (x[limit.row] - limit.value) < -RESPONSE.touching
         ]
 
     def held_task(self) -> Task:
@@ -525,7 +508,7 @@ class Stops:
             for limit in free:
                 height = partial(_gap, motion, limit)
                 t, gap = with_turns(height, looks, limit.sign * (x[limit.row] - limit.value))
-                deep = np.flatnonzero(gap < -TOUCHING)
+                deep = np.flatnonzero(gap < -RESPONSE.touching)
                 if deep.size:
                     before = np.flatnonzero(gap[: deep[0]] > 0.0)
                     times.append(first_root(height, t[before[-1]], t[deep[0]]) if before.size else looks[0])
@@ -549,7 +532,7 @@ class Stops:
 
         Also the energy that impacts take away, the longest first step from here, and what happened.
         """
-        closed = tuple(one for one in self.limits if one.sign * (x[one.row] - one.value) <= TOUCHING)
+        closed = tuple(one for one in self.limits if one.sign * (x[one.row] - one.value) <= RESPONSE.touching)
         if not closed:
             self.held = ()
             return dq, 0.0, np.inf, []
@@ -591,7 +574,7 @@ class _Free:
         self.impulse_to_rate, left = np.zeros(G.T.shape), np.zeros(G.T.shape)
         for i in np.flatnonzero(self.moves):
             (self.impulse_to_rate[:, [i]], left[:, [i]]) = accelerations(self.mass, G[i][:, None])
-        if np.abs(left).max(initial=0.0) > UNOPPOSED * np.abs(G).max(initial=0.0):
+        if np.abs(left).max(initial=0.0) > RESPONSE.unopposed * np.abs(G).max(initial=0.0):
             raise Stopped(NO_INERTIA)
         self.D = G @ self.impulse_to_rate
         self.w, self.w_rate = self.sign * dq[self.columns], self.sign * found.rates.ddq[self.columns, 0]
@@ -599,7 +582,9 @@ class _Free:
     @property
     def still(self) -> NDArray[np.bool_]:
         """Which limits are closed at rest: they would open by next to nothing before they close again."""
-        return np.asarray(self.w**2 <= 2.0 * LOWEST * np.maximum(np.abs(self.w_rate), LOWEST), dtype=bool)
+        return np.asarray(
+            self.w**2 <= 2.0 * RESPONSE.lowest * np.maximum(np.abs(self.w_rate), RESPONSE.lowest), dtype=bool
+        )
 
     def _least(self, D: Array, c: Array) -> Array:
         """``p >= 0`` with ``D p + c >= 0`` and ``p . (D p + c) = 0``."""

@@ -53,14 +53,8 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Array, Index, cross, rotate, rotate_back
 from mechgraph.maths.sparse import Factors
-from mechgraph.maths.tolerances import PATH
+from mechgraph.maths.tolerances import PATH, RESPONSE
 from mechgraph.model.loads import Load
-
-STEEPEST = 3.0
-"""Largest rate of a freedom for unit rates of the independent ones, against that where the chart was laid out, before a new one is; and
-the same of a condition that is poor."""
-LAST_STEP = 1e-13
-"""Newton step from which on a state counts as closed; the step before it was a millionth, so that only rounding is left."""
 
 
 class Stopped(Exception):
@@ -132,8 +126,8 @@ class Chart:
         """Whether another chart should take over at a state with coordinates ``u (n,)``, so steep and of this condition."""
         # angle of an independent rotation from where the chart was laid out above which a new one is
         far = self.turns and np.abs(u[self._singles < 0]).max(initial=0.0) > 1.0
-        poor = not condition < max(PATH.doubtful, STEEPEST * self.condition)
-        return bool(far or poor or steepness > STEEPEST * self.steepness)
+        poor = not condition < max(PATH.doubtful, RESPONSE.steepest * self.condition)
+        return bool(far or poor or steepness > RESPONSE.steepest * self.steepness)
 
     def coordinates(self, x: Array) -> Array:
         """Independent coordinates ``u (n, T)`` of states: how far they are from where the chart was laid out."""
@@ -173,8 +167,8 @@ class Chart:
             total = total + size
             with np.errstate(invalid="ignore"):
                 # below what is asked for, or twice below what rounding (1e-15) allows where the condition is poor
-                most = np.maximum(10 * LAST_STEP, 1e-15 * f.condition)
-                closed = (size <= LAST_STEP) | ((size <= most) & (before <= most))
+                most = np.maximum(10 * RESPONSE.last_step, 1e-15 * f.condition)
+                closed = (size <= RESPONSE.last_step) | ((size <= most) & (before <= most))
             before = size
             # correction above which closing is given up: the step was too long
             if closed.all() or not np.isfinite(size).all() or (total > 1.0).any():
@@ -262,12 +256,8 @@ def _tree_twists(tree: Tree, pair_of: Index, S: Array) -> scipy.sparse.csr_array
     )
 
 
-MASSLESS = 1e-12
-"""Eigenvalue of the mass matrix, of which the diagonal is one, below which a motion has no inertia."""
 SPARSE_FROM = 8000
 """Freedoms times links from which on the sparse form is faster than the full mass matrix (measured on open chains)."""
-UNOPPOSED = 1e-9
-"""Part of the largest generalized force below which none acts along a motion without inertia."""
 
 
 @dataclass(frozen=True)
@@ -439,7 +429,7 @@ def moved(closed: ClosedChart, v: Array, p: Array, loads: Loads, t: Array) -> Mo
     wrenches, efforts = stored + rest + inertia, by_stored + by_rest
     a, unopposed = columns.accelerations(wrenches, efforts)
     left = np.abs(unopposed).max(initial=0.0)
-    if left and left > UNOPPOSED * columns.largest((stored, rest, inertia), (by_stored, by_rest)):
+    if left and left > RESPONSE.unopposed * columns.largest((stored, rest, inertia), (by_stored, by_rest)):
         raise Stopped(NO_INERTIA)
     further = (Z * a).sum(axis=1)
     power = (V * rest).sum(axis=(0, 1)) + (dq * by_rest).sum(axis=0)
@@ -482,7 +472,7 @@ def accelerations(mass: Array, force: Array) -> tuple[Array, Array]:
     if (np.einsum("...ii->...i", pivots) ** 2 > 1e-9).all():
         return (np.linalg.solve(unit, Q / size[..., None]) / size[..., None])[..., 0].T, np.zeros_like(force)
     w, U = np.linalg.eigh(unit)
-    kept = (w > MASSLESS * w[:, -1:])[..., None]
+    kept = (w > RESPONSE.massless * w[:, -1:])[..., None]
     parts = np.swapaxes(U, 1, 2) @ (Q / size[..., None])
     a = U @ np.where(kept, parts / np.where(kept, w[..., None], 1.0), 0.0)
     left = U @ np.where(kept, 0.0, parts)

@@ -26,7 +26,7 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import Array, Index
-from mechgraph.maths.tolerances import MOTIONS, Tolerances
+from mechgraph.maths.tolerances import MOTIONS, RESPONSE, Tolerances
 from mechgraph.model.declaration import mapping_faults
 from mechgraph.model.loads import Law, Load
 from mechgraph.model.mechanism import Mechanism
@@ -220,8 +220,6 @@ class Chatter:
 
 
 OnStopName = Literal["raise", "return"]
-SOON = 1e-9
-"""The same as a part of the time that is left."""
 
 
 @door
@@ -436,14 +434,14 @@ def _occurrences(
             met = stops.met(course, segment.begin, segment.end) if stops.limits else None
             _end_at_ranges(course, segment.begin, segment.end if met is None else met)
             if met is not None:
-                crowd = crowd + 1 if met - segment.begin < SOON * (end - t) else 0
+                crowd = crowd + 1 if met - segment.begin < RESPONSE.soon * (end - t) else 0
                 it.cut(met)
             yield from watch.passed(segment.begin, segment.end if met is None else met)
             if met is not None:
                 break
         if met is None:
             return
-        # impacts and releases, each ``SOON`` after the one before, after which the motion is given up
+        # impacts and releases, each ``RESPONSE.soon`` after the one before, after which the motion is given up
         if crowd > 1000:
             raise Stopped("impacts and releases of stops follow each other without end")
         at = np.array([met])
