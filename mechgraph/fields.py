@@ -88,6 +88,14 @@ def second_direction(axis: Any) -> tuple[float, ...]:
     return x[0] / size, x[1] / size, x[2] / size
 
 
+def axes_of(axis: Any, second: Any) -> Array:
+    """Right-handed axes ``(3, 3)``, one a column: z along ``axis``, x along ``second`` less its part along z."""
+    z = np.asarray(axis) / np.linalg.norm(axis)
+    x = np.asarray(second) - (z @ np.asarray(second)) * z
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
 def vector_fault(value: Any, what: str, *, direction: bool = False) -> str | None:
     """The fault of a vector of three numbers, or None; a direction must not be zero."""
     if not is_numeric(value, (3,)):
@@ -151,7 +159,7 @@ NEEDED = object()
 
 
 @dataclass(frozen=True, eq=False)
-class Kind:
+class FieldKind:
     """A kind of value.
 
     ``words`` name it in tables, ``schema`` is its JSON Schema, ``stands_as`` the type of a value in a file where a reader can tell
@@ -168,7 +176,7 @@ class Kind:
     fault: Callable[[Any, str, float | None], str | None] | None = None
     moved: Callable[[Any, Array], Any] | None = None
     names: tuple[str, ...] = ()
-    entry: Kind | None = None
+    entry: FieldKind | None = None
 
     def __call__(
         self, meaning: str, dimension: Dimension = PURE, turn: Dimension | None = None, **more: Any
@@ -199,7 +207,7 @@ class FieldFormat:
     array has another name than the field; ``rules``: more of its schema.
     """
 
-    kind: Kind
+    kind: FieldKind
     meaning: str
     slide: Dimension = PURE
     turn: Dimension = PURE
@@ -528,16 +536,16 @@ class MovedShape:
 
 
 _VECTOR: Schema = {"$ref": "#/$defs/vector"}
-TEXT = Kind("text", {"type": "string"}, str)
-LINK_NAME = Kind("text", {"type": "string"}, str)
-FREEDOM_NAME = Kind("text", {"type": "string"}, str)
-FLAG = Kind("true/false", {"type": "boolean"}, bool)
-INTEGER = Kind("integer", {"type": "integer", "minimum": 0}, fault=_whole_fault)
-NUMBER = Kind(
+TEXT = FieldKind("text", {"type": "string"}, str)
+LINK_NAME = FieldKind("text", {"type": "string"}, str)
+FREEDOM_NAME = FieldKind("text", {"type": "string"}, str)
+FLAG = FieldKind("true/false", {"type": "boolean"}, bool)
+INTEGER = FieldKind("integer", {"type": "integer", "minimum": 0}, fault=_whole_fault)
+NUMBER = FieldKind(
     "number", {"type": "number"}, None, (), True, lambda value, what, least: number_fault(value, what, minimum=least)
 )
-POINT = Kind("3 numbers", _VECTOR, None, (3,), True, _vector_fault, _moved_point)
-NAMED_POINT = Kind(
+POINT = FieldKind("3 numbers", _VECTOR, None, (3,), True, _vector_fault, _moved_point)
+NAMED_POINT = FieldKind(
     "3 numbers or a name",
     {"anyOf": [_VECTOR, {"type": "string", "minLength": 1}]},
     None,
@@ -546,7 +554,7 @@ NAMED_POINT = Kind(
     _named_point_fault,
     _moved_point,
 )
-POINTS = Kind(
+POINTS = FieldKind(
     "table of 3 numbers",
     {"type": "object", "additionalProperties": _VECTOR},
     None,
@@ -555,11 +563,11 @@ POINTS = Kind(
     _points_fault,
     _moved_point,
 )
-VECTOR = Kind("3 numbers", _VECTOR, None, (3,), True, _vector_fault, _turned)
-DIRECTION = Kind(
+VECTOR = FieldKind("3 numbers", _VECTOR, None, (3,), True, _vector_fault, _turned)
+DIRECTION = FieldKind(
     "3 numbers", _VECTOR, None, (3,), True, lambda value, what, _: vector_fault(value, what, direction=True), _turned
 )
-TENSOR = Kind(
+TENSOR = FieldKind(
     "3 × 3",
     {"type": "array", "items": _VECTOR, "minItems": 3, "maxItems": 3},
     None,
@@ -568,18 +576,18 @@ TENSOR = Kind(
     _tensor_fault,
     _turned_tensor,
 )
-SIX = Kind("6 numbers", {"$ref": "#/$defs/six"})
-SERIES = Kind("number(s)", {"$ref": "#/$defs/series"}, None, (), True, _series_fault(1))
-VECTOR_SERIES = Kind(
+SIX = FieldKind("6 numbers", {"$ref": "#/$defs/six"})
+SERIES = FieldKind("number(s)", {"$ref": "#/$defs/series"}, None, (), True, _series_fault(1))
+VECTOR_SERIES = FieldKind(
     "3 numbers (series)", {"$ref": "#/$defs/vector_series"}, None, (3,), True, _series_fault(3), _turned
 )
-SAMPLES = Kind("n numbers", {"$ref": "#/$defs/series"}, None, None, True, _samples_fault, entry=NUMBER)
+SAMPLES = FieldKind("n numbers", {"$ref": "#/$defs/series"}, None, None, True, _samples_fault, entry=NUMBER)
 _ABOVE_0: Schema = {"type": "number", "exclusiveMinimum": 0}
 _AB, _ENDS = ("a", "b"), ("begin", "end")
 _TWO: Schema = {"type": "array", "minItems": 2, "maxItems": 2}
-POSITIVE = Kind("number > 0", _ABOVE_0, None, (), True, _positive_fault((), "a finite number"))
-TWO = Kind("2 numbers", {**_TWO, "items": {"type": "number"}}, None, (2,), True, _two_fault, names=_AB)
-TWO_POSITIVE = Kind(
+POSITIVE = FieldKind("number > 0", _ABOVE_0, None, (), True, _positive_fault((), "a finite number"))
+TWO = FieldKind("2 numbers", {**_TWO, "items": {"type": "number"}}, None, (2,), True, _two_fault, names=_AB)
+TWO_POSITIVE = FieldKind(
     "2 numbers > 0",
     {**_TWO, "items": _ABOVE_0},
     None,
@@ -588,7 +596,7 @@ TWO_POSITIVE = Kind(
     _positive_fault((2,), "two finite numbers"),
     names=_AB,
 )
-TWO_WHOLE = Kind(
+TWO_WHOLE = FieldKind(
     "2 integers > 0",
     {**_TWO, "items": {"type": "integer", "exclusiveMinimum": 0}},
     None,
@@ -597,21 +605,25 @@ TWO_WHOLE = Kind(
     _positive_fault((2,), "two whole numbers", whole=True),
     names=_AB,
 )
-INTERVAL = Kind("2 numbers", {**_TWO, "items": {"type": "number"}}, None, (2,), True, _interval_fault, names=_ENDS)
-POINT_LIST = Kind(
+INTERVAL = FieldKind("2 numbers", {**_TWO, "items": {"type": "number"}}, None, (2,), True, _interval_fault, names=_ENDS)
+POINT_LIST = FieldKind(
     "n × 3", {"type": "array", "items": _VECTOR}, None, None, True, _point_list_fault, _moved_points, entry=POINT
 )
-FUNCTION = Kind("function", {"not": {}}, None, None, False, _function_fault, lambda f, pose: MovedShape(f, plain(pose)))
-BREAKS = Kind("rising numbers", {"not": {}}, None, None, True, _rising_fault)
+FUNCTION = FieldKind(
+    "function", {"not": {}}, None, None, False, _function_fault, lambda f, pose: MovedShape(f, plain(pose))
+)
+BREAKS = FieldKind("rising numbers", {"not": {}}, None, None, True, _rising_fault)
 """Where a function is not smooth; files hold no functions."""
-NUMBERS = Kind("n numbers", {"type": "array", "items": {"type": "number"}})
-FACTS = Kind("table", {"type": "object"}, dict)
-COEFFICIENTS = Kind("table", {"type": "object", "additionalProperties": {"type": "number"}, "minProperties": 1}, dict)
-BY_FREEDOM = Kind("table", {"type": "object", "additionalProperties": {"type": "number"}})
+NUMBERS = FieldKind("n numbers", {"type": "array", "items": {"type": "number"}})
+FACTS = FieldKind("table", {"type": "object"}, dict)
+COEFFICIENTS = FieldKind(
+    "table", {"type": "object", "additionalProperties": {"type": "number"}, "minProperties": 1}, dict
+)
+BY_FREEDOM = FieldKind("table", {"type": "object", "additionalProperties": {"type": "number"}})
 """Numbers by freedoms; in a file in degrees under the name of the freedom with ``_deg`` added."""
-TABLE = Kind("table", {})
-TABLES = Kind("tables", {})
-OTHER = Kind("", {})
+TABLE = FieldKind("table", {})
+TABLES = FieldKind("tables", {})
+OTHER = FieldKind("", {})
 """A kind whose schema the field itself gives, in ``rules``."""
 
 POSITION = {"dimension": LENGTH, "turn": PURE, "degrees": True}

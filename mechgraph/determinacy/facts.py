@@ -34,7 +34,7 @@ from mechgraph.equations.build import BOOKKEEPINGS, BookkeepingName, formulate
 from mechgraph.equations.terms import Ledger, LedgerRow
 from mechgraph.errors import DeclarationError
 from mechgraph.force.block import hold_names
-from mechgraph.graph.linkgraph import LinkGraph, Parts, parts_of
+from mechgraph.graph.linkgraph import GraphParts, LinkGraph, parts_of
 from mechgraph.kinematics.assembly import at_position
 from mechgraph.kinematics.rank import EngineName
 from mechgraph.kinematics.system import System
@@ -155,7 +155,7 @@ class GraphFacts:
         return formulate(self.mechanism, bookkeeping).ledger()
 
     @cached_property
-    def parts(self) -> Parts:
+    def parts(self) -> GraphParts:
         """Dulmage-Mendelsohn parts: which links and pairs are over-, which underdetermined by count."""
         return parts_of(self.mechanism, self.graph)
 

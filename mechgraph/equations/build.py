@@ -13,7 +13,7 @@ from mechgraph.equations.formulation import ACCELERATION, Formulation, MotionWor
 from mechgraph.equations.terms import (
     AXES,
     Block,
-    Known,
+    KnownSymbol,
     LeeNames,
     ScalarEquation,
     Screw,
@@ -258,7 +258,7 @@ def _equilibrium(draft: _Draft, words: MotionWords | None) -> list[ScalarEquatio
                         tuple(terms[part]),
                         index,
                         part,
-                        tuple(Known(symbol, array, (part, index)) for symbol, array in symbols),
+                        tuple(KnownSymbol(symbol, array, (part, index)) for symbol, array in symbols),
                     )
                 )
     return equations
@@ -294,7 +294,7 @@ def _closure(draft: _Draft, words: MotionWords) -> list[ScalarEquation]:
         column = words.first[k] + j
         acceleration = words.freedoms[k][j].numbers[ACCELERATION]
         given = replace(acceleration, name="IN")
-        known = (Known(given, "accelerations", (column,), -1.0),)
+        known = (KnownSymbol(given, "accelerations", (column,), -1.0),)
         name = f"driver {unknown.freedom}: prescribed acceleration"
         draft.block((acceleration, "=", given), "prescribed", unknown.owner)
         equations.append(

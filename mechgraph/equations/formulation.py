@@ -32,7 +32,7 @@ from mechgraph.equations.terms import (
     AXES,
     Block,
     CoefficientTable,
-    Known,
+    KnownSymbol,
     Ledger,
     LedgerRow,
     LeeNames,
@@ -239,7 +239,7 @@ class MotionWords:
                     terms.append(Term(column, float(sign), column, part))
             if which == ACCELERATION and self.bias_terms(k):
                 symbol = replace(self.bias(k), kind="vector", moment=part >= 3, axis=AXES[part % 3])
-                known.append(Known(symbol, "biases", (part, k), float(sign)))
+                known.append(KnownSymbol(symbol, "biases", (part, k), float(sign)))
         what = f"{'turning' if part < 3 else 'velocity'} {AXES[part % 3]}"
         return ScalarEquation(
             f"{self.loop_name(i)}: {what}", self.loop_name(i), "closure", tuple(terms), None, part, tuple(known)

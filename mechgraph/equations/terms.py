@@ -308,7 +308,7 @@ class Term:
 
 
 @dataclass(frozen=True)
-class Known:
+class KnownSymbol:
     """``sign * symbol``, a known number in an equation: ``place`` in the ``array`` of a State; no array where the one before has it too."""
 
     symbol: Symbol
@@ -327,7 +327,7 @@ class ScalarEquation:
     terms: tuple[Term, ...]
     link: int | None = None
     part: int = 0
-    known: tuple[Known, ...] = ()
+    known: tuple[KnownSymbol, ...] = ()
 
     def __repr__(self) -> str:
         return f"ScalarEquation({self.name!r}, {counted(len(self.terms), 'term')})"

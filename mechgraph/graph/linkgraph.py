@@ -290,7 +290,7 @@ def _oriented(loop: list[int]) -> tuple[int, ...]:
 
 
 @dataclass(frozen=True)
-class Parts:
+class GraphParts:
     """Dulmage-Mendelsohn parts of the force equations.
 
     Attributes
@@ -310,7 +310,7 @@ class Parts:
     spare_equations: int
 
 
-def parts_of(m: Mechanism, graph: LinkGraph) -> Parts:
+def parts_of(m: Mechanism, graph: LinkGraph) -> GraphParts:
     """Matching and parts from the graph and the freedoms of the pairs, by maximum flow from unknowns to equations."""
     P, N = len(m.pairs), graph.n_links
     supply = np.array([6 - p.type.f for p in m.pairs], dtype=np.intp)
@@ -333,7 +333,7 @@ def parts_of(m: Mechanism, graph: LinkGraph) -> Parts:
     over = _alternating(P + N, everywhere, back, np.flatnonzero(used < supply))
     under = _alternating(P + N, everywhere[::-1], back[::-1], P + links[filled[links] < 6])
     names, pair_names = m.link_names(), [p.name for p in m.pairs]
-    return Parts(
+    return GraphParts(
         structural_rank=int(result.flow_value),
         redundant_links=tuple(names[i - P] for i in over if i >= P),
         redundant_pairs=tuple(pair_names[k] for k in over if k < P),

@@ -222,7 +222,7 @@ Lines = tuple[Array, Array]
 """Points and unit directions ``(3, 2, T)`` of the force on gear b, for both flanks or strands; along each it acts in one sense only."""
 
 
-class Step(NamedTuple):
+class MeshStep(NamedTuple):
     """A pair on the way from gear a to gear b: its place, and whether it is passed from its link a to its link b (1) or back (-1)."""
 
     pair: int
@@ -307,7 +307,7 @@ class Contact(BaseCoupling):
         wrong = [placed] if isinstance(placed, str) else self.misfits(placed.axes, fitting_of(m))
         return [where + fault for fault in wrong]
 
-    def _way(self, m: Any) -> tuple[Step, ...] | str:
+    def _way(self, m: Any) -> tuple[MeshStep, ...] | str:
         """The pairs from gear a to gear b, or why there is no carrier between them."""
         first, last = (m.freedom(q)[0] for q in (self.a, self.b))
         if first == last:
@@ -336,15 +336,15 @@ class Contact(BaseCoupling):
             *reversed(middle),
             (link, last),
         ]
-        return tuple(Step(k, 1.0 if m.pairs[k].a == start else -1.0) for start, k in ways)
+        return tuple(MeshStep(k, 1.0 if m.pairs[k].a == start else -1.0) for start, k in ways)
 
-    def _axes(self, m: Any, steps: tuple[Step, ...]) -> _OnCarrier | str:
+    def _axes(self, m: Any, steps: tuple[MeshStep, ...]) -> _OnCarrier | str:
         """The gears seen from their carrier in the declared configuration: between gear a and it pairs turn about the axis of a, between
         it and gear b about that of b; or what is wrong with them.
         """
         fitting = fitting_of(m)
         p, z, senses_a, off = _turned_about(m, steps[:-1], fitting)
-        back = tuple(Step(step.pair, -step.sense) for step in reversed(steps[1 + len(senses_a) :]))
+        back = tuple(MeshStep(step.pair, -step.sense) for step in reversed(steps[1 + len(senses_a) :]))
         q, w, senses_b, _ = _turned_about(m, back, fitting)
         if len(senses_a) + len(senses_b) < len(steps) - 2:
             stray = m.pairs[steps[1 + len(senses_a)].pair].name
@@ -402,7 +402,7 @@ class _OnCarrier(NamedTuple):
     senses_b: list[float]
 
 
-def _turned_about(m: Any, steps: tuple[Step, ...], fitting: float) -> tuple[Array, Array, list[float], float]:
+def _turned_about(m: Any, steps: tuple[MeshStep, ...], fitting: float) -> tuple[Array, Array, list[float], float]:
     """The axis of the pair of a gear, point and direction, in the last frame to which pairs about it lead on a way, with their senses, and
     by how much the next one is off it.
     """
@@ -458,7 +458,7 @@ def _motion(pair: Pair) -> str:
     return plain.get(tuple(freedoms[0].twist), "") if single else ""
 
 
-def _marker(pair: Pair, step: Step, *, behind: bool) -> Marker:
+def _marker(pair: Pair, step: MeshStep, *, behind: bool) -> Marker:
     """The marker of a pair on the link before it on the way, or on the link behind it."""
     return pair.markers[int((step.sense > 0) == behind)]
 

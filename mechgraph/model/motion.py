@@ -44,7 +44,7 @@ class LawFault(Exception):
     """Why a law cannot be evaluated; `Motion.law` raises it as a DeclarationError that names the law."""
 
 
-class Law(Protocol):
+class MotionLaw(Protocol):
     """A rule that gives position, velocity and acceleration at times t."""
 
     @property
@@ -111,7 +111,7 @@ class ConstantSpeed:
 
 
 @dataclass(frozen=True)
-class Sampled:
+class SampledLaw:
     """Spline through samples, with "not-a-knot" ends (de Boor, A Practical Guide to Splines, 1978).
 
     Of degree 5 the error of position, velocity and acceleration falls as h^6, h^5 and h^4 with the spacing h,
@@ -149,7 +149,7 @@ def _splined(times: Array, values: Array, degree: int, t: Array) -> Rates:
 
 
 def rates_of_samples(times: Array, values: Array) -> Rates:
-    """Values and rates ``(..., n)`` of the spline of `Sampled` through values at times, row by row; zero where all are the same.
+    """Values and rates ``(..., n)`` of the spline of `SampledLaw` through values at times, row by row; zero where all are the same.
 
     Raises
     ------
@@ -273,7 +273,7 @@ def _not_smooth(t: float) -> LawFault:
     )
 
 
-LAWS: Mapping[str, Law] = {
+LAWS: Mapping[str, MotionLaw] = {
     "cycloidal": DwellRise(
         lambda tau: tau - np.sin(math.tau * tau) / math.tau,
         lambda tau: 1.0 - np.cos(math.tau * tau),
@@ -287,7 +287,7 @@ LAWS: Mapping[str, Law] = {
     "poly345": _polynomial(0, 0, 0, 10, -15, 6),
     "poly4567": _polynomial(0, 0, 0, 0, 35, -84, 70, -20),
     "constant_speed": ConstantSpeed(),
-    "sampled": Sampled(),
+    "sampled": SampledLaw(),
 }
 r"""The laws by name.
 
@@ -502,7 +502,7 @@ class Motion(Described):
         >>> mg.Motion.law("cycloidal", rise=2.0, duration=1.0, t=[0.0, 0.5, 1.0]).position
         array([0., 1., 2.])
         """
-        rule: Law
+        rule: MotionLaw
         if callable(name):
             rule, title = Smooth(name), f"motion law {getattr(name, '__name__', name)!r}"
         elif isinstance(name, str) and name in LAWS:
@@ -561,7 +561,7 @@ def _missing_rates(arrays: Mapping[str, Array]) -> dict[str, Array]:
     return {name: value for name, value in zip(("velocity", "acceleration"), found, strict=True) if name in missing}
 
 
-def _argument_faults(rule: Law, given: Mapping[str, Any]) -> list[str]:
+def _argument_faults(rule: MotionLaw, given: Mapping[str, Any]) -> list[str]:
     """Return the arguments that are missing for every alternative of a law, or that it does not use."""
     usable = {key for choice in rule.choices for key in choice} | set(rule.optional)
     faults = [f"{key} is not an argument of this law" for key in given if key not in usable]

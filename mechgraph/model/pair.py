@@ -22,6 +22,7 @@ from mechgraph.fields import (
     TENSOR,
     TEXT,
     Described,
+    axes_of,
     cosine,
     filled_second,
     parallel_faults,
@@ -33,8 +34,8 @@ from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import SHAPES
 from mechgraph.pairs.contact_types import (
     ROWS,
-    Contact,
     Hertz,
+    PlacedRow,
     contact_faults,
     curve_faults,
     in_contact,
@@ -219,10 +220,7 @@ class Marker(Described):
 
     def pose(self) -> Array:
         """The marker as a pose ``(3, 4)`` in the frame of its link."""
-        z = np.asarray(self.axis) / np.linalg.norm(self.axis)
-        x = np.asarray(self.second) - (z @ np.asarray(self.second)) * z
-        x /= np.linalg.norm(x)
-        return np.column_stack([x, np.cross(z, x), z, np.asarray(self.point)])
+        return np.column_stack([axes_of(self.axis, self.second), np.asarray(self.point)])
 
 
 @dataclass(frozen=True)
@@ -333,7 +331,7 @@ class Pair(Described):
     surface: Annotated[
         Surface | None, NESTED("surface on link a on which the centre of a sphere travels, of Sp", table="surface")
     ] = None
-    contact: ClassVar[Contact | None] = None
+    contact: ClassVar[PlacedRow | None] = None
     asked_point: ClassVar[Any] = None
     """The point as it was given, where the pair travels on a curve or surface and ``point`` is the nearest place on it."""
 
@@ -353,7 +351,7 @@ class Pair(Described):
         if self.second is None:
             put("second", filled_second(self.axis))
 
-    def _on_its_shape(self) -> Contact | None:
+    def _on_its_shape(self) -> PlacedRow | None:
         """The row with the curves or the surface that are given; None where they have faults."""
         row, point, axis, on_a, on_b = self.type, self.point, self.axis, self.on_a, self.on_b
         if point is None and isinstance(on_a, Marker):
@@ -367,7 +365,7 @@ class Pair(Described):
             return on_surface(row, surface, point, towards, self.name, apart, roller)
         return None
 
-    def _place(self, contact: Contact) -> None:
+    def _place(self, contact: PlacedRow) -> None:
         """Put the pair where its curve or surface is nearest to the place that was asked for."""
         on_a, on_b = self.on_a, self.on_b
         point = on_a.point if self.point is None and isinstance(on_a, Marker) else self.point

@@ -32,7 +32,7 @@ GAUSS_NODES, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(6)
 
 
 @dataclass(frozen=True)
-class Place:
+class CurvePlace:
     """A curve at arc lengths ``(...)``: position, tangent and its rates by the arc length ``(3, ...)``, axes y and k, rates of turning."""
 
     x: Array
@@ -44,10 +44,10 @@ class Place:
     dw: Array
 
     @property
-    def real(self) -> Place:
+    def real(self) -> CurvePlace:
         """Without imaginary parts."""
         parts = (self.x, self.t, self.dt, self.y, self.k, self.w, self.dw)
-        return Place(*(np.asarray(part.real) for part in parts))
+        return CurvePlace(*(np.asarray(part.real) for part in parts))
 
 
 def _dot(a: Array, b: Array) -> Array:
@@ -131,15 +131,15 @@ class Travel:
         found = self._frame_guided(x[1], x[2], x[3])
         return x[0], *found[:15].reshape(5, 3, *s.shape), found[15], found[16]
 
-    def at(self, s: Array) -> Place:
+    def at(self, s: Array) -> CurvePlace:
         """Position and frame at arc lengths ``(...)``, real or complex."""
         if self.is_plane:
             u = self._parameter_at(s)
-            known: Place | None = self.curve.place_at(u)
+            known: CurvePlace | None = self.curve.place_at(u)
             if known is not None:
                 return known
             x = self.curve.at(u)
-            return Place(x[0], *self._frame_in_plane(x[1], x[2], x[3]).reshape(6, 3, *s.shape))
+            return CurvePlace(x[0], *self._frame_in_plane(x[1], x[2], x[3]).reshape(6, 3, *s.shape))
         x, t, dt, ddt, y, k, r, dr = self.guided(s)
         w, dw = cross(t, dt), cross(t, ddt)
         if not self.minimizing:
@@ -150,7 +150,7 @@ class Travel:
             rounds = self._rounds(s.real) if again else np.zeros(s.shape)
             a = self._turn.at(s.real - rounds * self.length)[0] + rounds * self._gain - (s - s.real) * r
             y, k = np.cos(a) * y + np.sin(a) * k, np.cos(a) * k - np.sin(a) * y
-        return Place(x, t, dt, y, k, w, dw)
+        return CurvePlace(x, t, dt, y, k, w, dw)
 
     def _find_turn(self) -> None:
         """The angle by which the minimizing frame is turned about the tangent against the guided one: ``a' = -r``."""

@@ -33,7 +33,7 @@ from mechgraph.quantities import LENGTH, PRESSURE, PURE, is_numeric, wrong
 
 
 @dataclass(frozen=True)
-class Contact:
+class PlacedRow:
     """A row with its curves, the markers at coordinates zero on links a and b ``(3, 4)``, and by how much each misses its curve.
 
     ``marker_b`` is None where no curve of link b says it; a pair without a place for one has it where it likes.
@@ -203,7 +203,7 @@ def in_contact(
     axis: Sequence[float] | None = None,
     pair: str = "",
     on_b: Array | None = None,
-) -> Contact:
+) -> PlacedRow:
     """A row of a ``pair`` with its curves put in; coordinates zero where the curves pass ``point`` (where they begin if it is left out).
 
     ``axis`` says in which sense of two z points; ``roller`` is that of the roller whose centre is the point. Where the marker ``on_b``
@@ -229,7 +229,7 @@ def in_contact(
         # a marker of its own says near which direction the curve of link b runs, a contact at one point that both touch
         crossing = float(np.linalg.norm(np.cross(back[:, 0], beside[:, 0]))) if on_b is None else 0.0
         off += [_off(second, beside[:, 3]), crossing]
-    return Contact(filled(row, factors, pair), marker, tuple(off), back if on_b is not None else None)
+    return PlacedRow(filled(row, factors, pair), marker, tuple(off), back if on_b is not None else None)
 
 
 def _across(curve: Curve, place: AlongCurve, z: Sequence[float] | Array | None) -> Curve:
@@ -336,7 +336,7 @@ def _of_shape(curve: Curve, where: str) -> list[str]:
     return of_function(lambda: curve.faults(where) or shape_faults(curve, where), where)
 
 
-def cut_faults(contact: Contact, where: str) -> Iterator[str]:
+def cut_faults(contact: PlacedRow, where: str) -> Iterator[str]:
     """A closed curve, inside which link a is, that cuts into what it touches where it is declared: it bends less than a hollow there."""
     places = takes_curves(contact.row)
     if len(places) < 2 or contact.marker_b is not None or not places[0].travel.is_closed:
@@ -351,7 +351,7 @@ def cut_faults(contact: Contact, where: str) -> Iterator[str]:
         )
 
 
-def miss_faults(contact: Contact, curves: Sequence[Curve | None], tol: float, where: str) -> Iterator[str]:
+def miss_faults(contact: PlacedRow, curves: Sequence[Curve | None], tol: float, where: str) -> Iterator[str]:
     """Contacts that are not on their curves, or where curves cross."""
     names = iter(("curve", "curve_b", ""))
     for miss, name, i in zip(contact.misses, names, count()):
@@ -416,7 +416,7 @@ def on_surface(
     pair: str,
     on_b: Array | None = None,
     roller: float | None = None,
-) -> Contact:
+) -> PlacedRow:
     """A row of a ``pair`` with its surface put in; coordinates zero at ``point`` (in the middle if left out), z towards ``axis``.
 
     The centre of a ball (``roller``) travels beside the surface, on the side of the point.
@@ -435,7 +435,7 @@ def on_surface(
     if axis is not None and placed.start[:, 2] @ np.asarray(axis) < 0:
         placed = replace(placed, turned=True)
     off = 0.0 if point is None or on_b is not None else float(np.linalg.norm(placed.start[:, 3] - point))
-    return Contact(filled(row, [placed], pair), placed.start, (off,))
+    return PlacedRow(filled(row, [placed], pair), placed.start, (off,))
 
 
 def _beside(surface: Surface, roller: float | None, point: Sequence[float] | None) -> Surface | None:
@@ -482,7 +482,7 @@ def surface_faults(row: Any, surface: Surface, point: Any, where: str, roller: A
     return []
 
 
-def surface_miss(contact: Contact, tol: float, where: str) -> Iterator[str]:
+def surface_miss(contact: PlacedRow, tol: float, where: str) -> Iterator[str]:
     """A contact that is not on its surface."""
     surface = next(
         step.surface for step in contact.row.steps if isinstance(step, OnSurface) and step.surface is not None

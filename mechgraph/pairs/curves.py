@@ -25,6 +25,7 @@ from mechgraph.fields import (
     POSITIVE,
     TEXT,
     Described,
+    axes_of,
     filled_second,
     parallel_faults,
 )
@@ -295,9 +296,7 @@ class Centred(Curve):
 
     @cached_property
     def _basis(self) -> Array:
-        z = _unit(self.axis)
-        x = _unit(np.asarray(self.second) - (z @ np.asarray(self.second)) * z)
-        return np.column_stack([x, np.cross(z, x), z])
+        return axes_of(self.axis, self.second)
 
     def _placed(self, parts: Array) -> Array:
         """Position and derivatives ``(4, 3, ...)`` from those in the own axes."""

@@ -29,7 +29,7 @@ from mechgraph.maths.se3 import (
 from mechgraph.pairs.factors import Component, Factor, Freedom
 
 
-class Row(Protocol):
+class EvaluatedRow(Protocol):
     """What is evaluated of a pair type (see ``PairType``)."""
 
     @property
@@ -65,19 +65,19 @@ class Row(Protocol):
         """Whether the components are combined with the efforts to do no work."""
 
 
-def places(row: Row) -> list[tuple[slice, slice]]:
+def places(row: EvaluatedRow) -> list[tuple[slice, slice]]:
     """For every factor of a row the places of its freedoms and of its state numbers."""
     columns = accumulate((len(step.freedoms) for step in row.steps), initial=0)
     numbers = accumulate((step.n_state for step in row.steps), initial=0)
     return list(zip(starmap(slice, pairwise(columns)), starmap(slice, pairwise(numbers)), strict=True))
 
 
-def _placed(row: Row) -> Iterator[tuple[Factor, slice, slice]]:
+def _placed(row: EvaluatedRow) -> Iterator[tuple[Factor, slice, slice]]:
     for step, (columns, numbers) in zip(row.steps, places(row), strict=True):
         yield step, columns, numbers
 
 
-def frames_of(row: Row, pitch: Array, x: Array, base: Array | None = None) -> list[Array]:
+def frames_of(row: EvaluatedRow, pitch: Array, x: Array, base: Array | None = None) -> list[Array]:
     """Frames 0, 1, ... of the pair as poses ``(3, 4, n, T)``, in the frame of ``base`` (marker A where it is None).
 
     The list is indexed by the number of single freedoms before the frame; places inside a factor of several freedoms hold its
@@ -90,7 +90,7 @@ def frames_of(row: Row, pitch: Array, x: Array, base: Array | None = None) -> li
     return frames
 
 
-def twists_of(row: Row, pitch: Array, frames: Sequence[Array], x: Array | None = None) -> Array:
+def twists_of(row: EvaluatedRow, pitch: Array, frames: Sequence[Array], x: Array | None = None) -> Array:
     """Twists of the freedoms, ``(6, f, n, T)``, in the frame in which ``frames`` are given.
 
     The state ``x`` may be left out where all twists are constant in their frames.
@@ -143,13 +143,13 @@ def _moved(
     return np.stack(parts, axis=1)
 
 
-def efforts_of(row: Row, pitch: Array, frames: Sequence[Array], x: Array | None = None) -> Array:
+def efforts_of(row: EvaluatedRow, pitch: Array, frames: Sequence[Array], x: Array | None = None) -> Array:
     """Effort wrenches ``E``, one a freedom, ``(6, f, n, T)``; combined to ``E (S^T E)^-1`` where the row asks for it."""
     E = components_of(row.efforts, pitch, frames)
     return dual(row, E, twists_of(row, pitch, frames, x), frames[-1][:, 3]) if row.computed_efforts else E
 
 
-def dual(row: Row, E: Array, S: Array, p: Array) -> Array:
+def dual(row: EvaluatedRow, E: Array, S: Array, p: Array) -> Array:
     """The combinations ``E (S^T E)^-1`` of efforts ``(6, f, n, T)`` of a row that are dual to the twists ``S``, B at ``p (3, n, T)``."""
     if row.pushed:
         E, at = E.copy(), list(row.pushed)
@@ -164,7 +164,7 @@ def without_work(W: Array, E: Array, S: Array) -> Array:
     return np.asarray(W - np.einsum("ifnt,jfnt,jcnt->icnt", E, S, W))
 
 
-def reactions_of(row: Row, pitch: Array, frames: Sequence[Array], x: Array | None = None) -> Array:
+def reactions_of(row: EvaluatedRow, pitch: Array, frames: Sequence[Array], x: Array | None = None) -> Array:
     """Reaction wrenches ``W``, ``(6, 6 - f, n, T)``: the row's components, or the null space of ``S^T``."""
     if row.reactions is not None:
         W = components_of(row.reactions, pitch, frames)
@@ -207,13 +207,13 @@ def _null_of_transpose(S: Array) -> Array:
     return np.asarray(N - U @ np.linalg.solve(St @ U, St @ N))
 
 
-def coordinates_to_state(row: Row, q: Array) -> Array:
+def coordinates_to_state(row: EvaluatedRow, q: Array) -> Array:
     """State numbers ``(nx, ...)`` from user coordinates ``(f, ...)`` (rotation vectors for rotations)."""
     parts = [quaternion_exp(q[columns]) if step.holds_rotation else q[columns] for step, columns, _ in _placed(row)]
     return np.concatenate(parts) if parts else np.empty((0, *q.shape[1:]))
 
 
-def advance(row: Row, x: Array, dq: Array) -> Array:
+def advance(row: EvaluatedRow, x: Array, dq: Array) -> Array:
     """State after the increments ``dq`` ``(f, ...)``: added for single freedoms, ``exp(dq) Q`` for rotations."""
     out = np.empty(np.broadcast_shapes(x.shape, (row.nx, *dq.shape[1:])), dtype=np.result_type(x, dq))
     for step, columns, rows in _placed(row):
@@ -224,7 +224,7 @@ def advance(row: Row, x: Array, dq: Array) -> Array:
     return out
 
 
-def difference(row: Row, x1: Array, x0: Array) -> Array:
+def difference(row: EvaluatedRow, x1: Array, x0: Array) -> Array:
     """Increments ``dq`` that lead from ``x0`` to ``x1``; the inverse of ``advance`` (rotations by the short way)."""
     out = np.empty((row.f, *np.broadcast_shapes(x1.shape[1:], x0.shape[1:])), dtype=np.result_type(x1, x0))
     for step, columns, rows in _placed(row):
@@ -235,7 +235,7 @@ def difference(row: Row, x1: Array, x0: Array) -> Array:
     return out
 
 
-def tangent(row: Row, dq: Array, rates: Array) -> Array:
+def tangent(row: EvaluatedRow, dq: Array, rates: Array) -> Array:
     """Rates of the increments ``dq`` at the state that they lead to, from the rates ``(f, ...)`` of the freedoms there.
 
     Unchanged for single freedoms; ``turn_tangent`` for a rotation.
@@ -247,7 +247,7 @@ def tangent(row: Row, dq: Array, rates: Array) -> Array:
     return out
 
 
-def state_to_coordinates(row: Row, x: Array, start: Array | None = None) -> Array:
+def state_to_coordinates(row: EvaluatedRow, x: Array, start: Array | None = None) -> Array:
     """User coordinates ``(f, n, ..., T)`` of n pairs from states, rotation vectors continued along the last axis.
 
     The rotation vector at the first position is the one nearest to ``start`` ``(f, n)`` (zero where it is None); at every
@@ -294,6 +294,6 @@ def _continued_paths(v: Array, first: Array) -> Array:
     return np.asarray(np.where(turned, moved, v))
 
 
-def random_coordinates(row: Row, rng: np.random.Generator, n: int, T: int) -> Array:
+def random_coordinates(row: EvaluatedRow, rng: np.random.Generator, n: int, T: int) -> Array:
     """Random states ``(nx, n, T)`` with coordinates of size about one."""
     return coordinates_to_state(row, rng.uniform(-1.2, 1.2, (row.f, n, T)))

@@ -25,6 +25,7 @@ from mechgraph.fields import (
     POINT_LIST,
     POSITIVE,
     Described,
+    axes_of,
     filled_second,
     parallel_faults,
 )
@@ -193,10 +194,7 @@ class AboutAxis(Surface):
 
     @cached_property
     def _basis(self) -> Array:
-        z = np.asarray(self.axis) / np.linalg.norm(self.axis)
-        x = np.asarray(self.second) - (z @ np.asarray(self.second)) * z
-        x /= np.linalg.norm(x)
-        return np.stack([x, np.cross(z, x), z])
+        return axes_of(self.axis, self.second).T
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

@@ -13,7 +13,7 @@ import numpy as np
 
 from mechgraph.errors import ShapeError
 from mechgraph.maths.se3 import Array, Library, by_components, cross
-from mechgraph.pairs.arc_length import COMPLEX_STEP, Place, Travel
+from mechgraph.pairs.arc_length import COMPLEX_STEP, CurvePlace, Travel
 from mechgraph.pairs.curves import ORDERS, Curve, turned
 from mechgraph.pairs.factors import UNIT_TWISTS, Factor, Freedom, PoseStack, Stack, entries
 from mechgraph.pairs.surfaces import Surface
@@ -214,7 +214,7 @@ class AlongCurve(Travelling):
         """Whether the frame keeps its orientation."""
         return self.curve is not None and self.curve.frame == "held"
 
-    def _frame(self, here: Place) -> Array:
+    def _frame(self, here: CurvePlace) -> Array:
         """The frame ``(3, 3, ...)`` where the curve is ``here``."""
         if self.held:
             return np.broadcast_to(self.start[:, :3].reshape(3, 3, *(1,) * (here.t.ndim - 1)), (3, *here.t.shape))
@@ -232,12 +232,12 @@ class AlongCurve(Travelling):
         here = self.travel.at(np.array(self.home))
         return np.column_stack([self._axes(here.t, here.y, here.k), here.x])
 
-    def place_of(self, x: Array) -> Place:
+    def place_of(self, x: Array) -> CurvePlace:
         """The curve where the coordinate is ``x (1, ...)``, lengths in its own unit."""
         here = self.travel.at(self.home + (-self.unit if self.reversed else self.unit) * x[0])
         return replace(here, w=0.0 * here.w, dw=0.0 * here.dw) if self.held else here
 
-    def pose_at(self, here: Place) -> Array:
+    def pose_at(self, here: CurvePlace) -> Array:
         """The pose where the curve is ``here``."""
         R = self._frame(here)
         if not self.back:
@@ -245,18 +245,18 @@ class AlongCurve(Travelling):
         R0, behind = self.start[:, :3], -self._off(here.x)
         return np.concatenate([np.einsum("ji...,jk->ik...", R, R0), (R * behind[:, None]).sum(axis=0)[:, None]], axis=1)
 
-    def twists_at(self, here: Place) -> Array:
+    def twists_at(self, here: CurvePlace) -> Array:
         """``(w, t + w x (p - x))``; on the side of link b minus ``(R^T w, R^T t)``."""
         w, sense = self.unit * here.w, -1.0 if self.reversed != self.back else 1.0
         return sense * self._screw(here, w, here.t)[:, None]
 
-    def twist_rates_at(self, here: Place, x: Array, dq: Array) -> Array:
+    def twist_rates_at(self, here: CurvePlace, x: Array, dq: Array) -> Array:
         """Their derivatives by the coordinate, times the rate squared."""
         w, dw = self.unit * here.w, self.unit**2 * here.dw
         sense = -1.0 if self.back else 1.0
         return sense * dq[0] ** 2 * self._screw(here, dw, self.unit * here.dt - cross(w, here.t))
 
-    def _screw(self, here: Place, w: Array, v: Array) -> Array:
+    def _screw(self, here: CurvePlace, w: Array, v: Array) -> Array:
         """A screw at the point of the curve, seen from the frame before the factor ``(6, ...)``."""
         if self.back:
             R = self._frame(here)
@@ -295,11 +295,11 @@ class Beside(Curve):
         rates = self._offset(here.t, here.y, np.stack([bend, rate, more.imag / COMPLEX_STEP]))
         return np.concatenate([here.x + self.distance * here.y, rates]).reshape(ORDERS, *here.x.shape)
 
-    def place_at(self, u: Array) -> Place | None:
+    def place_at(self, u: Array) -> CurvePlace | None:
         """With the frame of the curve, which turns over shorter or longer ways: ``c / g`` and ``c' / g^3``, ``g = 1 - d c``."""
         if self._named is not None:
             return None
-        here: Place = self.base.once(Travel).at(u)
+        here: CurvePlace = self.base.once(Travel).at(u)
         g = 1.0 - self.distance * (here.k * here.w).sum(axis=0)
         return replace(here, x=here.x + self.distance * here.y, dt=here.dt / g, w=here.w / g, dw=here.dw / (g * g * g))
 
