@@ -192,17 +192,19 @@ def close_all(
 def last_closed(system: System, nodes: Nodes, columns: Index) -> Nodes:
     """The last of the nodes of a track at which all loops close, the coordinates ``columns`` kept; at least its start.
 
-    A path follows independent rows. Those that depend on them at the start of a shaky mechanism open with the square of the way, which
-    the nodes, being closed coarsely, do not show at once.
+    A path follows independent rows. Those that depend on them at the start of a shaky mechanism open with a power of the way, which
+    the nodes, being closed coarsely, do not show at once; the first node, at half of the way that counts as closed or more, shows a part.
     """
     order = np.argsort(nodes.place, kind="stable")
 
-    def open_at(i: int) -> bool:
-        return close(system, nodes.x[:, order[i]], columns)[1] > CLOSED
+    def left(i: int) -> float:
+        return close(system, nodes.x[:, order[i]], columns)[1]
 
     last = len(order) - 1
-    if last and open_at(last):
-        last = max(bisect_left(range(last), True, lo=1, key=open_at) - 1, 0)
+    if last and left(last) > CLOSED:
+        last = max(bisect_left(range(last), True, lo=1, key=lambda i: left(i) > CLOSED) - 1, 0)
+    if last and nodes.place[order[last]] < PATH.shortest_quick and left(1) > max(CLOSURE_GOAL, 10.0 * left(0)):
+        last = 0
     return nodes.take(order[last : last + 1])
 
 

@@ -22,7 +22,7 @@ from mechgraph.graph.linkgraph import labels_of_bipartite, members
 from mechgraph.kinematics.solver import ClosureSolver, FactoredClosure
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Array, Index, cross, cross_twist
-from mechgraph.maths.tolerances import PATH
+from mechgraph.maths.tolerances import MOTIONS, PATH
 
 TURNING = 1e-6
 """Part of a unit motion from which on it turns the links that it moves."""
@@ -223,8 +223,11 @@ def _named(passive: Sequence[PassiveMotion], Z: Array, V: Array, links: list[int
             lead, *rest = passive[i].links
             apart = [of_links([link]) - of_links([lead]) for link in rest]
             rows = np.concatenate([of_links(some.difference(passive[i].links)), *apart], axis=1) @ mine
-            count = sum(passive[j].links == passive[i].links for j in group)
-            space = mine @ np.linalg.eigh(np.swapaxes(rows, 1, 2) @ rows)[1][:, :, :count]
+            squares, mixes = np.linalg.eigh(np.swapaxes(rows, 1, 2) @ rows)
+            # motions of other links may differ by one of these, as slides of all and of the others do
+            count = int((squares <= MOTIONS.tied**2 * np.maximum(squares[:, -1:], 1.0)).sum(axis=1).min())
+            count = max(count, sum(passive[j].links == passive[i].links for j in group))
+            space = mine @ mixes[:, :, :count]
             there = np.moveaxis(Z, 2, 0) @ space
             out[:, :, i] = (
                 (space @ (np.linalg.pinv(there) @ passive[i].rates)[..., None])[..., 0] if count > 1 else space[..., 0]

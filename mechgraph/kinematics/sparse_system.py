@@ -37,11 +37,12 @@ from itertools import pairwise
 import numpy as np
 import scipy
 
+from mechgraph.graph.linkgraph import labels_of_bipartite, members
 from mechgraph.kinematics.loop_rows import ClosureRows, ReducedRows
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.sparse import BlockFactor, BlockTriangular, Factors, Pattern, SparseFactor, SparseFactors
-from mechgraph.maths.tolerances import RANKS
+from mechgraph.maths.tolerances import MOTIONS, RANKS
 
 SPARE = 2.0
 """Rows a column that the front may have before it is condensed."""
@@ -244,17 +245,39 @@ class LoopSystem(ReducedRows):
     def of_rank(cls, here: Configuration, fixed: Index) -> LoopSystem:
         """The same with the rank that the position has, be it below that of the graph."""
         out = cls.at(here, fixed)
-        return out if out.regular else cls(out.rows, fixed, out.null_spaces())
+        return out.well_held() if out.regular else cls(out.rows, fixed, out.null_spaces())
 
     @classmethod
     def like(cls, other: LoopSystem, here: Configuration) -> LoopSystem:
         """The system of another position chosen at the first one of a configuration, of the same rank."""
         out = cls(ClosureRows.at(here), other.fixed)
         if other.borders is None:
-            return out
+            return out.well_held()
         own = out.null_spaces()
         as_there = own[1].shape == other.borders[1].shape or out.height != other.height
         return cls(out.rows, other.fixed, own if as_there else other.borders)
+
+    def well_held(self) -> LoopSystem:
+        """Itself, with motions of several loops held along themselves: random rows, which prove the rank, may hardly hold them."""
+        if self.held == self._motions or not self.regular:
+            return self
+        rhs = np.zeros((self._size, self.held))
+        rhs[self._m :] = np.eye(self.held)
+        motions = self.first.solve(rhs)[: self._n]
+        motions /= np.abs(motions).max(axis=0)
+        moving = scipy.sparse.csr_array(np.abs(motions.T) > MOTIONS.rounding)
+        for group in members(labels_of_bipartite(moving)):  # orthonormal; those without a freedom in common stay apart
+            motions[:, group] = np.linalg.qr(motions[:, group])[0]
+        (row, column), (held, moved) = self.pattern.places, (np.abs(motions.T) > MOTIONS.rounding).nonzero()
+        rest, self._motions = row < self._m, 0
+        self.pattern = Pattern(
+            np.concatenate([row[rest], self._m + held]), np.concatenate([column[rest], moved]), self._size
+        )
+        self._constant = np.concatenate([self._constant[rest[len(rest) - len(self._constant) :]], motions[moved, held]])
+        self.first = self.factor(self.rows)
+        self.smallest = self.first.smallest_pivot
+        self.pivot_limit = max(PIVOT, WORSE * self.smallest)
+        return self
 
     def null_spaces(self) -> tuple[Array, Array]:
         """Orthonormal self-stresses ``(height, s)`` that connect loops and motions ``(free columns, p)``, columns of unit size."""

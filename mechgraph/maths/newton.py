@@ -275,7 +275,7 @@ class _Run:
 
     def _unmet(self, small: Mask, step: Array, size: Array) -> Mask | None:
         """Where a last step leaves the residual of rows that were left out as dependent as large as it is: they are not. None: nowhere."""
-        doubt = small & (self.left > np.maximum(UNMET * size, 1e3 * min(self.step_goal, PATH.node)))
+        doubt = small & (self.left > np.maximum(UNMET * size, 10.0 * PATH.accepted))
         if not np.count_nonzero(doubt):
             return None
         rest = largest(self.point.residual + self.point.closure_rates(step))

@@ -58,6 +58,32 @@ def test_a_rank_below_that_of_the_graph(seed: int) -> None:
     test_engines_and_company(seed)
 
 
+@pytest.mark.parametrize("seed", [10031, 10647])
+def test_a_freedom_left_free_is_held_along_itself(seed: int) -> None:
+    """Passive freedoms held by random rows: rates without bound 0.17 from the start; and spins taken out that came back."""
+    m = integer_mechanism(seed)
+    given = {d.freedom: [-0.1 if i == 0 else -0.06] for i, d in enumerate(m.drives)}
+    assert mg.kinematics(m, given, engine="sparse").status.tolist() == ["ok"]
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+def test_a_way_along_which_loops_open_is_no_way(engine: str) -> None:
+    """Mobility 2 here and 1 finite: with both driven the loops open with the cube of the way, though their independent rows close."""
+    m = integer_mechanism(10199)
+    s = mg.kinematics(m, {"J4.Ry": [0.0, 0.01, 0.05], "J4.Rx": [0.0, 0.006, 0.03]}, engine=engine, on_reach="flag")
+    assert s.status.tolist() == ["ok", "out of reach", "out of reach"]
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+def test_what_holds_a_turn_is_taken_about_its_own_axis(engine: str) -> None:
+    """Four bodies turn about (3, 1, 0), and slide, as the slides of all links and of the two others differ: no mix of both is held."""
+    m = integer_mechanism(11396)
+    bodies = ["b3", "b4", "b5", "b6"]
+    couple = sum(9.81 * k.mass * (k.center[0] - 3.0) for k in m.links if k.name in bodies)
+    s = mg.solve(m, dict.fromkeys((d.freedom for d in m.drives), 0.0), engine=engine)
+    assert abs(s.passive_effort[" and ".join(bodies)]) == pytest.approx(abs(couple), rel=1e-10)
+
+
 def test_finite_mobility_does_not_hang_on_a_basis() -> None:
     """Mobility 3 in a shaky position: of its directions one goes on, and the others return, as any mix of them does in part."""
     m = integer_mechanism(223)
