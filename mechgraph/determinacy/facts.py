@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from time import monotonic
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.determinacy import findings
+from mechgraph.determinacy.budget import Budget
 from mechgraph.determinacy.decomposition import Decomposition, decomposition
 from mechgraph.determinacy.families import Families, Kind, families, kind_of, kind_of_mechanism
 from mechgraph.determinacy.findings import (
@@ -533,8 +533,8 @@ class Facts(GraphFacts):
     def _sought(self) -> tuple[tuple[Effect, ...], bool]:
         if not (g := self.geometry):
             return (), False
-        until = monotonic() + self.limit
-        return advice(g.freedoms, g.driven, self.finite_mobility or 0, self.asked, until), monotonic() > until
+        budget = Budget(self.limit)
+        return advice(g.freedoms, g.driven, self.finite_mobility or 0, self.asked, budget), budget.ended
 
     @property
     def sets_not_sought(self) -> bool:

@@ -11,12 +11,12 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
-from time import monotonic
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mechgraph.determinacy.budget import Budget, SearchEnded
 from mechgraph.determinacy.families import kind_of
 from mechgraph.determinacy.mobility import Freedoms, Position, drive_order, single_freedoms
 from mechgraph.determinacy.pair_changes import (
@@ -29,7 +29,7 @@ from mechgraph.determinacy.pair_changes import (
     self_aligning_sets,
     with_spline,
 )
-from mechgraph.determinacy.snapping import EXACT, TOOK_TOO_LONG, SearchEnded, SnappedMechanism, candidates, snapped
+from mechgraph.determinacy.snapping import EXACT, SnappedMechanism, candidates, snapped
 from mechgraph.errors import MechgraphError
 from mechgraph.files import patch
 from mechgraph.force.block import hold_at_rest, hold_names, is_idle
@@ -179,9 +179,9 @@ def rounding(m: Mechanism, verdict: Callable[[Mechanism], tuple[Any, ...]], limi
     Raises
     ------
     SearchEnded
-        after ``limit`` seconds, and of more than ``MOST_PAIRS`` pairs.
+        where it takes more than ``limit`` seconds (see ``determinacy.budget``), and of more than ``MOST_PAIRS`` pairs.
     """
-    until = monotonic() + limit
+    budget = Budget(limit)
     if isinstance(m, SnappedMechanism) or not m.has_geometry:
         return None
     if len(m.pairs) > MOST_PAIRS:
@@ -196,7 +196,7 @@ def rounding(m: Mechanism, verdict: Callable[[Mechanism], tuple[Any, ...]], limi
         if (sizes <= tol).sum() > max(BY_CHANCE[0], BY_CHANCE[1] * len(m.pairs)):
             break
         try:
-            exact = snapped(m, tol, until)
+            exact = snapped(m, tol, budget)
         except SearchEnded:
             raise
         except MechgraphError:
@@ -205,9 +205,8 @@ def rounding(m: Mechanism, verdict: Callable[[Mechanism], tuple[Any, ...]], limi
             m, exact.changes.L
         ):
             continue
+        budget.spend(2e-3 * len(m.pairs))  # two verdicts, measured
         own = verdict(m) if own is None else own
-        if monotonic() > until:
-            raise SearchEnded(TOOK_TOO_LONG)
         then = verdict(exact)
         if then and (not own or then[0] != own[0]):
             return _worded(exact, tol, then)

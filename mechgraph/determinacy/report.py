@@ -14,6 +14,7 @@ from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 from mechgraph.determinacy import sentences
+from mechgraph.determinacy.budget import Budget, SearchEnded
 from mechgraph.determinacy.decomposition import Decomposition, joints_at
 from mechgraph.determinacy.facts import Facts, Geometry
 from mechgraph.determinacy.families import COLUMNS, Families
@@ -22,7 +23,7 @@ from mechgraph.determinacy.finite_motion import branches_text
 from mechgraph.determinacy.mobility import FreeMotion, free_motion
 from mechgraph.determinacy.pair_changes import LARGEST_FOR_SETS
 from mechgraph.determinacy.sentences import assumed, here_only, kind_line, loop_names, mobility_line, reasons, verdict
-from mechgraph.determinacy.snapping import EXACT, TOOK_TOO_LONG, SearchEnded, meant
+from mechgraph.determinacy.snapping import EXACT, meant
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table, to_markdown, to_text
 from mechgraph.equations.terms import Ledger
 from mechgraph.errors import AssemblyError, DeadPointError, DeclarationError, IndeterminateError, MechgraphError, listed
@@ -463,7 +464,7 @@ class DeterminacyReport(Facts, Shown):
         try:
             return rounding(self.mechanism, _verdict_of, self.limit), ""
         except SearchEnded as error:
-            late = str(error) == TOOK_TOO_LONG
+            late = str(error) == Budget.TOOK_TOO_LONG
             return None, ENDED.format(limit=self.limit) if late else UNSOUGHT.format(error)
 
     @property
@@ -568,8 +569,9 @@ def _verdict_of(m: Mechanism, doubt: float | None = None) -> tuple[Any, ...]:
 def hinted(m: Mechanism, error: MechgraphError) -> MechgraphError:
     """An error that also says what tolerance would change the verdict, or make exact what is so to rounding only, where one would."""
     try:
-        # seconds that an error may wait for the same
-        found = rounding(m, partial(_verdict_of, doubt=EXACT), 2.0)
+        found = rounding(
+            m, partial(_verdict_of, doubt=EXACT), 2.0
+        )  # seconds of work that an error may wait for the same
     except SearchEnded:
         return error
     if found is not None:
@@ -604,7 +606,8 @@ def check(
         Accuracy of directions [rad] and distances (relative to L); the report is that of ``m.snapped(tol)``. Default: that of the
         mechanism, or exact.
     limit : float
-        Seconds for each search (special geometry behind rounded numbers, changes that help); the report lists unfinished searches.
+        Seconds for each search (special geometry behind rounded numbers, changes that help) on one quiet core, counted by its work, so
+        that the report is the same on a busy machine; the report lists unfinished searches.
     tolerances : Tolerances, optional
         Numbers by which to decide, see ``Tolerances``. Default: those of the mechanism, which are the default ones.
 

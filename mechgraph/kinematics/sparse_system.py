@@ -219,6 +219,11 @@ class LoopSystem(ReducedRows):
     such; None where borders are random.
     """
 
+    shared: int
+    held: int
+    _motions: int
+    _size: int
+
     def __init__(self, rows: ClosureRows, fixed: Index, borders: tuple[Array, Array] | None = None) -> None:
         super().__init__(rows, fixed)
         self.borders = borders
