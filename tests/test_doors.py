@@ -105,6 +105,14 @@ WRONG = {
         lambda: door(pairs=[HINGE.replace(type="Sg", radius=0.1, curve=mg.Curve.circle(radius=1, second=(0, 0, 2)))]),
         "curve.second = (0.0, 0.0, 2.0): parallel to the axis",
     ),
+    "rows of thousands of digits": (
+        lambda: door(pairs=[HINGE.replace(type="Sp", surface=mg.Surface.patch(points=np.eye(16, 3), rows=10**5000))]),
+        "rows = an integer of 16610 bits",
+    ),
+    "times within times": (
+        lambda: door(response=mg.ResponseSetup(time=([0.0, 1.0], 2.0), points=5)),
+        "expected (begin, end) or rising times",
+    ),
     "a study of a name": (lambda: mg.study("four-bar", {"crank.mass": [1]}, "A.effort"), "mechanism = 'four-bar'"),
     "a study of a list": (lambda: mg.study(M, ["crank.mass"], "A.effort"), "expected a mapping"),
     "a study with a wrong sampling": (lambda: mg.study(M, {"crank.mass": [1]}, "A.effort", sampling=[]), "sampling = []"),

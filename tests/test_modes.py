@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -578,6 +579,25 @@ def test_in_a_plane_a_sum_along_an_isotropic_direction_has_a_low_degree(monkeypa
     assert (whole.degree, whole.samples) == (1, 16)
     monkeypatch.setattr("mechgraph.modes.start_sets.MOST_TRACKS", 16 * 5)
     assert not trace_test(equations, start.member, start.x[:, :5], rng).passed
+
+
+@pytest.mark.usefixtures("empty")
+def test_a_linear_sum_is_not_taken_of_groups_that_do_not_depend_on_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two four-bars on one crank, not split: two of their four assemblies that differ in both have a linear sum."""
+    rng = np.random.default_rng(3)
+    pairs = [mg.Pair("A", "R", "f", "c", point=(0, 0, 0), axis=Z)]
+    for i in range(2):
+        ends = [("c", f"k{i}"), (f"k{i}", f"r{i}"), (f"r{i}", "f")]
+        pairs += [
+            mg.Pair(f"{n}{i}", "R", *on, point=(*rng.normal(size=2), 0), axis=Z)
+            for n, on in zip("BCD", ends, strict=True)
+        ]
+    monkeypatch.setattr("mechgraph.modes.start_sets.MOST_TRACKS", 64)
+    family = Question(mg.Mechanism("bars", pairs=pairs, frame="f"), {"A": 0.1}).form.family
+    start = start_set(family, np.random.default_rng(0))
+    equations = Equations(family, start.mixing)
+    for some in itertools.combinations(range(start.x.shape[1]), 2):
+        assert not trace_test(equations, start.member, start.x[:, list(some)], np.random.default_rng(1)).passed
 
 
 TRUSSES = {14: "01 05 06 12 23 26 34 45 46", 16: "01 03 06 12 14 23 35 45 46", 18: "01 02 05 06 14 23 34 36 45"}

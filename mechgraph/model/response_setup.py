@@ -221,11 +221,8 @@ class ResponseSetup(Described):
     def faults(self, m: Nameable) -> list[str]:
         """What is wrong with it, one line each."""
         found: list[str] = []
-        read_times(self.time, found)
-        points = self.points
-        if points is not None and (
-            type(points) is not int or not 2 <= points <= MOST_POINTS or len(np.atleast_1d(self.time)) != 2
-        ):
+        times, points = read_times(self.time, found), self.points
+        if points is not None and (type(points) is not int or not 2 <= points <= MOST_POINTS or len(times) != 2):
             found.append(wrong(points, "points", f"a number from 2 to {MOST_POINTS}, beside time = (begin, end)"))
         for what in ("start", "rates"):
             found += _value_faults(m, what, getattr(self, what))

@@ -18,7 +18,7 @@ go that of their two ways that is nearest to the start: ways of rods are no asse
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import count
@@ -27,6 +27,7 @@ from typing import NamedTuple, Protocol, cast
 
 import numpy as np
 
+from mechgraph.determinacy.decomposition import MOST_SPLIT, Constraint, Constraints, rows_of_pair, smallest
 from mechgraph.errors import counted
 from mechgraph.graph.linkgraph import LinkGraph, components_of_edges
 from mechgraph.kinematics.loop_rows import PointNumbers, PointRows
@@ -50,7 +51,7 @@ from mechgraph.maths.tolerances import MODES, RANKS
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Pair
 from mechgraph.model.parameters import Parameters
-from mechgraph.modes.family import Array, Family
+from mechgraph.modes.family import Array, Family, generated
 from mechgraph.pairs import kinematics
 from mechgraph.pairs.pair_type import PairType
 
@@ -562,3 +563,86 @@ def _angle(a: Array, b: Array, axis: Array) -> Array:
     # exp(i angle) and exp(-i angle): the smaller one has lost its digits
     ahead, back = cosine + 1j * sine, cosine - 1j * sine
     return np.where(np.abs(ahead) >= np.abs(back), -1j * np.log(ahead), 1j * np.log(back))
+
+
+def is_one_group(family: Family) -> bool:
+    """Whether all pairs of a class have to be solved together, as far as that is looked for: of one loop, or up to ``MOST_SPLIT`` links."""
+    s = family.system
+    if s.graph.n_loops <= 1:
+        return True
+    pairs, _, known = next(sets_of(family), ((), (), ()))
+    return len(pairs) + len(known) == len(s.m.pairs) and len(s.m.links) <= MOST_SPLIT
+
+
+def sets_of(family: Family) -> Iterator[tuple[Index, Index, Index]]:
+    """Pairs and rods of the groups, one after the other, with the pairs known before."""
+    s, rows = family.system, _constraints(family)
+    columns = [range(s.first_column[k], s.first_column[k + 1]) for k in range(len(s.m.pairs))]
+    free = set(family.free.tolist())
+    known = {k for k, own in enumerate(columns) if free.isdisjoint(own)}
+    rods = list(zip(*family.points[:2], strict=True))
+    left = set(range(len(rods)))
+    while len(known) < len(columns):
+        before = np.array(sorted(known), dtype=np.intp)
+        body = components_of_edges(len(s.m.links), [s.graph.ends[k] for k in before])
+        unknown = [k for k in range(len(columns)) if k not in known]
+        mine = _smallest(rows, body, [s.graph.ends[k] for k in unknown], int(body[s.graph.frame]))
+        pairs = [k for k in unknown if mine.issuperset(body[list(s.graph.ends[k])].tolist())]
+        own = [i for i in sorted(left) if mine.issuperset(body[list(rods[i])].tolist())]
+        yield np.array(pairs, dtype=np.intp), np.array(own, dtype=np.intp), before
+        known.update(pairs)
+        left.difference_update(own)
+
+
+def _smallest(rows: Constraints, body: Index, unknown: list[tuple[int, int]], frame: int) -> set[int]:
+    """The smallest set of bodies that determine each other, that of the frame with them if it has one; all where there is none."""
+    count = int(body.max()) + 1
+    every = set(range(count))
+    if count > MOST_SPLIT:
+        return every
+    merged = _merged(rows, body)
+    for root in sorted(every, key=lambda i: i != frame):
+        mine = smallest(merged, merged.determined(every - {root}, {root}), {root}) | {root}
+        joined = [(int(body[a]), int(body[b])) for a, b in unknown if mine.issuperset(body[[a, b]].tolist())]
+        if 1 < len(mine) < count and len({components_of_edges(count, joined)[i] for i in mine}) == 1:
+            return mine
+    return every
+
+
+def _constraints(family: Family) -> Constraints:
+    """What pairs, rods and passive motions, which rest, ask of the motions of links."""
+    here, s = family.here, family.system
+    S = here.S[:, :, 0]
+    T = generated(S)
+    free = np.zeros(s.n_freedoms, dtype=bool)
+    free[family.free] = True
+    out = []
+    for k, (a, b) in enumerate(s.graph.ends):
+        own = np.arange(s.first_column[k], s.first_column[k + 1])
+        row = rows_of_pair(S[:, own[free[own]]], T)
+        out.append(Constraint(k, {a: -row, b: row}))
+    if isinstance(s, RodSystem):
+        W = s.rod_rows.lines(here)[1][:, :, 0]
+        for a, b, w in zip(s.points.a.tolist(), s.points.b.tolist(), W.T, strict=True):
+            out.append(Constraint(len(out), {a: -(w @ T)[None], b: (w @ T)[None]}))
+    for rates in family.passive.T:
+        V = here.link_twists(rates[:, None])[:, :, 0]
+        moved = {i: (v @ T)[None] for i, v in enumerate(V.T) if np.abs(v).max() > MODES.span}
+        # against a neighbour that rests
+        rests = next(b if a in moved else a for a, b in s.graph.ends if (a in moved) != (b in moved))
+        moved[rests] = -np.sum(list(moved.values()), axis=0)
+        out.append(Constraint(len(out), moved))
+    return Constraints(out, T.shape[1])
+
+
+def _merged(rows: Constraints, body: Index) -> Constraints:
+    """The same between bodies ``(N,)`` of links."""
+    out = []
+    for c in rows.constraints:
+        summed: dict[int, Array] = {}
+        for link, row in c.rows.items():
+            i = int(body[link])
+            summed[i] = summed.get(i, 0.0) + row
+        left = {i: row for i, row in summed.items() if np.abs(row).max(initial=0.0) > RANKS.position}
+        out.append(Constraint(c.number, left))
+    return Constraints(out, rows.b)

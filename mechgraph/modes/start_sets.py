@@ -19,7 +19,8 @@ Where all loops move in one plane, markers slide along an isotropic direction ``
 numbers by which links have turned, the loops are linear in ``w`` along ``v``, which stands still, and in ``1 / w`` along its conjugate,
 which moves: parallel planes cut the assemblies out of the inverses of a linear space, an irreducible curve. The sum is that of ``g``
 itself, of points along ``v``, linear in ``w``: its degree is the number of ``z`` where an assembly goes to infinity, less than a tenth.
-(Of groups that do not depend on each other a linear sum does not tell every part from the whole; they are solved one after the other.)
+(Of groups that do not depend on each other a linear sum does not tell every part from the whole: it is only taken of what is known to
+be one group. Groups are solved one after the other, but for large classes, whose groups are not looked for.)
 
 Whether a function is rational its Loewner matrix ``(f(a_i) - f(b_j)) / (a_i - b_j)`` tells: the rank is the degree (Antoulas and
 Anderson, On the scalar rational interpolation problem, IMA J. Math. Control Inform. 3, 1986). The singular values of a rational function
@@ -62,7 +63,7 @@ from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import compose, pose_exp
 from mechgraph.maths.tolerances import MODES
 from mechgraph.modes.family import Array, Family, Labelling, Member, common, span
-from mechgraph.modes.form import RodFamily
+from mechgraph.modes.form import RodFamily, is_one_group
 from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, Equations, Leg, Linear, follow
 
 SIX_TURNS = (
@@ -369,7 +370,7 @@ def _isotropic(family: Family) -> Array | None:
     """An isotropic direction ``(3,)`` of the plane in which all loops move, and nothing else; None where they have none in common."""
     algebras = family.loop_algebras
     shared, plane = common(algebras), {h.shape[1] for h in algebras} == {3}
-    if family.points or family.idle.shape[1] or not plane or shared.shape[1] != 3:
+    if family.points or family.idle.shape[1] or not plane or shared.shape[1] != 3 or not is_one_group(family):
         return None
     _, turns, Vt = np.linalg.svd(shared[:3])
     return (shared @ Vt[1:].T)[3:] @ [1.0, 1.0j] if (turns > MODES.span).sum() == 1 else None

@@ -19,12 +19,11 @@ Sources: Assur's groups, see ``structure.groups``; Sommese and Wampler, The Nume
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechgraph.determinacy.decomposition import MOST_SPLIT, Constraint, Constraints, rows_of_pair, smallest
 from mechgraph.graph.linkgraph import components_of_edges
 from mechgraph.kinematics.assembly import CLOSED, close_all
 from mechgraph.kinematics.loop_rows import PointNumbers
@@ -32,12 +31,12 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Index, compose, identity
-from mechgraph.maths.tolerances import MODES, RANKS
+from mechgraph.maths.tolerances import MODES
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Pair
 from mechgraph.modes.continua import Nearby, irregular, least_value
-from mechgraph.modes.family import Array, Family, Member, generated
-from mechgraph.modes.form import RodFamily, RodStep, RodSystem, behind
+from mechgraph.modes.family import Array, Family, Member
+from mechgraph.modes.form import RodFamily, RodStep, RodSystem, behind, sets_of
 from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, Equations, Leg, follow, rounding
 from mechgraph.modes.start_sets import StartSet, distinct
 
@@ -434,7 +433,7 @@ def groups_of(family: Family) -> Sequence[Undivided | EquationGroup]:
     graph = family.system.graph
     if len(family.bearers) // 2 - len(graph.ends) + graph.n_loops > 1:
         found = []
-        for pairs, rods, known in _sets(family):
+        for pairs, rods, known in sets_of(family):
             group = EquationGroup(family, pairs, rods, known)
             if group.family.rank or group.family.unknowns:
                 found.append(group)
@@ -444,80 +443,6 @@ def groups_of(family: Family) -> Sequence[Undivided | EquationGroup]:
             if len(found) > 1:
                 return found
     return [Undivided(family)]
-
-
-def _sets(family: Family) -> Iterator[tuple[Index, Index, Index]]:
-    """Pairs and rods of the groups, one after the other, with the pairs known before."""
-    s, rows = family.system, _constraints(family)
-    columns = [range(s.first_column[k], s.first_column[k + 1]) for k in range(len(s.m.pairs))]
-    free = set(family.free.tolist())
-    known = {k for k, own in enumerate(columns) if free.isdisjoint(own)}
-    rods = list(zip(*family.points[:2], strict=True))
-    left = set(range(len(rods)))
-    while len(known) < len(columns):
-        before = np.array(sorted(known), dtype=np.intp)
-        body = components_of_edges(len(s.m.links), [s.graph.ends[k] for k in before])
-        unknown = [k for k in range(len(columns)) if k not in known]
-        mine = _smallest(rows, body, [s.graph.ends[k] for k in unknown], int(body[s.graph.frame]))
-        pairs = [k for k in unknown if mine.issuperset(body[list(s.graph.ends[k])].tolist())]
-        own = [i for i in sorted(left) if mine.issuperset(body[list(rods[i])].tolist())]
-        yield np.array(pairs, dtype=np.intp), np.array(own, dtype=np.intp), before
-        known.update(pairs)
-        left.difference_update(own)
-
-
-def _smallest(rows: Constraints, body: Index, unknown: list[tuple[int, int]], frame: int) -> set[int]:
-    """The smallest set of bodies that determine each other, that of the frame with them if it has one; all where there is none."""
-    count = int(body.max()) + 1
-    every = set(range(count))
-    if count > MOST_SPLIT:
-        return every
-    merged = _merged(rows, body)
-    for root in sorted(every, key=lambda i: i != frame):
-        mine = smallest(merged, merged.determined(every - {root}, {root}), {root}) | {root}
-        joined = [(int(body[a]), int(body[b])) for a, b in unknown if mine.issuperset(body[[a, b]].tolist())]
-        if 1 < len(mine) < count and len({components_of_edges(count, joined)[i] for i in mine}) == 1:
-            return mine
-    return every
-
-
-def _constraints(family: Family) -> Constraints:
-    """What pairs, rods and passive motions, which rest, ask of the motions of links."""
-    here, s = family.here, family.system
-    S = here.S[:, :, 0]
-    T = generated(S)
-    free = np.zeros(s.n_freedoms, dtype=bool)
-    free[family.free] = True
-    out = []
-    for k, (a, b) in enumerate(s.graph.ends):
-        own = np.arange(s.first_column[k], s.first_column[k + 1])
-        row = rows_of_pair(S[:, own[free[own]]], T)
-        out.append(Constraint(k, {a: -row, b: row}))
-    if isinstance(s, RodSystem):
-        W = s.rod_rows.lines(here)[1][:, :, 0]
-        for a, b, w in zip(s.points.a.tolist(), s.points.b.tolist(), W.T, strict=True):
-            out.append(Constraint(len(out), {a: -(w @ T)[None], b: (w @ T)[None]}))
-    for rates in family.passive.T:
-        V = here.link_twists(rates[:, None])[:, :, 0]
-        moved = {i: (v @ T)[None] for i, v in enumerate(V.T) if np.abs(v).max() > MODES.span}
-        # against a neighbour that rests
-        rests = next(b if a in moved else a for a, b in s.graph.ends if (a in moved) != (b in moved))
-        moved[rests] = -np.sum(list(moved.values()), axis=0)
-        out.append(Constraint(len(out), moved))
-    return Constraints(out, T.shape[1])
-
-
-def _merged(rows: Constraints, body: Index) -> Constraints:
-    """The same between bodies ``(N,)`` of links."""
-    out = []
-    for c in rows.constraints:
-        summed: dict[int, Array] = {}
-        for link, row in c.rows.items():
-            i = int(body[link])
-            summed[i] = summed.get(i, 0.0) + row
-        left = {i: row for i, row in summed.items() if np.abs(row).max(initial=0.0) > RANKS.position}
-        out.append(Constraint(c.number, left))
-    return Constraints(out, rows.b)
 
 
 REAL = 0.5 * MODES.one_assembly

@@ -34,7 +34,7 @@ from mechgraph.maths.se3 import Array, cross
 from mechgraph.pairs.arc_length import far_from
 from mechgraph.pairs.curves import Circle, Curve, Line, remade_from
 from mechgraph.pairs.given import asked, between, slope_faults
-from mechgraph.quantities import LENGTH, PURE, wrong
+from mechgraph.quantities import LENGTH, PURE, shown, wrong
 
 NO_ENDS = (-np.inf, np.inf)
 
@@ -466,7 +466,7 @@ class Patch(Surface):
         found = super().faults(where)
         n = len(self.points) if not found else 0
         if not found and (self.rows < 4 or n % self.rows or n // self.rows < 4):
-            found.append(f"{where}rows = {self.rows}: {n} points make no grid of 4 or more rows and columns")
+            found.append(f"{where}rows = {shown(self.rows)}: {n} points make no grid of 4 or more rows and columns")
         return found
 
 
