@@ -24,8 +24,8 @@ from mechgraph.maths.tolerances import PATH
 from mechgraph.maths.track import Interpolation, Nodes, Rule, rule
 from mechgraph.maths.tracker import Follower
 
-MOST_TURNS = 8
-"""Most repetitions of the turn that takes the spin out."""
+MOST_TURNS = 80
+"""Most repetitions of the turn that takes the spin out; over a plane half a turn takes some thirty."""
 MOST_BENDS = 20_000
 """Bends up to which steps end there; of more (many positions of several drivers) a step goes along its chord."""
 UNTURNED = 1e-13
@@ -272,17 +272,23 @@ class _Carried:
 
         Also where that is beyond doubt.
         """
+        part = np.ones(len(track))
         for _ in range(MOST_TURNS):
             amount, dq, sure = self._missing(x, which, track, place, turns)
             if amount.max(initial=0.0) < UNTURNED:
                 break
             # exact where the rates of the motion are constant (ball joints, hinges), so that nothing is left to correct; over a plane it
-            # comes nearer with every repetition
-            closed = self.follower.newton.close(self.path.advance(x, dq, track), x[self.path.rows], track, which)
-            x = closed.x
-            if closed.correction.max(initial=0.0) < UNTURNED:
-                amount = np.zeros(len(track))
+            # comes nearer with every repetition, by parts of the way that need no large correction
+            closed = self.follower.newton.close(self.path.advance(x, part * dq, track), x[self.path.rows], track, which)
+            if closed.correction.max(initial=0.0) < UNTURNED and (part == 1.0).all():
+                x, amount = closed.x, np.zeros(len(track))
                 break
+            near = closed.done & (closed.correction <= PATH.correction)
+            x = np.where(near, closed.x, x)
+            easily = near & (closed.correction <= 0.25 * PATH.correction)  # it grows with the square of the part
+            part = np.where(easily, np.minimum(2.0 * part, 1.0), np.where(near, part, 0.5 * part))
+            # freedoms that held the motion may no longer do so where it has led
+            which = self.path.chosen(self.path.at(x, x[self.path.rows], track), which)
         return x, sure & (amount < MISSING)
 
     def spin(self, nodes: Nodes) -> Array:

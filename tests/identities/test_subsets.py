@@ -502,3 +502,5 @@ def test_links_that_a_driver_moves_against_each_other_share_their_rest(engine, n
     s = mg.kinematics(m, {"B": mg.Motion(np.linspace(0.0, 1.0, n), 1.0, 0.0)}, engine=engine)
     assert np.allclose(s["A"].position[-1], -0.5, atol=1e-11)
     assert np.allclose(s["A"].velocity, -0.5, atol=1e-11)
+    far = mg.kinematics(m, {"B": [2.2, 5.0]}, engine=engine)
+    assert np.allclose(far["A"].position[:, 0], [-1.1, -2.5], atol=1e-11)
