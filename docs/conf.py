@@ -75,6 +75,14 @@ def displayed(translator: Any, node: Any) -> None:
     raise SkipNode
 
 
+def draw(app: Any) -> None:
+    """Pages draw their pictures before Sphinx looks for them."""
+    import player
+
+    for page in player.PAGES:
+        player.draw(page)
+
+
 def stays_here(app: Any, exception: Exception | None) -> None:
     """No page loads anything from elsewhere."""
     from sphinx.errors import SphinxError
@@ -87,5 +95,6 @@ def stays_here(app: Any, exception: Exception | None) -> None:
 
 def setup(app: Any) -> dict[str, bool]:
     app.add_html_math_renderer("mathml", (formula, None), (displayed, None))
+    app.connect("builder-inited", draw)
     app.connect("build-finished", stays_here)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,4 +1,4 @@
-"""The pictures of the README: the ball press of example 02, and the excavator of example 12.
+"""Pictures of the README and the manual: the four-bar of the README, the ball press of example 02, the excavator of example 12.
 
 Asserted: the mean power of the crank over a turn equals the mean power against the resistance, zero here, since the lever returns
 and weights and kinetic energy come back: ``int T dtheta = 0`` over a cycle.
@@ -31,6 +31,15 @@ SPEED = 10.0
 Made = Callable[[], tuple[mg.Mechanism, mg.Solution]]
 
 
+def four_bar() -> tuple[mg.Mechanism, mg.Solution]:
+    """As the first block of the README declares and solves it."""
+    page = (HERE.parent / "README.md").read_text(encoding="utf-8")
+    block = page.partition("```python\n")[2].partition("\nB = ")[0]
+    names: dict[str, Any] = {}
+    exec(compile(block, "README.md", "exec"), names)
+    return names["m"], names["s"]
+
+
 def press() -> tuple[mg.Mechanism, mg.Solution]:
     m = runpy.run_path(str(HERE / "02_new_topology.py"))["ball_press"]()
     s = mg.solve(m, {"A": mg.Motion(np.deg2rad(np.arange(0.0, 360.0)), velocity=SPEED)})
@@ -43,6 +52,13 @@ def excavator() -> tuple[mg.Mechanism, mg.Solution]:
     example = runpy.run_path(str(HERE / "12_excavator.py"))
     m = example["excavator"]()
     return m, example["dig"](m)
+
+
+def draw_four_bar(figure: Any, m: mg.Mechanism, s: mg.Solution) -> None:
+    figure.set_size_inches(10.4, 4.0)
+    grid = figure.add_gridspec(1, 2, width_ratios=(1.15, 1.0))
+    show.draw_skeleton(s, 60, ax=figure.add_subplot(grid[0]), forces=True, traces=False)
+    show.effort_curve(s, ax=figure.add_subplot(grid[1]), marked=60)
 
 
 def draw_press(figure: Any, m: mg.Mechanism, s: mg.Solution) -> None:
@@ -77,6 +93,7 @@ def draw_excavator(figure: Any, m: mg.Mechanism, s: mg.Solution) -> None:
 
 
 PICTURES: dict[str, tuple[Made, Callable[[Any, mg.Mechanism, mg.Solution], None]]] = {
+    "four_bar.png": (four_bar, draw_four_bar),
     "readme.png": (press, draw_press),
     "graphs.png": (press, draw_graphs),
     "forces.png": (press, draw_forces),

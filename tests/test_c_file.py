@@ -190,9 +190,9 @@ def test_no_heap_and_no_globals():
 
 
 @pytest.mark.usefixtures("compiled")
-def test_the_controller_loop_of_the_readme(tmp_path):
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    (loop,) = re.findall(r"^```c\n(.*?)^```$", readme, re.MULTILINE | re.DOTALL)
+def test_the_controller_loop_of_the_manual(tmp_path):
+    page = (ROOT / "docs" / "how-to" / "control-loop.md").read_text(encoding="utf-8")
+    (loop,) = re.findall(r"^```c\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
     (tmp_path / "loop.c").write_text(loop)
     write_c(tabled(mg.load("four-bar")), tmp_path / "press.c")
     printed = float(run_c(tmp_path / "loop.c", tmp_path / "press.c").split()[-1])

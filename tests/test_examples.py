@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import player
 import pytest
 
 import mechgraph as mg
@@ -64,18 +65,18 @@ def test_the_worked_machine_has_its_page(tmp_path: Path) -> None:
     assert all(f"{name} (R)" in page for name in "ABCK")
 
 
-def test_pictures_of_the_readme_are_current_and_small() -> None:
-    """They were drawn from what the examples declare now, in the way that is stated now; and the README shows each of them."""
+def test_pictures_of_the_pages_are_current_and_small() -> None:
+    """They were drawn from what the examples declare now, in the way that is stated now; and a page shows each of them."""
     script = runpy.run_path(str(ROOT / "examples" / "04_readme_figures.py"))
     folder = script["FIGURES"]
     notes = json.loads((folder / script["NOTES"]).read_text(encoding="utf-8"))
     assert notes == {name: script["fingerprint"](name) for name in script["PICTURES"]}, (
         "run examples/04_readme_figures.py"
     )
-    page = (ROOT / "README.md").read_text(encoding="utf-8")
+    pages = "".join(page.read_text(encoding="utf-8") for page in player.PAGES)
     for name in script["PICTURES"]:
         assert 0 < (folder / name).stat().st_size < LARGEST_PICTURE
-        assert f"](examples/figures/{name})" in page
+        assert f"examples/figures/{name})" in pages
 
 
 def test_a_fingerprint_tells_other_numbers_and_another_way_to_draw() -> None:

@@ -371,8 +371,8 @@ def test_unknown_law_lists_the_known():
     assert all(name in said for name in LAWS)
 
 
-def test_the_readme_lists_every_law():
-    page = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+def test_the_manual_lists_every_law():
+    page = (Path(__file__).parents[1] / "docs" / "how-to" / "drive-by-a-law.md").read_text(encoding="utf-8")
     assert re.findall(r'^\| `"(\w+)"` \| `(?:rise|speed|samples)', page, re.MULTILINE) == [*LAWS]
 
 

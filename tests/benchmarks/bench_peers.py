@@ -3,7 +3,7 @@
 The job: from the driver motion of a closed loop to the driver torque and all reactions at 1, 36, 360 and 3,600 positions of its cycle,
 from the same numbers (``peer_cases``), on one core, in one run. Every round does every job once, one after the other, and gives the
 ratio of each program to mechgraph; shown are the medians over all rounds. Errors are those of the torque and, where they are unique,
-of the reaction forces against mechgraph's ``newton_euler``, in parts of the greatest. ``--write`` puts the table into the README. A
+of the reaction forces against mechgraph's ``newton_euler``, in parts of the greatest. ``--write`` puts the table into docs/comparison.md. A
 program that is not there says why and the others run (``pip install '.[bench]'``; the C++ job is compiled here where a compiler is).
 """
 
@@ -45,7 +45,7 @@ PEERS = {
 }
 Programs = dict[str, ModuleType | str]
 """The programs by name; for one that is not there the reason."""
-README = Path(__file__).resolve().parents[2] / "README.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "comparison.md"
 MARKED = re.compile(
     r"(<!-- peers: written by tests/benchmarks/bench_peers\.py -->\n).*?(\n<!-- end of peers -->)", re.DOTALL
 )
@@ -285,10 +285,10 @@ def main() -> None:
             raise SystemExit(
                 f"not written: needs all programs (missing: {missing}); pip install '.[bench]' and a C++ compiler"
             )
-        page, times = MARKED.subn(lambda m: m[1] + "\n" + text + "\n" + m[2], README.read_text(encoding="utf-8"))
+        page, times = MARKED.subn(lambda m: m[1] + "\n" + text + "\n" + m[2], PAGE.read_text(encoding="utf-8"))
         if times != 1:
-            raise SystemExit("not written: the README has no place marked for the table")
-        README.write_text(page, encoding="utf-8")
+            raise SystemExit("not written: the page has no place marked for the table")
+        PAGE.write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 The job: from declared bodies and joints to the positions of one point over time, by each program at the coarsest setting (tolerance or
 step) at which that point is nowhere further off than the wanted accuracy; all of them in one run, on one core, processor times.
 mechgraph returns all reactions with it, the others are not asked for any. Variants of a program are all tried, the fastest counts.
-``--write`` puts the table into the README.
+``--write`` puts the table into docs/comparison.md.
 """
 
 import importlib
@@ -20,7 +20,7 @@ from datetime import date
 from types import ModuleType
 
 import numpy as np
-from bench_peers import README, WIDTH, one_core, processor, row, short
+from bench_peers import PAGE, WIDTH, one_core, processor, row, short
 from motion_cases import ROWS, Case, others
 from motion_cases import row as row_of
 
@@ -247,10 +247,10 @@ def main() -> None:
     if "--write" in sys.argv:
         if missing:
             raise SystemExit(f"not written: needs all programs (missing: {', '.join(missing)}); pip install '.[bench]'")
-        page, times = MARKED.subn(lambda m: m[1] + "\n" + text + "\n" + m[2], README.read_text(encoding="utf-8"))
+        page, times = MARKED.subn(lambda m: m[1] + "\n" + text + "\n" + m[2], PAGE.read_text(encoding="utf-8"))
         if times != 1:
-            raise SystemExit("not written: the README has no place marked for the table")
-        README.write_text(page, encoding="utf-8")
+            raise SystemExit("not written: the page has no place marked for the table")
+        PAGE.write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":

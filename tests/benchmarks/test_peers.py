@@ -117,4 +117,4 @@ def test_the_extra_bench_has_all_that_the_benchmarks_import():
 
 
 def test_the_table_has_its_place_in_the_readme():
-    assert len(bench_peers.MARKED.findall(bench_peers.README.read_text(encoding="utf-8"))) == 1
+    assert len(bench_peers.MARKED.findall(bench_peers.PAGE.read_text(encoding="utf-8"))) == 1
