@@ -1,4 +1,4 @@
-"""The manual as a static site, without network: ``python -m sphinx -W docs site``."""
+"""The manual as a static site, without network: ``python docs``."""
 
 import re
 import sys
@@ -25,7 +25,7 @@ extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "nu
 exclude_patterns = ["_built/*.md"]
 nitpicky = True
 
-myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
+myst_enable_extensions = ["amsmath", "attrs_block", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 
 autodoc_typehints = "none"
@@ -46,7 +46,20 @@ html_theme_options = {
     "footer_start": ["copyright"],
     "footer_end": [],
     "show_nav_level": 1,
-    "header_links_before_dropdown": 8,
+    "header_links_before_dropdown": 5,
+}
+html_sidebars = {
+    name: []
+    for name in (
+        "index",
+        "gallery/index",
+        "verified",
+        "comparison",
+        "glossary",
+        "changelog",
+        "architecture",
+        "contributing",
+    )
 }
 pygments_style = "default"
 
@@ -77,8 +90,10 @@ def displayed(translator: Any, node: Any) -> None:
 
 def draw(app: Any) -> None:
     """Pages draw their pictures before Sphinx looks for them."""
+    import gallery
     import player
 
+    gallery.draw()
     for page in player.PAGES:
         player.draw(page)
 

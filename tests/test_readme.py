@@ -4,12 +4,16 @@
 and for the page of all equations.
 """
 
+import json
 import os
 import re
+import tomllib
 from pathlib import Path
 
+import gallery
 import player
 import pytest
+import rooms
 
 import mechgraph as mg
 from mechgraph.compiled.tabled import STATUSES
@@ -120,6 +124,48 @@ def test_links_lead_somewhere(page: Path) -> None:
         place = (page.parent / target) if target else page
         assert re.search("_built/|generated/", target) or place.exists(), target
         assert not anchor or anchor in anchors(place), f"{target}#{anchor}"
+
+
+@pytest.mark.parametrize("page", ["ARCHITECTURE.md", "CONTRIBUTING.md"])
+def test_every_file_that_is_named_is_there(page: str) -> None:
+    text = (ROOT / page).read_text(encoding="utf-8")
+    named = set(re.findall(r"`((?:mechgraph|tests|docs|library|examples)/[^`*]*)`", text))
+    assert named
+    assert not {place for place in named if not (ROOT / place).exists()}
+
+
+def test_the_picture_of_the_architecture_is_current() -> None:
+    """It is drawn from the imports, and every room has its line in the table."""
+    assert rooms.PICTURE.read_text(encoding="utf-8") == rooms.drawn(), "run python docs/rooms.py"
+    table = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8").partition("| room |")[2].partition("\n\n")[0]
+    assert {*re.findall(r"`(\w+)`", table)} == {*rooms.rooms()}
+
+
+def test_the_tour_runs() -> None:
+    notebook = json.loads((ROOT / "examples" / "tour.ipynb").read_text(encoding="utf-8"))
+    namespace: dict[str, object] = {"__name__": "tour"}
+    with player.stage():
+        for cell in notebook["cells"]:
+            assert not cell.get("outputs")
+            if cell["cell_type"] == "code":
+                player.run_python("".join(cell["source"]), namespace, "tour.ipynb")
+
+
+def test_the_gallery_draws_thirty_mechanisms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert len({entry.slug for entry in gallery.ENTRIES}) == 30
+    assert all((ROOT / "docs" / "gallery" / entry.more).exists() for entry in gallery.ENTRIES)
+    monkeypatch.setattr(gallery, "FOLDER", tmp_path)
+    card = gallery.card(gallery.ENTRIES[0])
+    assert "Mobility 1, by count -2; redundancy 3" in card
+    still, film = ((tmp_path / f"four-bar{suffix}.svg").read_text(encoding="utf-8") for suffix in ("", "-film"))
+    assert still.count("<animate") == 0
+    assert film.count("<animate") == 3 + 4  # three links; two pins that move, each right and up
+
+
+def test_version_and_citation_agree() -> None:
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\n## {version} (" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,308 @@
+"""The gallery of the manual: thirty mechanisms, each with a picture, a film, its numbers and its source.
+
+A mechanism is drawn from what a solution gives of it: a link joins the points of its pairs, and the path of a pair's marker on its first
+link is the guide, slot or cam there. ``python docs/gallery.py`` draws them all below ``docs/_built``.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import runpy
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import mechgraph as mg
+
+ROOT = Path(__file__).resolve().parents[1]
+FOLDER = ROOT / "docs" / "_built" / "gallery"
+SIZE, MARGIN, FRAMES, SECONDS = 220.0, 26.0, 36, 4
+COLORS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#6b3a00")
+VIEW = np.array([[0.82, -0.57, 0.0], [0.2, 0.29, 0.94]])
+"""Right and up of a view from above and the side."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A mechanism of the gallery: its title, how it is made and moved, and the page that tells more."""
+
+    title: str
+    made: Callable[[], mg.Solution]
+    more: str = ""
+    source: str = ""
+
+    @property
+    def slug(self) -> str:
+        """The name of its files."""
+        return "-".join("".join(c if c.isalnum() else " " for c in self.title.lower()).split())
+
+
+def library(name: str) -> Callable[[], mg.Solution]:
+    """A mechanism of the library over its stored motion, or as its stored response moves."""
+
+    def made() -> mg.Solution:
+        m = mg.load(name)
+        if m.response is not None:
+            return mg.respond(m, np.linspace(0.0, 1.0, 2 * FRAMES) * np.max(m.response.time))
+        return mg.solve(m)
+
+    return made
+
+
+def example(
+    number: str, declared: str, motions: Callable[[], dict[str, Any]], *arguments: Any
+) -> Callable[[], mg.Solution]:
+    """A mechanism that an example declares."""
+
+    def made() -> mg.Solution:
+        (script,) = (ROOT / "examples").glob(f"{number}_*.py")
+        return mg.solve(runpy.run_path(str(script))[declared](*arguments), motions())
+
+    return made
+
+
+def turn(name: str, speed: float = 10.0, end: float = 360.0) -> Callable[[], dict[str, Any]]:
+    """A freedom that rotates evenly."""
+    return lambda: {name: mg.Motion(np.deg2rad(np.linspace(0.0, end, 73)), velocity=speed)}
+
+
+def dig() -> mg.Solution:
+    """The excavator of example 12 on its path."""
+    names = runpy.run_path(str(ROOT / "examples" / "12_excavator.py"))
+    solution: mg.Solution = names["dig"](names["excavator"]())
+    return solution
+
+
+def ride() -> mg.Solution:
+    """The suspension of example 13 over the travel of its wheel."""
+    names = runpy.run_path(str(ROOT / "examples" / "13_five_rod_suspension.py"))
+    m = names["suspension"]()
+    return mg.kinematics(m, {m.drives[0].freedom: np.linspace(-0.06, 0.06, 25)} if m.drives else None)
+
+
+ENTRIES = [
+    Entry("Four-bar", library("four-bar"), "../tutorials/crank-rocker.md"),
+    Entry("Slider-crank", library("slider-crank"), "../tutorials/slider-crank.md"),
+    Entry("Ellipsograph", library("marghitu-2-1")),
+    Entry("Shaper", library("marghitu-2-2")),
+    Entry("Six-bar with two slotted levers", library("marghitu-2-6")),
+    Entry("Six-bar with a slide", library("marghitu-2-7")),
+    Entry("Wedges", library("marghitu-2-8")),
+    Entry("Lifting jack", library("marghitu-2-5")),
+    Entry("Two four-bars in a row", library("windows-2"), "../how-to/vibrations.md"),
+    Entry("Andrews' squeezer", library("andrews"), "../explanation/forward-dynamics.md"),
+    Entry("Geneva wheel", library("geneva"), "../how-to/slots-and-curves.md"),
+    Entry("Cam with roller arm", example("16", "mechanism", turn("A", 20.0)), "../how-to/cam.md"),
+    Entry("Planetary train", example("14", "planetary", turn("S", 10.0, 1260.0), 1), "../how-to/gears.md"),
+    Entry("Excavator", dig, "../tutorials/excavator.md"),
+    Entry("Five-rod suspension", ride),
+    Entry("Globoid cam", example("17", "mechanism", turn("A"))),
+    Entry("Spherical four-bar", library("spherical-four-bar")),
+    Entry("Bennett's linkage", library("bennett"), "../explanation/mobility.md"),
+    Entry("Bricard's linkage on a cube", library("bricard-cube")),
+    Entry("Sarrus linkage", library("marghitu-2-3")),
+    Entry("RSSR", library("rssr"), "../how-to/passive-freedoms.md"),
+    Entry("RSUP", library("marghitu-2-9")),
+    Entry("Haug's slider-crank", library("haug-slider-crank"), "../how-to/simulate.md"),
+    Entry("Ball press", example("02", "ball_press", turn("A")), "../how-to/contacts.md"),
+    Entry("Lee's RCSR", library("rcsr"), "../tutorials/lee-rcsr.md"),
+    Entry("Lee's RCSR-CSR", library("rcsr-csr"), "../explanation/lee.md"),
+    Entry("Lee's RCHCH", library("rchch"), "../how-to/equations.md"),
+    Entry("7R", library("7r"), "../how-to/assembly-modes.md"),
+    Entry("Sphere in a groove", library("r-sg-c")),
+    Entry("Sphere on a plane", library("r-sp-r")),
+]
+
+
+class Film:
+    """What is drawn of a solution: lines, dots and circles at every frame, in the plane of the picture."""
+
+    def __init__(self, s: mg.Solution) -> None:
+        m = s.mechanism
+        good = np.flatnonzero(np.asarray(s.status).reshape(-1) == "ok")
+        chosen = good[np.unique(np.linspace(0, len(good) - 1, FRAMES).round().astype(int))]
+        self.poses = {name: s.link(name).pose.reshape(-1, 4, 4)[chosen] for name in m.link_names()}
+        self.frame, self.loop = m.frame, len(chosen) > 1
+        ends = {
+            (p.name, link): self.at(link, marker.pose()[:3, 3])
+            for p in m.pairs
+            for link, marker in zip((p.a, p.b), p.markers, strict=True)
+        }
+        every = np.concatenate([path.reshape(-1, 3) for path in ends.values()])
+        self.view = view(every)
+        self.lines: list[tuple[str, str, Any]] = []
+        self.dots: list[tuple[str, Any]] = []
+        self.circles: list[tuple[str, Any, Any]] = []
+        for name in m.link_names():
+            points = [ends[key] for key in ends if key[1] == name]
+            joined = (
+                [(one, np.mean(points, axis=0)) for one in points] if len(points) > 3 else [*combinations(points, 2)]
+            )
+            self.lines += [("link", name, self.seen(np.stack(pair, axis=1))) for pair in joined if name != m.frame]
+        for p in m.pairs:
+            inverse = np.linalg.inv(self.poses[p.a])
+            path = np.einsum("tij,tj->ti", inverse[:, :3, :3], ends[p.name, p.b]) + inverse[:, :3, 3]
+            if np.linalg.norm(np.ptp(path, axis=0)) > 1e-6 * np.linalg.norm(np.ptp(every, axis=0)):
+                self.lines.append(("guide", p.a, self.seen(np.stack([self.at(p.a, q) for q in path], axis=1))))
+            apart = ends[p.name, p.a], ends[p.name, p.b]
+            if p.curve is None and p.a != m.frame and np.abs(apart[0] - apart[1]).max() > 1e-6 * np.ptp(every):
+                self.lines.append(("link", p.a, self.seen(np.stack(apart, axis=1))))  # it reaches to what slides on it
+            self.dots.append(("foot" if m.frame in (p.a, p.b) else "pin", self.seen(ends[p.name, p.b][:, None])[:, 0]))
+        for gear in m.couplings:
+            if hasattr(gear, "teeth"):
+                contact = s.coupling(gear.name).point.reshape(-1, 3)[chosen]
+                for name in (gear.a, gear.b):
+                    pair = next(p for p in m.pairs if p.name == str(name).partition(".")[0])
+                    middle = ends[pair.name, pair.b]
+                    self.circles.append(
+                        (pair.b, self.seen(middle[:, None])[:, 0], np.linalg.norm(contact - middle, axis=1))
+                    )
+        self.links = [name for name in m.link_names() if name != m.frame]
+        low, high = (f(axis=0) for f in (self.extent().min, self.extent().max))
+        self.scale = (SIZE - 2 * MARGIN) / max(*(high - low), 1e-12)
+        self.middle = (low + high) / 2
+
+    def at(self, link: str, point: Any) -> Any:
+        """A point of a link at every frame."""
+        pose = self.poses[link]
+        return pose[:, :3, :3] @ np.asarray(point) + pose[:, :3, 3]
+
+    def seen(self, points: Any) -> Any:
+        """Points as they are seen, right and up."""
+        return points @ self.view.T
+
+    def extent(self) -> Any:
+        """All places in the picture."""
+        round_ = [np.concatenate([at - r[:, None], at + r[:, None]]) for _, at, r in self.circles]
+        return np.concatenate([*(x.reshape(-1, 2) for _, _, x in self.lines), *(x for _, x in self.dots), *round_])
+
+    def placed(self, points: Any) -> Any:
+        """Places in the picture, in its units."""
+        return (points - self.middle) * self.scale * [1, -1] + SIZE / 2
+
+    def color(self, link: str) -> str:
+        """The color of a link."""
+        return "#7b8794" if link == self.frame else COLORS[self.links.index(link) % len(COLORS)]
+
+    def elements(self, moving: bool) -> Iterator[str]:
+        """The elements of the picture; the film moves to and fro if the mechanism does not return."""
+        closed = self.loop and all(np.abs(x[0] - x[-1]).max() * self.scale < 12 for _, x in self.dots)
+
+        def animated(attribute: str, values: list[str]) -> str:
+            if not moving or len(set(values)) == 1:
+                return ""
+            every = values if closed else values + values[-2:0:-1]
+            return f'<animate attributeName="{attribute}" dur="{SECONDS}s" repeatCount="indefinite" values="{";".join(every)}"/>'
+
+        def drawn(kind: str, fixed: str, values: dict[str, list[str]]) -> str:
+            first = " ".join(f'{name}="{value[0]}"' for name, value in values.items())
+            return f"<{kind} {first} {fixed}>{''.join(animated(*item) for item in values.items())}</{kind}>"
+
+        for style, link, x in self.lines:
+            how = 'stroke-width="5" stroke-linecap="round"' if style == "link" else 'stroke-width="1.6" opacity="0.65"'
+            yield drawn(
+                "polyline",
+                f'fill="none" stroke="{self.color(link)}" {how}',
+                {"points": [" ".join(f"{a:.1f},{b:.1f}" for a, b in self.placed(row)) for row in x]},
+            )
+        for link, x, r in self.circles:
+            at = self.placed(x)
+            yield drawn(
+                "circle",
+                f'fill="none" stroke="{self.color(link)}" stroke-width="2"',
+                {
+                    "cx": [f"{v:.1f}" for v in at[:, 0]],
+                    "cy": [f"{v:.1f}" for v in at[:, 1]],
+                    "r": [f"{v * self.scale:.1f}" for v in r],
+                },
+            )
+        for style, x in self.dots:
+            at = self.placed(x)
+            fill = "#1f2933" if style == "foot" else "#ffffff"
+            yield drawn(
+                "circle",
+                f'r="4" fill="{fill}" stroke="#1f2933" stroke-width="1.6"',
+                {"cx": [f"{v:.1f}" for v in at[:, 0]], "cy": [f"{v:.1f}" for v in at[:, 1]]},
+            )
+
+    def svg(self, moving: bool) -> str:
+        """The picture, or the film."""
+        inner = "\n".join(self.elements(moving))
+        size = f'viewBox="0 0 {SIZE:g} {SIZE:g}" width="{SIZE:g}" height="{SIZE:g}"'
+        return f'<svg xmlns="http://www.w3.org/2000/svg" {size}>\n{inner}\n</svg>\n'
+
+
+def view(points: Any) -> Any:
+    """Right and up of a view: along the normal of what is planar, from above and the side of what is not."""
+    _, size, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
+    if size[2] > 1e-6 * size[0]:
+        return VIEW
+    up = np.eye(3)[2] if abs(axes[2, 2]) < 0.9 else np.eye(3)[1]
+    up = up - (up @ axes[2]) * axes[2]
+    up /= np.linalg.norm(up)
+    normal = axes[2] * (np.sign(axes[2] @ (0.01, -1.0, 0.1)) if abs(axes[2, 2]) < 0.9 else np.sign(axes[2, 2]))
+    return np.stack([np.cross(up, normal), up])
+
+
+def numbers(s: mg.Solution) -> str:
+    """Links, pairs, mobility and redundancy, and the efforts of the drivers."""
+    m, report = s.mechanism, mg.check(s.mechanism)
+    text = f"{len(m.link_names())} links, {' '.join(p.type.symbol for p in m.pairs)}. "
+    text += f"Mobility {report.mobility}, by count {report.mobility_by_count}; redundancy {report.redundancy}."
+    for drive in m.drives if s.has_forces and m.loads else ():
+        freedom = drive.freedom
+        effort = s[freedom.partition(".")[0]].effort
+        effort = effort[np.isfinite(effort).all(axis=-1)]
+        if len(m.drives) == 1 and np.abs(effort).max() > 1e-9:
+            text += f" Driver {effort.min():.4g} to {effort.max():.4g}."
+    return text
+
+
+def card(entry: Entry) -> str:
+    """Draw a mechanism, and describe it."""
+    s = entry.made()
+    film = Film(s)
+    for suffix, moving in (("", False), ("-film", True)):
+        (FOLDER / f"{entry.slug}{suffix}.svg").write_text(film.svg(moving), encoding="utf-8")
+    m, place = s.mechanism, f"/_built/gallery/{entry.slug}"
+    about = " ".join(
+        part
+        for part in (m.description.partition(":")[0].rstrip(".") + "." if m.description else "", numbers(s))
+        if part
+    )
+    source = m.source or entry.source
+    return "\n".join(
+        [
+            f":::{{grid-item-card}} [{entry.title}]({entry.more.removeprefix('..')})"
+            if entry.more
+            else f":::{{grid-item-card}} {entry.title}",
+            "",
+            f"![{entry.title}]({place}.svg){{.still}}![]({place}-film.svg){{.film}}",
+            "",
+            about,
+            *(["", "{.source}", source] if source else []),
+            ":::",
+        ]
+    )
+
+
+def draw() -> None:
+    """Draw the gallery, unless it was drawn before as it stands."""
+    stamp, current = FOLDER / ".drawn", hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
+    if stamp.exists() and stamp.read_text(encoding="utf-8") == current:
+        return
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    cards = [card(entry) for entry in ENTRIES]
+    page = "\n".join(["::::{grid} 1 2 3 3", ":gutter: 3", "", *cards, "::::", ""])
+    (FOLDER / "cards.md").write_text(page, encoding="utf-8")
+    stamp.write_text(current, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(ROOT))
+    draw()
