@@ -34,6 +34,7 @@ static const magnitude UNIQUE = 1e-7;       /* part of a self-stress in a compon
 static const magnitude NEARBY = 1e-5;       /* part of a passive motion above which it moves other links */
 static const magnitude UNTURNED = 1e-13;    /* angle that is rounding */
 static const magnitude MISSING = 1e-9;      /* angle, or length / L, that may be missing to rest */
+static const magnitude CLOSEST = 1.0 / 16;   /* distance of a third node, over a step, from which on it tells of higher orders than rounding */
 static const magnitude STRAIGHT_ON = 1e-12; /* change of direction up to which a polygon goes straight on */
 enum { ITERATIONS = 8, MOST_STEPS = 20000, MOST_TURNS = 8, POINTS = 8, TOLD = 8 };
 
@@ -49,9 +50,10 @@ typedef struct {
       *inertia, *base, *border, *coefficient, *constant, *load_number;
 } Model;
 
-/* A place on the path: state, rates along the way, the closure matrix and its rate along the way. */
+/* A place on the path: state, rates along the way, the closure matrix, its rate along the way and the inverse of its independent rows. */
 typedef struct {
-  double *x, *rate, *matrix, *matrix_rate, *at, *passive, *twist, *pose, condition;
+  double *x, *rate, *matrix, *matrix_rate, *inverse, *at, *passive, *twist, *pose, condition;
+  int *row;
 } Node;
 
 typedef struct {
@@ -65,7 +67,7 @@ typedef struct {
   int *row;
   /* rates and forces */
   double *dq, *ddq, *V, *A, *bias, *G, *chord_V, *pair_twist, *E, *applied, *inertial, *total, *reaction, *carried, *given, *tau, *coupled, *multiplier;
-  double *null, *stress, *stress_effort, *row_value, *column_value, *trial, *increment, *change, *bound, *record, *direction, *line_begin, *asked, *kept;
+  double *null, *stress, *stress_effort, *row_value, *column_value, *trial, *increment, *bend, *change, *bound, *record, *direction, *line_begin, *asked, *kept;
   /* passive motions: unit rates, twists with their rates, velocity parts, links at rest in them; along a step, what is missing to rest */
   double *passive, *twist, *twist_rate, *own_bias, *moving_bias, *moving, *raw, *apart, *trial_rate, *trial_acceleration, *still, *series;
   magnitude single, told;
@@ -120,13 +122,14 @@ static size_t lay_out(const Model *m, double *memory, Work *w) {
   TAKE(dq, c), TAKE(ddq, c), TAKE(V, 6 * n), TAKE(A, 6 * n), TAKE(bias, 6 * p), TAKE(G, 6 * c), TAKE(chord_V, 6 * m->loops), TAKE(pair_twist, 6 * p), TAKE(E, 6 * c);
   TAKE(applied, 6 * n), TAKE(inertial, 6 * n), TAKE(total, 6 * p), TAKE(reaction, 6 * p), TAKE(carried, 6 * n), TAKE(given, c);
   TAKE(tau, c), TAKE(coupled, c), TAKE(multiplier, m->couplings), TAKE(null, s * r), TAKE(stress, 6 * p * s), TAKE(stress_effort, c * s);
-  TAKE(row_value, r), TAKE(column_value, c), TAKE(trial, m->states), TAKE(increment, c), TAKE(change, u * u), TAKE(bound, 4 * u);
+  TAKE(row_value, r), TAKE(column_value, c), TAKE(trial, m->states), TAKE(increment, c), TAKE(bend, 2 * c), TAKE(change, u * u), TAKE(bound, 4 * u);
   TAKE(passive, q * c), TAKE(twist, 6 * q), TAKE(twist_rate, 6 * q), TAKE(own_bias, 6 * p * q), TAKE(moving_bias, q ? 6 * p : 0), TAKE(moving, 6 * q);
   TAKE(raw, 6 * q * q + q), TAKE(apart, 2 * q * q), TAKE(trial_rate, q ? c : 0), TAKE(trial_acceleration, q ? c : 0), TAKE(still, m->drives), TAKE(series, POINTS * q);
   Node *nodes[3] = {&w->a, &w->b, &w->before};
   FOR(i, 3) {
     nodes[i]->x = taken(&memory, &size, m->states), nodes[i]->rate = taken(&memory, &size, c);
     nodes[i]->matrix = taken(&memory, &size, r * u), nodes[i]->matrix_rate = taken(&memory, &size, r * u);
+    nodes[i]->inverse = taken(&memory, &size, u * u), nodes[i]->row = (int *)taken(&memory, &size, u);
     nodes[i]->at = taken(&memory, &size, 1);
     nodes[i]->passive = taken(&memory, &size, q * c), nodes[i]->twist = taken(&memory, &size, 6 * q), nodes[i]->pose = taken(&memory, &size, 12 * q);
   }
@@ -354,14 +357,33 @@ static void tangent(const Model *m, const double *dq, const double *rate, double
   }
 }
 
-/* The state at place `at` of Hermite's cubic through two nodes, increments from the first. */
-static void between(const Model *m, Work *w, const Node *a, const Node *b, double at, double *x) {
+/* The state at place `at` of Hermite's polynomial through two nodes, increments from the first: a cubic, or with what a node a length g
+ * before both adds to it, see `bent`. */
+static void between(const Model *m, Work *w, const Node *a, const Node *b, double at, const double *bend, double g, double *x) {
   const double h = *b->at - *a->at, s = (at - *a->at) / h;
   double *y = w->increment, *there = w->column_value;
   difference(m, b->x, a->x, y);
   tangent(m, y, b->rate, there);
   FOR(i, m->columns) y[i] = s * (h * a->rate[i] + s * ((3 * y[i] - h * (2 * a->rate[i] + there[i])) + s * (h * (a->rate[i] + there[i]) - 2 * y[i])));
+  const double t = s * h, square = t * t * (t - h) * (t - h);
+  if (bend) FOR(i, m->columns) y[i] += square * (bend[i] + (t + g) * bend[m->columns + i]);
   advance(m, a->x, y, x);
+}
+
+/* What the node before a adds to Hermite's cubic through a and b, t behind a: t^2 (t - h)^2 (bend_0 + (t + g) bend_1), of degree five. */
+static void bent(const Model *m, Work *w) {
+  const Node *a = &w->a, *b = &w->b, *before = &w->before;
+  const double h = *b->at - *a->at, g = *a->at - *before->at, square = g * g * (g + h) * (g + h), slope = -2.0 * g * (g + h) * (2.0 * g + h);
+  double *y = w->increment, *there = w->column_value, *bend = w->bend, *rate = w->bend + m->columns;
+  difference(m, b->x, a->x, y);
+  tangent(m, y, b->rate, there);
+  difference(m, before->x, a->x, bend);
+  tangent(m, bend, before->rate, rate);
+  FOR(i, m->columns) {
+    const double p = a->rate[i], q = (3 * y[i] / h - 2 * p - there[i]) / h, r = (p + there[i] - 2 * y[i] / h) / (h * h);
+    bend[i] = (bend[i] + g * (p - g * (q - g * r))) / square;
+    rate[i] = (rate[i] - p + g * (2 * q - 3 * g * r) - bend[i] * slope) / square;
+  }
 }
 #endif
 
@@ -1171,7 +1193,7 @@ static void continued(const Model *m, Work *w, double at) {
   if (!turns || !(at > from)) return;
   const int n = (int)ceil(TOLD * (at - from) / h);
   for (int i = 1; i < n; i++) {
-    between(m, w, &w->a, &w->b, from + (at - from) * i / n, w->trial);
+    between(m, w, &w->a, &w->b, from + (at - from) * i / n, NULL, 0.0, w->trial);
     coordinates(m, w, w->trial, w->dq);
   }
 }
@@ -1221,6 +1243,8 @@ static int made_node(const Model *m, Work *w, Node *node) {
   }
   fill(m, w->G, w->middle, w->S, w->chord_V, node->matrix_rate);
   node->condition = made_inverse(m, w, node->matrix);
+  memcpy(node->inverse, w->inverse, (size_t)m->unknowns * m->unknowns * sizeof(double));
+  memcpy(node->row, w->row, m->unknowns * sizeof(int));
   return node->condition <= FAIR ? MGK_OK : MGK_SINGULAR;
 }
 
@@ -1237,33 +1261,45 @@ static double radius(const double *M, int n, double *v) {
   return n ? best : 0.0;
 }
 
-/* Whether the step from node a to b leads along one regular branch, b being factored; grown: by how much the next one may be longer.
- *
- * The closure matrix along the step is, to third order, the Hermite cubic through both ends, which lies in the hull of its Bezier points
- * C: no matrix of it is singular where |C_b^-1 (C_b - C_i)| < 1 for all of them (Banach's lemma). That b is on the branch of a and not on
- * another one: the states' own cubic is closed in the middle, where it is furthest from the track, by a correction that is small against
- * the distance of any two solutions, 2 / (|J^-1| |J'|) at least (see maths/tracker.py, where the same limit holds). */
-static int certified(const Model *m, Work *w, double *grown) {
+/* How far the closure matrix departs from that of a node on its half of a step of length h to another one (h < 0: behind the other): a bound
+ * of the spectral radius of |C^-1 (C - C_i)| for the Bezier points C_i of this half. */
+static double departed(const Model *m, Work *w, const Node *here, const Node *there, double h) {
   const int n = m->unknowns;
-  const Node *a = &w->a, *b = &w->b;
-  const double third = (*b->at - *a->at) / 3.0;
+  const double third = h / 3.0;
   double *whole = w->bound, *first = whole + n, *last = first + n;
   FOR(i, n) {
     memset(whole, 0, 3 * (size_t)n * sizeof(double));
     FOR(r, n) {
-      const double g = w->inverse[i * n + r], *A = a->matrix + w->row[r] * n, *B = b->matrix + w->row[r] * n;
-      const double *from_a = a->matrix_rate + w->row[r] * n, *from_b = b->matrix_rate + w->row[r] * n;
+      const int row = here->row[r] * n;
+      const double g = here->inverse[i * n + r], *A = here->matrix + row, *B = there->matrix + row;
+      const double *from_a = here->matrix_rate + row, *from_b = there->matrix_rate + row;
       FOR(j, n) whole[j] += g * (B[j] - A[j]), first[j] += g * from_a[j], last[j] += g * from_b[j];
     }
-    FOR(j, n) w->change[i * n + j] = raised(raised(fabs(whole[j]), fabs(whole[j] - third * first[j])), third * fabs(last[j]));
+    FOR(j, n) {
+      const double near = third * first[j], far = whole[j] - third * last[j];
+      w->change[i * n + j] = raised(raised(0.5 * fabs(near), 0.25 * fabs(2.0 * near + far)), 0.125 * fabs(3.0 * (near + far) + whole[j]));
+    }
   }
-  const double departure = radius(w->change, n, w->bound);
-  between(m, w, a, b, 0.5 * (*a->at + *b->at), w->trial);
+  return radius(w->change, n, w->bound);
+}
+
+/* Whether the step from node a to b leads along one regular branch, b being factored; grown: by how much the next one may be longer.
+ *
+ * The closure matrix along the step is, to third order, the Hermite cubic through both ends; either half of it lies in the hull of its Bezier
+ * points C_i: no matrix of it is singular where |C^-1 (C - C_i)| < 1 for all of them, C being that at its end (Banach's lemma). That b is
+ * on the branch of a and not on another one: the states' own cubic is closed in the middle, where it is furthest from the track, by a
+ * correction that is small against the distance of any two solutions, 2 / (|J^-1| |J'|) at least (see maths/tracker.py, where the same
+ * limit holds). */
+static int certified(const Model *m, Work *w, double *grown) {
+  const int n = m->unknowns;
+  const Node *a = &w->a, *b = &w->b;
+  const double h = *b->at - *a->at, departure = fmax(departed(m, w, b, a, -h), departed(m, w, a, b, h));
+  between(m, w, a, b, 0.5 * (*a->at + *b->at), NULL, 0.0, w->trial);
   if (!isfinite(evaluate(m, w, w->trial))) return 0;
   solve(m, w, w->residual, w->column_value);
   double size = fmax(1.0, fmax(size_of(a->rate, m->columns), size_of(b->rate, m->columns)));
   const double correction = 4.0 * size_of(w->column_value, n), allowed = ALONE / (size * fmax(1.0, fmax(a->condition, b->condition)));
-  *grown = fmin(2.0, fmax(0.4, 0.8 * fmin(DEPARTURE / fmax(departure, 1e-9), sqrt(sqrt(allowed / fmax(correction, 1e-300))))));
+  *grown = fmax(0.4, 0.8 * fmin(DEPARTURE / fmax(departure, 1e-9), sqrt(sqrt(allowed / fmax(correction, 1e-300)))));
   return departure <= DEPARTURE && correction <= allowed;
 }
 
@@ -1365,7 +1401,7 @@ static int rest_along(const Model *m, Work *w) {
   FOR(g, POINTS) {
     const double t = g % 2 ? point[g / 2] : -point[g / 2];
     double P[POINTS + 1], gap;
-    between(m, w, &w->a, &w->b, *w->a.at + 0.5 * (1.0 + t) * h, w->trial);
+    between(m, w, &w->a, &w->b, *w->a.at + 0.5 * (1.0 + t) * h, NULL, 0.0, w->trial);
     int status = closed(m, w, w->trial, NULL);
     if (!status) status = velocities(m, w, w->direction, w->dq, &gap);
     if (status) return status;
@@ -1426,11 +1462,11 @@ typedef struct {
 
 static int at_place(const Asked *asked, int i) { return asked->order ? asked->order[i] : i; }
 
-/* One position of a certified step, read off its nodes. */
-static int read_off(const Model *m, Work *w, Asked *asked, double at) {
+/* One position of a certified step, read off its nodes, that `before` them too where it helps. */
+static int read_off(const Model *m, Work *w, Asked *asked, double at, int before) {
   const int i = at_place(asked, asked->done), d = m->drives;
   if (at >= *w->b.at) memcpy(w->x, w->b.x, m->states * sizeof(double));
-  else between(m, w, &w->a, &w->b, at, w->x);
+  else between(m, w, &w->a, &w->b, at, before ? w->bend : NULL, *w->a.at - *w->before.at, w->x);
   set_drives(m, w->x, asked->q + i * d);
   continued(m, w, fmin(at, *w->b.at));
   const int status = closed_at_rest(m, w, w->x, at, NULL);
@@ -1445,14 +1481,14 @@ static void swapped(Node *p, Node *q) {
 
 /* Along a straight line of the drives from node a, which lies at place 0, to `end` at a `length`; `until`: the positions on it. */
 static int follow(const Model *m, Work *w, Asked *asked, const double *begin, const double *end, double length, int until) {
-  double h = fmin(LONGEST, length), *drive = w->column_value;
+  double h = fmin(LONGEST, length), furthest = 0.0, *drive = w->column_value;
   int known = 0, status;
   while (*w->a.at < length) {
     if (++w->steps > MOST_STEPS) return MGK_TOO_FAR;
     const double left = length - *w->a.at, step = h >= left ? left : h > 0.5 * left ? 0.5 * left : h;
     *w->b.at = step == left ? length : *w->a.at + step;
     if (known && step < 16.0 * (*w->a.at - *w->before.at)) {
-      between(m, w, &w->before, &w->a, *w->b.at, w->b.x);
+      between(m, w, &w->before, &w->a, *w->b.at, NULL, 0.0, w->b.x);
     } else {
       FOR(c, m->columns) w->increment[c] = step * w->a.rate[c];
       advance(m, w->a.x, w->increment, w->b.x);
@@ -1471,12 +1507,14 @@ static int follow(const Model *m, Work *w, Asked *asked, const double *begin, co
       if (h < SHORTEST) return status;
       continue;
     }
+    const int before = known && asked->done < until && *w->a.at - *w->before.at > CLOSEST * step;
+    if (before) bent(m, w);
     for (; asked->done < until; asked->done++) {
       const double *q = asked->q + at_place(asked, asked->done) * m->drives;
       double at = 0.0;
       FOR(i, m->drives) at += w->direction[i] * (q[i] - begin[i]);
       if (at > *w->b.at && step != left) break;
-      if ((status = read_off(m, w, asked, at))) return status;
+      if ((status = read_off(m, w, asked, at, before))) return status;
     }
     if (asked->node) {
       if (asked->nodes == asked->most_nodes) return MGK_TOO_FAR;
@@ -1489,7 +1527,10 @@ static int follow(const Model *m, Work *w, Asked *asked, const double *begin, co
     swapped(&w->before, &w->a);
     swapped(&w->a, &w->b);
     set_border(m, w, &w->a);
-    known = 1, h = fmin(LONGEST, grown * step);
+    /* where steps have to become shorter they go on to, by as much as over the last one */
+    h = grown * step;
+    const double next = h < furthest ? h * h / furthest : h;
+    known = 1, furthest = h, h = fmin(fmin(LONGEST, 2.0 * step), next);
   }
   return MGK_OK;
 }
@@ -1525,7 +1566,7 @@ static int along(const Model *m, Work *w, Asked *asked) {
       if ((status = first_node(m, w, w->x))) return status;
       *w->b.at = 0.0, w->b.condition = w->a.condition;
       memcpy(w->b.x, w->a.x, m->states * sizeof(double));
-      if ((status = read_off(m, w, asked, 0.0))) return status;
+      if ((status = read_off(m, w, asked, 0.0, 0))) return status;
       asked->done++;
       continue;
     }
