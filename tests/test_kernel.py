@@ -250,6 +250,51 @@ def test_loads_that_are_numbers(name):
     assert tables.tables(known, line.system, line.x[:, None], m.loads) is not None
 
 
+def tabled_loads(m):
+    """Tables over coordinates and rates, in freedoms and between points, of either interpolation, held at their ends or not."""
+    place, more = np.linspace(-8.0, 8.0, 9), np.random.default_rng(5).normal(size=9)
+    first, last = m.pairs[0].name, m.pairs[-1].name
+    links = m.links[0].name, m.links[2].name, (0.3, 2.0, 0.1), (0.2, 0.1, 0.0)
+    return [
+        mg.ForceLaw(first, law=mg.ForceTable(x=place, force=more), free=0.2, scale=1.7),
+        mg.ForceLaw(last, law=mg.ForceTable(v=[-30, -1, 0, 2, 30], force=more[:5], interpolation="cubic")),
+        mg.ForceLaw(*links, law=mg.ForceTable(x=[0, 0.2, 3, 90], force=more[:4], interpolation="cubic"), free=0.1),
+        mg.ForceLaw(*links, law=mg.ForceTable(v=[-0.1, 0.1], force=[1.0, -2.0], outside="hold"), scale=-0.4),
+        mg.ForceLaw(first, law=mg.ForceTable(x=[0.05, 0.1], force=[3.0, 9.0], outside="hold")),
+    ]
+
+
+@pytest.mark.parametrize("name", ["four-bar", "slider-crank"])
+def test_force_tables(name):
+    m = mg.load(name)
+    for load in tabled_loads(m):
+        assert agreed(m.replace(loads=[load]), swing(m)) == "compiled"
+    m = m.replace(loads=tabled_loads(m))
+    c = mg.compile(m)
+    c(c.tables.home + 0.3, 2.0, 0.5)
+    for number in ("loads[0].scale", "loads[0].free", "loads[2].free"):
+        slope, middle, h = c.gradient(f"{c.drives[0]}.effort", [number]), c.parameters[number], 1e-5
+        efforts = []
+        for sense in (1, -1):
+            c.parameters[number] = middle + sense * h
+            efforts.append(c(c.tables.home + 0.3, 2.0, 0.5))
+        c.parameters[number] = middle
+        c(c.tables.home + 0.3, 2.0, 0.5)
+        np.testing.assert_allclose(slope, (efforts[0] - efforts[1]) / (2 * h), rtol=1e-6, atol=1e-8)
+
+
+def test_beyond_a_force_table_numpy_says_where():
+    m = mg.load("four-bar").replace(loads=[mg.ForceLaw("A", law=mg.ForceTable(x=[0.0, 1.0], force=[1.0, 2.0]))])
+    with pytest.raises(mg.DeclarationError, match=r"x = 1\.5 lies outside of the table"):
+        mg.solve(m, {"A": [0.5, 1.5]}, engine="compiled")
+    c = mg.compile(m)
+    assert np.isnan(c(1.5)).all()
+    assert c.status == "not finite"
+    assert c(0.5) == pytest.approx(-1.5)
+    grid = mg.ForceLaw("A", law=mg.ForceTable(x=[-9.0, 9.0], v=[-9.0, 9.0], force=[[1.0, 2.0], [3.0, 5.0]]))
+    assert agreed(m.replace(loads=[grid]), swing(m)) == "compiled"  # its states, the forces by numpy
+
+
 def test_other_loads_on_the_same_start():
     """Tables are kept with a start, which mechanisms under other loads share."""
     m = mg.load("four-bar")

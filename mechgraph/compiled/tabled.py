@@ -215,7 +215,10 @@ def tabled(m: Mechanism, asked: str = "compile") -> Tabled:
     found = tables(places, system, x[:, None], own.loads)
     if found is None:
         known = listed(sorted({load.kind for load in own.loads}))
-        fault = f"a load is a function, a table or varies over positions (loads: {known}); expected constant numbers"
+        fault = (
+            f"a load is a function, a table over coordinate and rate, or varies over positions (loads: {known}); "
+            "expected constant numbers"
+        )
         raise DeclarationError(subject, [f"the compiled kernel does not carry it: {fault}"])
     I, P = found
     return Tabled(own, system, x, places, I, P[0], drives, home)

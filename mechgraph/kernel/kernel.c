@@ -35,6 +35,7 @@ static const magnitude NEARBY = 1e-5;       /* part of a passive motion above wh
 static const magnitude UNTURNED = 1e-13;    /* angle that is rounding */
 static const magnitude MISSING = 1e-9;      /* angle, or length / L, that may be missing to rest */
 static const magnitude CLOSEST = 1.0 / 16;   /* distance of a third node, over a step, from which on it tells of higher orders than rounding */
+static const magnitude OFF_TABLE = 1e-9;     /* part of a table's length up to which a place beyond its end is on it by rounding */
 static const magnitude STRAIGHT_ON = 1e-12; /* change of direction up to which a polygon goes straight on */
 enum { ITERATIONS = 8, MOST_STEPS = 20000, MOST_TURNS = 8, POINTS = 8, TOLD = 8 };
 
@@ -859,8 +860,24 @@ static void pushed(Work *w, int link, const double *force, const double *at) {
   FOR(i, 6) w->applied[6 * link + i] += f[i];
 }
 
-/* A spring or damper between points of two links. */
-static void between_points(Work *w, int i, int j, const double *number) {
+/* The force of a table at a coordinate and rate: its cubic there; not a number beyond ends at which it does not hold. */
+static double tabulated(const double *number, double x, double rate) {
+  const double at = REAL_PART(number[1]) > 0.5 ? rate : x - number[0], *begin = number + 4;
+  const int pieces = (int)(REAL_PART(number[3]) + 0.5);
+  const magnitude first = REAL_PART(begin[0]), end = REAL_PART(begin[pieces]), place = REAL_PART(at), rounding = OFF_TABLE * (end - first);
+  if (REAL_PART(number[2]) < 0.5 && !(place >= first - rounding && place <= end + rounding)) return NAN;
+  int low = 0, high = pieces;
+  while (high - low > 1) {
+    const int middle = (low + high) / 2;
+    if (REAL_PART(begin[middle]) <= place) low = middle;
+    else high = middle;
+  }
+  const double *c = begin + pieces + 1 + 4 * low, d = place < first ? 0.0 : place > end ? begin[pieces] - begin[low] : at - begin[low];
+  return ((c[0] * d + c[1]) * d + c[2]) * d + c[3];
+}
+
+/* A spring, damper or table between points of two links. */
+static void between_points(Work *w, int i, int j, const double *number, int table) {
   double p[3], q[3], d[3], back[3], speed = 0.0, length = 0.0;
   point_of(w->pose + 12 * i, number, p);
   point_of(w->pose + 12 * j, number + 3, q);
@@ -872,7 +889,7 @@ static void between_points(Work *w, int i, int j, const double *number) {
     cross(V, at, v);
     FOR(r, 3) speed += (side ? 1.0 : -1.0) * (V[3 + r] + v[r]) * (fabs(length) > 0.0 ? d[r] / length : 0.0);
   }
-  const double force = -number[6] * (length - number[7]) - number[8] * speed;
+  const double force = table ? tabulated(number + 6, length, speed) : -number[6] * (length - number[7]) - number[8] * speed;
   FOR(r, 3) d[r] *= force == 0.0 ? 0.0 : force / length, back[r] = -d[r];
   pushed(w, i, back, p);
   pushed(w, j, d, q);
@@ -905,8 +922,10 @@ static void loads(const Model *m, Work *w, const double *x) {
       w->given[i] += number[0];
     } else if (load[0] == MGK_LAW) {
       w->given[i] += -number[0] * (x[m->column_state[i]] - number[1]) - number[2] * w->dq[i];
+    } else if (load[0] == MGK_TABLE) {
+      w->given[i] += tabulated(number, x[m->column_state[i]], w->dq[i]);
     } else {
-      between_points(w, i, j, number);
+      between_points(w, i, j, number, load[0] == MGK_TABLE_BETWEEN);
     }
   }
 }

@@ -41,8 +41,10 @@ enum { MGK_TURN = 0, MGK_SLIDE = 3, MGK_ROTATION = 6, MGK_POSE = 7 };
 
 /* Kinds of loads and their numbers. Points in the frames that links have here.
  * weight: g[3]. wrench on link i, turning with it where j: force[3], moment[3], point[3]. effort in column i: value.
- * law in column i, or between points of links i and j: [p[3], q[3],] stiffness, rest, damping. */
-enum { MGK_WEIGHT, MGK_WRENCH, MGK_EFFORT, MGK_LAW, MGK_BETWEEN };
+ * law in column i, or between points of links i and j: [p[3], q[3],] stiffness, rest, damping.
+ * table likewise: [p[3], q[3],] coordinate at its 0, over the rate (1) or the coordinate (0), whether the force at its ends holds beyond them,
+ * pieces n, breaks[n + 1], of every piece four coefficients behind its first break, the highest first. */
+enum { MGK_WEIGHT, MGK_WRENCH, MGK_EFFORT, MGK_LAW, MGK_BETWEEN, MGK_TABLE, MGK_TABLE_BETWEEN };
 
 /* What comes back: 0, or why a position is not given. */
 enum {

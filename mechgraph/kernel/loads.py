@@ -11,9 +11,9 @@ import numpy as np
 from mechgraph.fields import PerCase
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Array, rotate
-from mechgraph.model.loads import Damper, Effort, Gravity, Load, Spring, TorsionSpring, Wrench
+from mechgraph.model.loads import Damper, Effort, ForceLaw, ForceTable, Gravity, Load, Spring, TorsionSpring, Wrench
 
-WEIGHT, WRENCH, EFFORT, LAW, BETWEEN = range(5)
+WEIGHT, WRENCH, EFFORT, LAW, BETWEEN, TABLE, TABLE_BETWEEN = range(7)
 """Kinds of loads, as in ``kernel.h``."""
 
 
@@ -82,7 +82,8 @@ def in_tables(load: Load) -> bool:
     """Whether a load is numbers of the tables: its fields are no functions, and no arrays over positions."""
     values = [getattr(load, name) for name in load.formats]
     given = [name for name in load.over_positions if not isinstance(getattr(load, name), PerCase)]
-    return type(load) in KINDS and not given and not any(callable(value) for value in values)
+    by_pieces = not isinstance(load, ForceLaw) or (isinstance(load.law, ForceTable) and load.law.pieces is not None)
+    return type(load) in KINDS and not given and by_pieces and not any(callable(value) for value in values)
 
 
 def rows(value: Any, width: int = 1) -> Array:
@@ -131,6 +132,22 @@ def _damper(places: _Places, load: Any, out: Acting) -> None:
     _law(places, load, out, 0.0, 0.0, load.coefficient)
 
 
+def _tabled(places: _Places, load: Any, out: Acting) -> None:
+    """The cubics of a table over the coordinate or the rate, in internal units."""
+    pieces, slides, column = load.law.pieces, True, -1
+    if load.in_freedom is not None:
+        column, slides = places.column(load.in_freedom)
+    length, unit = (places.L, 1.0 / places.L) if slides else (1.0, places.L**-2)
+    cubics = (unit * pieces.c * length ** np.arange(3.0, -1.0, -1.0)[:, None]).T.reshape(-1, 1)
+    kind = load.law.x is None, load.law.outside == "hold", len(pieces.x) - 1
+    numbers = rows(load.free) / length, *map(rows, kind), (pieces.x / length)[:, None], cubics * rows(load.scale)
+    if load.in_freedom is not None:
+        out.add(TABLE, column, 0, *numbers)
+        return
+    p, q = places.point(load.a, load.p), places.point(load.b, load.q)
+    out.add(TABLE_BETWEEN, places.link(load.a), places.link(load.b), p, q, *numbers)
+
+
 KINDS: dict[type[Load], Callable[[_Places, Any, Acting], None]] = {
     Gravity: _weight,
     Wrench: _wrench,
@@ -138,5 +155,6 @@ KINDS: dict[type[Load], Callable[[_Places, Any, Acting], None]] = {
     Spring: _elastic,
     TorsionSpring: _elastic,
     Damper: _damper,
+    ForceLaw: _tabled,
 }
 """What puts a load into the tables, by its class."""

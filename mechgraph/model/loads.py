@@ -301,6 +301,11 @@ class ForceTable(Described):
         """The piecewise cubic over the last axis."""
         return self._cubic(self.x if self.v is None else self.v, self.force, -1)
 
+    @property
+    def pieces(self) -> Any:
+        """The piecewise cubic, a ``scipy.interpolate.PPoly``, over the coordinate or the rate; None over a grid of both."""
+        return self._last if self.v is None or self.x is None else None
+
     def at(self, x: Array, v: Array) -> Array:
         """The force ``(T,)`` at coordinates and rates ``(T,)``."""
         if self.v is None or self.x is None:

@@ -37,7 +37,7 @@ def cannot(system: System, loads: Loads, held: bool) -> str | None:
         return f"it has {system.n_freedoms} freedoms and {len(system.m.links)} links; expected fewer than {SPARSE_FROM} of the product"
     other = next((load for load in (*loads.stored, *loads.rest) if not in_tables(load)), None)
     if other is not None:
-        return f"load {other.where.removesuffix(': ')} is a function or a table"
+        return f"load {other.where.removesuffix(': ')} is a function, or a table over coordinate and rate"
     return why_not(system)
 
 
