@@ -36,8 +36,9 @@ ROUNDS = {1: 75, 36: 45, 360: 25, 3600: 15}
 SMALL = 1e-9
 """An error below it is not worth a word."""
 WIDTH = 138
-FROM_PYTHON, COMPILED = "Pinocchio from Python", "Pinocchio in C++"
+FROM_PYTHON, COMPILED, KERNEL = "Pinocchio from Python", "Pinocchio in C++", "mechgraph compiled"
 PEERS = {
+    KERNEL: "peer_compiled",
     FROM_PYTHON: "peer_pinocchio",
     COMPILED: "peer_pinocchio_cpp",
     "Exudyn": "peer_exudyn",
@@ -137,6 +138,7 @@ def balance(case: Case) -> float:
 
 def lines_of(program: ModuleType) -> int:
     """Lines of code of the job, without docstrings, comments, blank lines and what only the table needs."""
+    program = getattr(program, "JOB", program)
     if hasattr(program, "SOURCE"):
         lines = program.SOURCE.read_text(encoding="utf-8").splitlines()
         return sum(1 for line in lines if line.strip() and not line.strip().startswith("//"))
@@ -189,7 +191,7 @@ def table(programs: Programs, every: dict[str, list[Case]], results: dict[str, l
     for name, cases_of in every.items():
         loop = "-".join(joint.kind for joint in cases_of[0].joints)
         for case, found in zip(cases_of, results[name], strict=True):
-            cells = [cell(found[other]) if other in found else str(programs[other]) for other in programs]
+            cells = [cell(found[other]) if other in found else "-" for other in programs]
             lines.append(row(f"{name}, {loop}", f"{len(case.t):,}", *cells))
     last = [cases_of[-1] for cases_of in every.values()]
     there = [None if isinstance(program, str) else program for program in programs.values()]
@@ -231,6 +233,17 @@ def faster(name: str, results: dict[str, list[dict[str, Result]]], place: int) -
 def in_short(programs: Programs, results: dict[str, list[dict[str, Result]]]) -> list[str]:
     """What the table says, where the programs are there."""
     out = []
+    there = [name for name, program in programs.items() if not isinstance(program, str)]
+    if KERNEL in there:
+        one, few, many = (faster(KERNEL, results, place) for place in (0, 1, -1))
+        at = f"{one} times as fast at one position, {few} at {POSITIONS[1]} and {many} at {POSITIONS[-1]:,}"
+        out.append(f"With the compiled kernel mechgraph is {at}, the mechanism declared anew each time.")
+    if KERNEL in there and COMPILED in there:
+        parts = [[found[i][KERNEL].ratio / found[i][COMPILED].ratio for found in results.values()] for i in (1, -1)]
+        few, many = map(span, parts)
+        out.append(
+            f"That is {few} times the time of Pinocchio in C++ at {POSITIONS[1]} positions, {many} at {POSITIONS[-1]:,}."
+        )
     if not isinstance(programs.get(COMPILED, ""), str):
         few, many = faster(COMPILED, results, 1), faster(COMPILED, results, -1)
         out.append(
@@ -250,6 +263,8 @@ def notes(programs: Programs, results: dict[str, list[dict[str, Result]]], power
         f"One core of {os.cpu_count()} ({processor()}), {versions}, {date.today().isoformat()}. "
         f"The power balance of mechgraph's own solutions is within {power:.0e}."
     )
+    missing = "; ".join(f"{name} ({why})" for name, why in programs.items() if isinstance(why, str))
+    run += f" Not there: {missing}." if missing else ""
     parts = [" ".join(in_short(programs, results)), f"{run} {MEANING}", LIMITS]
     return "\n\n".join(textwrap.fill(part, WIDTH) for part in parts if part)
 

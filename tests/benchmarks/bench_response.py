@@ -32,7 +32,12 @@ STALE = 4
 """Settings, one finer than the other, after which a variant is left that is no nearer to the reference."""
 ROUNDS = 5
 """Runs at the setting found, at most; fewer where they take long."""
-PROGRAMS = {"mechgraph": "motion_mechgraph", "Pinocchio": "motion_pinocchio", "Exudyn": "motion_exudyn"}
+PROGRAMS = {
+    "mechgraph": "motion_mechgraph",
+    "mechgraph compiled": "motion_compiled",
+    "Pinocchio": "motion_pinocchio",
+    "Exudyn": "motion_exudyn",
+}
 MARKED = re.compile(
     r"(<!-- motion: written by tests/benchmarks/bench_response\.py -->\n).*?(\n<!-- end of motion -->)", re.DOTALL
 )
@@ -147,7 +152,11 @@ def table(names: list[str], lines: list[tuple[str, dict[str, list[Run]]]], grown
     heads = [f"{name}, {accuracy:.0e}" for accuracy in ACCURACIES for name in names]
     out = [row("mechanism", *heads), row(*["---"] * (len(heads) + 1))]
     for label, found in lines:
-        cells = [cell(found[name][i], found["mechgraph"][i]) for i in range(len(ACCURACIES)) for name in names]
+        cells = [
+            cell(found[name][i], found["mechgraph"][i]) if name in found else "-"
+            for i in range(len(ACCURACIES))
+            for name in names
+        ]
         out.append(row(label, *cells))
     return "\n".join([*out, row("growth with N", *grown)])
 
@@ -155,7 +164,7 @@ def table(names: list[str], lines: list[tuple[str, dict[str, list[Run]]]], grown
 def told(lines: list[tuple[str, dict[str, list[Run]]]]) -> str:
     """What the table says at the finer accuracy."""
     out = []
-    for peer in [name for name in lines[0][1] if name != "mechgraph"]:
+    for peer in [name for name in lines[0][1] if not name.startswith("mechgraph")]:
         faster, slower, failed = [], [], []
         for label, found in lines:
             base, run = found["mechgraph"][-1], found[peer][-1]
@@ -199,9 +208,20 @@ def measured(programs: dict[str, ModuleType], case: Case, before: dict[str, list
     return found
 
 
+def installed() -> tuple[dict[str, ModuleType], list[str]]:
+    """The programs that are there, and the names of the others."""
+    found, missing = {}, []
+    for name, module in PROGRAMS.items():
+        try:
+            found[name] = importlib.import_module(module)
+        except ImportError:
+            missing.append(name)
+    return found, missing
+
+
 def main() -> None:
     one_core()
-    programs = {name: importlib.import_module(module) for name, module in PROGRAMS.items()}
+    programs, missing = installed()
     rows = [int(n) for n in sys.argv[sys.argv.index("--rows") + 1].split(",")] if "--rows" in sys.argv else list(ROWS)
     lines: list[tuple[str, dict[str, list[Run]]]] = []
     by_length: dict[str, dict[int, list[Run]]] = {name: {} for name in programs}
@@ -215,15 +235,18 @@ def main() -> None:
             if n:
                 by_length[name][n] = runs
                 before[name] = runs
-    names = list(programs)
-    grown = [exponent(by_length[name], i) for i in range(len(ACCURACIES)) for name in names]
+    names = list(PROGRAMS)
+    grown = [exponent(by_length.get(name, {}), i) for i in range(len(ACCURACIES)) for name in names]
     versions = ", ".join(f"{name} {p.VERSION}" for name, p in programs.items() if p.VERSION)
-    versions = f"{versions}, numpy {np.__version__}, Python {platform.python_version()}, {date.today().isoformat()}"
+    versions = f"{versions}{', ' * bool(versions)}numpy {np.__version__}, Python {platform.python_version()}, {date.today().isoformat()}"
     run = f"One core of {os.cpu_count()} ({processor()}), {versions}."
+    run += f" Not there: {', '.join(missing)}." if missing else ""
     parts = [told(lines), f"{run} {MEANING}"]
     text = "\n\n".join([table(names, lines, grown), *(textwrap.fill(part, WIDTH) for part in parts)])
     print(text)
     if "--write" in sys.argv:
+        if missing:
+            raise SystemExit(f"not written: needs all programs (missing: {', '.join(missing)}); pip install '.[bench]'")
         page, times = MARKED.subn(lambda m: m[1] + "\n" + text + "\n" + m[2], README.read_text(encoding="utf-8"))
         if times != 1:
             raise SystemExit("not written: the README has no place marked for the table")

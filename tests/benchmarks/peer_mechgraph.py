@@ -1,4 +1,4 @@
-"""The same job with mechgraph, from the same numbers as the other programs take."""
+"""The same job with mechgraph on numpy, from the same numbers as the other programs take."""
 
 import numpy as np
 from peer_cases import Case
@@ -21,9 +21,9 @@ def declared(case: Case) -> mg.Mechanism:
     return mg.Mechanism(case.mechanism.name, links, pairs, drives=[case.driver], loads=[gravity])
 
 
-def solve(case: Case, method: str = "loop_wrench") -> tuple[np.ndarray, np.ndarray]:
+def solve(case: Case, method: str = "loop_wrench", engine: str = "dense") -> tuple[np.ndarray, np.ndarray]:
     """Torque of the driver ``(T,)`` and wrench of every pair ``(joints, T, 6)``, moment first, in global directions."""
-    s = mg.solve(declared(case), {case.driver: mg.Motion(*case.turned())}, method=method)
+    s = mg.solve(declared(case), {case.driver: mg.Motion(*case.turned())}, method=method, engine=engine)
     return s[case.driver].effort[:, 0], np.array([s[joint.name].total for joint in case.joints])
 
 

@@ -1,0 +1,18 @@
+"""Motion under given loads with mechgraph's compiled kernel, built before the clock starts; ``motion_mechgraph`` is numpy."""
+
+from functools import partial
+
+import motion_mechgraph
+from motion_mechgraph import VERSION, Setting, ladder, variants
+
+from mechgraph.errors import MissingExtraError
+from mechgraph.kernel import build
+
+__all__ = ["VERSION", "Setting", "ladder", "solve", "variants"]
+
+try:
+    build.built()
+except MissingExtraError as error:
+    raise ImportError(str(error)) from None
+
+solve = partial(motion_mechgraph.solve, engine="auto")

@@ -1,0 +1,19 @@
+"""The same job with mechgraph's compiled kernel, built before the clock starts; ``peer_mechgraph`` is numpy."""
+
+from functools import partial
+
+import peer_mechgraph
+from peer_mechgraph import FORCE, VERSION, verdict
+
+from mechgraph.errors import MissingExtraError
+from mechgraph.kernel import build
+
+__all__ = ["FORCE", "JOB", "VERSION", "solve", "verdict"]
+
+try:
+    build.built()
+except MissingExtraError as error:
+    raise ImportError(str(error)) from None
+
+JOB = peer_mechgraph
+solve = partial(peer_mechgraph.solve, engine="compiled")
