@@ -1,13 +1,14 @@
 """mechgraph: spatial mechanisms as graphs of links and pairs; determinacy, equations, motion, drivers and reactions."""
 
-import importlib
 from typing import TYPE_CHECKING, Any
 
 from mechgraph import errors  # noqa: F401  # isort: skip  # before all that takes time to load
+from mechgraph import methods
 from mechgraph.determinacy.decomposition import Decomposition, Group
-from mechgraph.determinacy.equivalent import multiple_joints, split_joint
+from mechgraph.determinacy.equivalent import equivalent, multiple_joints, split_joint
 from mechgraph.determinacy.families import Families
 from mechgraph.determinacy.report import DeterminacyReport, check
+from mechgraph.determinacy.snapping import snapped
 from mechgraph.determinacy.structure import Structure, groups, structure
 from mechgraph.equations.build import formulate
 from mechgraph.equations.formulation import Formulation
@@ -168,10 +169,30 @@ __all__ = [
 ]
 
 
-LATER = {
-    "Compiled": ("mechgraph.compiled.compiled", "Compiled"),
-    "compile": ("mechgraph.compiled.compiled", "compile"),
-    "write_report": ("mechgraph.show.page.write", "write_report"),
+def _view(shown: Mechanism | Solution) -> Any:
+    from mechgraph.show.page.write import view
+
+    return view(shown)
+
+
+def _draw_assemblies(modes: Assemblies) -> Any:
+    from mechgraph.show.diagrams import draw_assemblies
+
+    return draw_assemblies(modes)
+
+
+def _draw_branches(found: Branches, output: str | None, **asked: Any) -> Any:
+    from mechgraph.show.diagrams import draw_branches
+
+    return draw_branches(found, output, **asked)
+
+
+methods.TABLE |= {
+    "snapped": snapped,
+    "equivalent": equivalent,
+    "view": _view,
+    "draw_assemblies": _draw_assemblies,
+    "draw_branches": _draw_branches,
 }
 
 
@@ -182,7 +203,12 @@ def __dir__() -> list[str]:
 
 def __getattr__(name: str) -> Any:
     """What takes time to load, and few calls need."""
-    if name in LATER:
-        module, own = LATER[name]
-        return getattr(importlib.import_module(module), own)
+    if name in ("Compiled", "compile"):
+        from mechgraph.compiled import compiled
+
+        return getattr(compiled, name)
+    if name == "write_report":
+        from mechgraph.show.page.write import write_report
+
+        return write_report
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -27,7 +27,7 @@ from mechgraph.maths.se3 import Array, Index
 from mechgraph.model.couplings import Contact
 from mechgraph.model.loads import Load
 from mechgraph.outcome import Call, Outcome, Starts, system_at
-from mechgraph.result.kept import BlockMotion
+from mechgraph.result.trajectory import BlockMotion
 
 COMPILED: Literal["compiled"] = "compiled"
 """Name of the engine."""

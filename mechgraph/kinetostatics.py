@@ -52,7 +52,7 @@ from mechgraph.maths.track import Nodes
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import declared
-from mechgraph.outcome import Followed, Options, Outcome, Starts
+from mechgraph.outcome import FollowedPositions, Options, Outcome, Starts
 from mechgraph.quantities import door
 from mechgraph.result.solution import Solution
 
@@ -217,7 +217,7 @@ class Pipeline:
         path = DriverPath(self.system, self.solver, starts.system_of, start)
         path.carries = are_alone(self.passive)
         found = self._followed(path, starts, followed)
-        return Followed(self, starts, batch, variant, found, path)
+        return FollowedPositions(self, starts, batch, variant, found, path)
 
     def _followed(self, path: DriverPath, starts: Starts, batch: tuple[int, ...]) -> Positions:
         """The positions along the path, by the reduced form of the mechanism where it has one."""

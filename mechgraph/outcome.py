@@ -27,8 +27,7 @@ from mechgraph.maths.tracker import Follower
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import option_faults
-from mechgraph.result.kept import BlockMotion
-from mechgraph.result.trajectory import Trajectory
+from mechgraph.result.trajectory import BlockMotion, Trajectory
 from mechgraph.result.values import PassedCrossing
 
 
@@ -169,7 +168,7 @@ class Outcome:
         return found
 
 
-class Followed(Outcome):
+class FollowedPositions(Outcome):
     """Positions that were followed, their rates and forces found block by block."""
 
     found: Positions

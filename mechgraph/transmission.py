@@ -30,7 +30,8 @@ from mechgraph.model.couplings import Contact
 from mechgraph.model.loads import Effort
 from mechgraph.quantities import door, wrong
 from mechgraph.result.solution import Solution
-from mechgraph.result.values import OK, Places, ranges
+from mechgraph.result.values import OK, ranges
+from mechgraph.result.views import PositionLabels
 
 UNMOVED = 1e-12
 """What wrenches on the output could do for a unit effort, below which nothing is transmitted."""
@@ -76,7 +77,7 @@ class Transmission(Shown):
             ("transmission angle [deg]", np.rad2deg(self.transmission_angle)),
             ("deviation angle [deg]", np.rad2deg(self.deviation_angle)),
         ]
-        places = Places(self.solution._values)
+        places = PositionLabels(self.solution._values)
         text = f"From {', '.join(self.drivers)} to {self.output}, links at rest and without mass."
         return Document(f"Transmission of {self.solution.mechanism.name}", (Paragraph(text), ranges(rows, places.name)))
 
@@ -144,7 +145,7 @@ def transmission(s: Solution, output: str, driver: str | None = None) -> Transmi
 
 def _held(s: Solution, output: str, drivers: tuple[str, ...]) -> Solution:
     """The links at rest and without mass at the positions of a solution: the drivers hold a unit effort in the output."""
-    m, places = s.mechanism, Places(s._values)
+    m, places = s.mechanism, PositionLabels(s._values)
     known = np.flatnonzero(places.solved)
     if not known.size or not s.prescribed:
         raise DeclarationError(f"transmission of {m.name!r}", ["no position with prescribed motion; solve one first"])

@@ -12,6 +12,8 @@ from pathlib import Path
 import networkx as nx
 import pytest
 
+from mechgraph import methods
+
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "mechgraph"
 
@@ -166,47 +168,32 @@ def test_the_check_finds_a_circle(source: str) -> None:
     assert not circles({**sources, "room.c": "import other"})
 
 
-UPWARD = {
-    ("model/mechanism.py", "snapped", "mechgraph.determinacy.snapping"),
-    ("model/mechanism.py", "equivalent", "mechgraph.determinacy.equivalent"),
-    ("model/mechanism.py", "view", "mechgraph.show.page.write"),
-    ("result/solution.py", "view", "mechgraph.show.page.write"),
-    ("modes/result.py", "plot", "mechgraph.show.diagrams"),
-    ("modes/branches.py", "plot", "mechgraph.show.diagrams"),
-}
-"""Methods that a user looks for on a class of a lower room: all they do is call, when they are called, a function of a room above."""
+def names_of_modules(source: str) -> list[str]:
+    """Texts that name a module of the package: what no check of import statements sees."""
+    texts = [node.value for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Constant)]
+    return [text for text in texts if text in MODULES]
 
 
-def calls_upward(source: str) -> set[tuple[str, str]]:
-    """(function, module) of imports of the package by name, which no check of import statements sees."""
-    found = set()
-    for function in ast.walk(ast.parse(source)):
-        if isinstance(function, ast.FunctionDef):
-            for node in ast.walk(function):
-                named = (
-                    isinstance(node, ast.Call)
-                    and getattr(node.func, "attr", getattr(node.func, "id", "")) == "import_module"
-                )
-                if named and str(getattr(node.args[0], "value", "")).startswith("mechgraph"):
-                    found.add((function.name, node.args[0].value))
-    return found
+MODULES = {".".join(file.relative_to(ROOT).with_suffix("").parts) for file in FILES}
 
 
-def test_only_thin_methods_import_the_package_by_name() -> None:
-    sources = {file.relative_to(PACKAGE).as_posix(): file.read_text(encoding="utf-8") for file in FILES}
-    found = {(name, *call) for name, source in sources.items() for call in calls_upward(source)}
-    assert found == UPWARD
-    for name, method, _ in UPWARD:
-        bodies = [
-            node.body
-            for node in ast.walk(ast.parse(sources[name]))
-            if isinstance(node, ast.FunctionDef) and node.name == method
-        ]
-        assert [len(body) <= 3 for body in bodies] == [True]  # docstring, call, return
+def test_nothing_imports_the_package_by_name() -> None:
+    found = [(file.name, name) for file in FILES for name in names_of_modules(file.read_text(encoding="utf-8"))]
+    assert not found
+    assert names_of_modules("import_module('mechgraph.errors')") == ["mechgraph.errors"]
 
 
-def test_the_check_finds_an_import_by_name() -> None:
-    assert calls_upward("def f():\n    return importlib.import_module('mechgraph.show').g()") == {
-        ("f", "mechgraph.show")
-    }
-    assert not calls_upward("def f():\n    return importlib.import_module('pint')")
+def test_methods_that_rooms_above_answer_are_thin() -> None:
+    """The table that the top fills has just the names that classes of lower rooms ask for, each in a method that does nothing else."""
+    asked = []
+    for file in FILES:
+        for method in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(method, ast.FunctionDef) and file.stem != "methods":
+                calls = [
+                    node
+                    for node in ast.walk(method)
+                    if isinstance(node, ast.Call) and ast.unparse(node.func) == "methods.call"
+                ]
+                asked += [ast.literal_eval(node.args[0]) for node in calls]
+                assert not calls or len(method.body) <= 3  # docstring, call, return
+    assert set(asked) == set(methods.TABLE)

@@ -52,7 +52,7 @@ def test_extremes_are_those_of_the_arrays() -> None:
 
 def test_extremes_do_not_depend_on_the_blocks(four_bar: mg.Mechanism, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = mg.solve(four_bar, TURN).summary()
-    monkeypatch.setattr("mechgraph.result.kept.TOGETHER", 1)
+    monkeypatch.setattr("mechgraph.result.trajectory.TOGETHER", 1)
     assert mg.solve(four_bar, TURN).summary() == whole
 
 

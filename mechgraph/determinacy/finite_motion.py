@@ -293,12 +293,12 @@ class _Curvature:
         bias = here.closure_bias(here.bias(dq, here.link_twists(dq)))
         return np.concatenate([self.stress.T @ bias, self.given @ a - 1.0])
 
-    def at(self, a: Array) -> _Point:
+    def at(self, a: Array) -> _CurvaturePoint:
         """The residual with its derivatives."""
-        return _Point(self, a)
+        return _CurvaturePoint(self, a)
 
 
-class _Point:
+class _CurvaturePoint:
     def __init__(self, curvature: _Curvature, a: Array) -> None:
         self.curvature, self.x, self.residual = curvature, a, curvature.residual(a)
 
@@ -351,7 +351,7 @@ def branches(
 def _ways(curvature: _Curvature, rng: np.random.Generator) -> list[Array]:
     """The rates ``(F,)`` that have no residual, found from random starts."""
     first = rng.normal(size=(curvature.N.shape[1], STARTS))
-    a, error = closest_zeros(curvature.at, _Point.steps, np.add, first, tolerance=BRANCH_RESIDUAL)
+    a, error = closest_zeros(curvature.at, _CurvaturePoint.steps, np.add, first, tolerance=BRANCH_RESIDUAL)
     ways: list[Array] = []
     for one in (curvature.N @ a[:, error < 1e3 * BRANCH_RESIDUAL]).T:
         if all(np.abs(one - other).max() > SAME for other in ways):

@@ -282,7 +282,7 @@ EXACT = 1e-13
 """Residual with which a relation, or a loop, counts as exact."""
 
 
-class Placed:
+class PlacedPairs:
     """The pairs where they stand in a start that is closed to the tolerance, the misfit of loops shared by all pairs.
 
     ``frames (3, 4, P)`` of the pairs (marker B), ``steps (3, 4, P)`` from marker A to them; ``misfit (6, P)`` of the two sides;

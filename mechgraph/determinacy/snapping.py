@@ -24,7 +24,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import scipy
 
-from mechgraph.determinacy.near_relations import EXACT, Placed, Relation, Relations
+from mechgraph.determinacy.near_relations import EXACT, PlacedPairs, Relation, Relations
 from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, MechgraphError
 from mechgraph.fields import tolerance_fault
@@ -70,7 +70,7 @@ class SearchEnded(MechgraphError):
     """A search for near-special geometry was given up."""
 
 
-def least_change(placed: Placed, tol: float) -> tuple[Array, tuple[Relation, ...], tuple[Relation, ...], bool]:
+def least_change(placed: PlacedPairs, tol: float) -> tuple[Array, tuple[Relation, ...], tuple[Relation, ...], bool]:
     """Change ``(6, P)``, relations met and dropped, and whether motions asked for more."""
     none = np.zeros((6, placed.frames.shape[2]))
     declared = placed.changed(none)
@@ -101,7 +101,7 @@ def weakness(system: System, tol: float) -> float:
 
 
 def _meeting(
-    placed: Placed, found: Relations, near: tuple[Relation, ...], tol: float
+    placed: PlacedPairs, found: Relations, near: tuple[Relation, ...], tol: float
 ) -> tuple[Array, tuple[Relation, ...], tuple[Relation, ...]]:
     """The smallest change that meets all relations that hold together within the tolerance; these, and those left out."""
     dropped: list[Relation] = []
@@ -143,7 +143,7 @@ def _relation_rows(found: Relations, relations: tuple[Relation, ...], change: Ar
 
 
 def _solved(
-    placed: Placed, rows_at: Callable[[Array], Rows], begin: Array | None = None, most: float = 1.0
+    placed: PlacedPairs, rows_at: Callable[[Array], Rows], begin: Array | None = None, most: float = 1.0
 ) -> tuple[Array, Array]:
     """The smallest change with residual zero, by least-norm linearizations from ``begin``; and what is left of the residuals.
 
@@ -182,7 +182,7 @@ def _least_norm(A: scipy.sparse.csr_array, b: Array, cut: float) -> Array:
 
 
 def _moving(
-    placed: Placed, found: Relations, relations: tuple[Relation, ...], mobility: int, tol: float
+    placed: PlacedPairs, found: Relations, relations: tuple[Relation, ...], mobility: int, tol: float
 ) -> Array | None:
     """The smallest change that meets relations and lets the mechanism move with that mobility; None where there is none within ``tol``."""
     rank = placed.system.n_freedoms - mobility
@@ -198,7 +198,7 @@ def _moving(
 
 
 def _rows_along(
-    placed: Placed, found: Relations, relations: tuple[Relation, ...], states: Array, rank: int, change: Array
+    placed: PlacedPairs, found: Relations, relations: tuple[Relation, ...], states: Array, rank: int, change: Array
 ) -> Rows:
     """The rows of relations, and those of loops closed again at states ``(nx, T)``."""
     r, A = _relation_rows(found, relations, change)
@@ -235,7 +235,7 @@ def _closed(system: System, x: Array, rank: int, times: int = 4) -> Array:
     return x
 
 
-def _closing_rows(placed: Placed, change: Array, states: Array, rank: int) -> tuple[Array, Array]:
+def _closing_rows(placed: PlacedPairs, change: Array, states: Array, rank: int) -> tuple[Array, Array]:
     """What self-stresses do on what the loops leave open after a change, closed again from states ``(nx, T)``; with its derivatives."""
     system = placed.changed(change)
     here = Configuration(system, _closed(system, states, rank))
@@ -253,7 +253,7 @@ GIVEN_UP = "{} {!r}: what makes its geometry exact to tol={:g} was not found in 
 
 
 @dataclass(frozen=True)
-class Change:
+class MovedPair:
     """What one pair was moved: a turn (radians) and a shift (in the unit of length of the mechanism)."""
 
     pair: str
@@ -271,7 +271,7 @@ class Changes(Shown):
     """
 
     tol: float
-    moved: tuple[Change, ...]
+    moved: tuple[MovedPair, ...]
     met: tuple[Relation, ...]
     dropped: tuple[Relation, ...]
     largest: float
@@ -324,12 +324,12 @@ def snapped(m: Mechanism, tol: float, until: float = np.inf) -> SnappedMechanism
     if fault:
         raise DeclarationError(f"mechanism {m.name!r}", [fault])
     here = closed_start(m, tol=tol)
-    placed = Placed(here, until)
+    placed = PlacedPairs(here, until)
     change, met, dropped, mobile = least_change(placed, tol)
     pairs = placed.pairs(change)
     L, moved = here.system.par.L, placed.moved(change)
     rows = [
-        Change(pair.name, float(angle) if angle > EXACT else 0.0, float(shift * L) if shift > EXACT else 0.0)
+        MovedPair(pair.name, float(angle) if angle > EXACT else 0.0, float(shift * L) if shift > EXACT else 0.0)
         for pair, angle, shift in zip(m.pairs, *moved, strict=True)
         if max(angle, shift) > EXACT
     ]
@@ -380,7 +380,7 @@ def meant(m: Mechanism, tol: float | None, call: str, limit: float = np.inf) -> 
 def candidates(m: Mechanism, tol: float) -> Array:
     """Sizes of the changes that near relations and nearly dependent closure rows ask for, and of the misfit of the loops."""
     here = closed_start(m, tol=tol)
-    placed = Placed(here)
+    placed = PlacedPairs(here)
     declared = Configuration(placed.changed(np.zeros_like(placed.misfit)), placed.x[:, None])
     sizes = [r.miss / 2 for r in Relations(declared, placed.frames).near(tol)] + [float(here.closure[0])]
     s = singular_values(declared.J[:, :, 0]) if here.system.n_rows <= MOST_ROWS else np.zeros(0)

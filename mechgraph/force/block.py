@@ -198,7 +198,7 @@ def forces_of_block(
 
 
 @dataclass(frozen=True)
-class _Found:
+class _FreeForces:
     """Reactions and efforts, of least norm where redundant, with the self-stresses; see ``BlockForces``."""
 
     reactions: Array
@@ -210,7 +210,7 @@ class _Found:
 
 def _least_on_flanks(
     here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: ForceTask, lines: ContactLines
-) -> tuple[_Found, Array]:
+) -> tuple[_FreeForces, Array]:
     """See ``_least``; with the signs of the multipliers ``(n, T)`` that tell on which flanks gears touch each other.
 
     Where multipliers are not unique those of least norm may touch on other flanks than the first ones found: then once more on these, and
@@ -258,7 +258,7 @@ def _relieved(wrenches: Wrenches, lines: ContactLines, flank: Array) -> Wrenches
 
 def _least(
     here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: ForceTask, lines: ContactLines, flank: Array
-) -> _Found:
+) -> _FreeForces:
     """Reactions and efforts of least norm; where self-stresses are random ones only if that is asked for."""
     totals, multipliers = wrenches.totals, wrenches.multipliers
     stress = _stress(here, wrenches, f, task)
@@ -274,7 +274,7 @@ def _least(
         return found
     y = least_multiples(here, found.reactions, found.efforts, multipliers, stress)
     multipliers = multipliers + np.einsum("nit,it->nt", stress.multipliers, y)
-    return _Found(
+    return _FreeForces(
         found.reactions + np.einsum("cpit,it->cpt", stress.wrenches, y),
         found.efforts + np.einsum("fit,it->ft", stress.efforts, y),
         stress,
@@ -283,11 +283,11 @@ def _least(
     )
 
 
-def _found(here: Configuration, totals: Array, multipliers: Array, stress: Stress) -> _Found:
+def _found(here: Configuration, totals: Array, multipliers: Array, stress: Stress) -> _FreeForces:
     """What total wrenches are made of."""
     efforts = pair_power(here, totals)
     coupled = row_efforts(here, multipliers[:, None])[:, 0]
-    return _Found(reaction_part(here, totals, efforts), efforts, stress, multipliers, coupled)
+    return _FreeForces(reaction_part(here, totals, efforts), efforts, stress, multipliers, coupled)
 
 
 def _acting(here: Configuration, task: ForceTask) -> Index:

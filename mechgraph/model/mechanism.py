@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib
 import itertools
 import math
 import warnings
@@ -15,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from mechgraph import methods
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, MechgraphWarning, counted
 from mechgraph.fields import plain, same_fields
@@ -530,8 +530,7 @@ class Mechanism(Parts, Once, Shown):
         >>> mg.check(tilted).mobility, mg.check(tilted.snapped(0.005)).mobility
         (0, 1)
         """
-        # this, equivalent() and view() call up to a room above: a user looks for them here
-        made: Mechanism = importlib.import_module("mechgraph.determinacy.snapping").snapped(self, tol)
+        made: Mechanism = methods.call("snapped", self, tol)
         return made
 
     @door
@@ -562,9 +561,7 @@ class Mechanism(Parts, Once, Shown):
         >>> mg.load("geneva").equivalent().name
         'geneva, lower pairs'
         """
-        made: Mechanism = importlib.import_module("mechgraph.determinacy.equivalent").equivalent(
-            self, at, rollers=rollers
-        )
+        made: Mechanism = methods.call("equivalent", self, at, rollers=rollers)
         return made
 
     def view(self) -> Any:
@@ -582,7 +579,7 @@ class Mechanism(Parts, Once, Shown):
         MissingExtraError
             Without anywidget.
         """
-        return importlib.import_module("mechgraph.show.page.write").view(self)
+        return methods.call("view", self)
 
     @door
     def moved(self, pose: Any) -> Mechanism:

@@ -9,13 +9,13 @@ that pass the same crossing meet in it. Pieces that arrive, one after the other,
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 import numpy as np
 
+from mechgraph import methods
 from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, counted
 from mechgraph.files import plain
@@ -450,7 +450,7 @@ class Branches(Shown):
         MissingExtraError
             Without matplotlib.
         """
-        return importlib.import_module("mechgraph.show.diagrams").draw_branches(self, output, ax=ax, current=current)
+        return methods.call("draw_branches", self, output, ax=ax, current=current)
 
     def document(self) -> Document:
         """Branches and folds as tables, turns in degrees."""

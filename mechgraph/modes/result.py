@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
 
+from mechgraph import methods
 from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import counted
 from mechgraph.files import plain
@@ -237,7 +237,7 @@ class Assemblies(Shown, Sequence[Mechanism]):
         MissingExtraError
             Without matplotlib.
         """
-        return importlib.import_module("mechgraph.show.diagrams").draw_assemblies(self)
+        return methods.call("draw_assemblies", self)
 
     @property
     def data(self) -> AssembliesData:

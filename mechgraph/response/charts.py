@@ -47,8 +47,7 @@ from mechgraph.response.motion_equations import (
     moved,
     positions_together,
 )
-from mechgraph.result.kept import BlockMotion
-from mechgraph.result.trajectory import Trajectory
+from mechgraph.result.trajectory import BlockMotion, Trajectory
 
 Law = Callable[[float], tuple[float, float, float]]
 """Position, velocity and acceleration at a time."""

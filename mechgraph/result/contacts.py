@@ -35,14 +35,15 @@ from mechgraph.pairs.contact_types import (
 )
 from mechgraph.pairs.factors import Touching
 from mechgraph.quantities import FORCE, LENGTH, PRESSURE, TIME, unit_of, wrong
-from mechgraph.result.values import OK, Mask, Places, Values, bracket, driver_value, number, ranges, with_unit
-from mechgraph.result.views import CouplingResult
+from mechgraph.result.trajectory import Trajectory
+from mechgraph.result.values import OK, Mask, bracket, driver_value, number, ranges, with_unit
+from mechgraph.result.views import CouplingResult, PositionLabels
 
 
 class ContactGeometry:
     """Centre, point, normal and curvatures of one contact, arrays over the positions."""
 
-    def __init__(self, values: Values, index: int) -> None:
+    def __init__(self, values: Trajectory, index: int) -> None:
         self._values, self._index = values, index
 
     @property
@@ -227,7 +228,7 @@ class Stretch(NamedTuple):
     amount: float
 
 
-def stretches(values: Values, below: Mask, of: Array) -> Iterator[Stretch]:
+def stretches(values: Trajectory, below: Mask, of: Array) -> Iterator[Stretch]:
     """The ranges of positions ``below`` zero of a fact ``of (...)``, which crosses zero where they begin and end."""
     low, fact = below.reshape(-1), of.reshape(-1)
     if not low.any():
@@ -236,7 +237,7 @@ def stretches(values: Values, below: Mask, of: Array) -> Iterator[Stretch]:
     ends = np.flatnonzero(np.diff(low, prepend=False, append=False))
     cuts = np.arange(row, low.size, row)  # rows of positions are motions of their own
     cuts = cuts[low[cuts - 1] & low[cuts]]
-    places = Places(values)
+    places = PositionLabels(values)
     drivers = dict(zip(places.drivers, places.driver_values, strict=True))
     if values.t is not None:
         drivers["t"] = np.broadcast_to(np.asarray(values.t, dtype=float), values.batch).reshape(-1)
@@ -265,7 +266,7 @@ STANDS = 1e-10
 """Part of the greatest velocity of a link at a contact below which it is rounding."""
 
 
-def place_of_contact(values: Values, name: str) -> int:
+def place_of_contact(values: Trajectory, name: str) -> int:
     """The number of the pair of that name.
 
     Raises
@@ -291,7 +292,7 @@ class ContactResult(ContactGeometry, Shown):
         held = "only pushed" if pair.closed == "force" else "held on both sides"
         blocks: list[Block] = [
             Paragraph(f"{pair.type.name}, {pair.a} on {pair.b}, {held}. Paths are seen in the frames of its markers."),
-            ranges(rows, Places(self._values).name),
+            ranges(rows, PositionLabels(self._values).name),
             *(Paragraph(found.text) for found in (self.lift_off if self._values.has_forces else ())),
             *(Paragraph(found.text) for found in self.overlap),
         ]
@@ -525,23 +526,23 @@ def angle_between(v: Array, n: Array) -> Array:
     return np.where(along + across > 0, np.arctan2(across, along), np.nan)
 
 
-def contacts_of(values: Values) -> dict[str, ContactResult]:
+def contacts_of(values: Trajectory) -> dict[str, ContactResult]:
     """The facts of all contacts by the names of their pairs."""
     return {p.name: ContactResult(values, k) for k, p in enumerate(values.whole.pairs) if p.type.touching}
 
 
-def lift_offs(values: Values) -> tuple[LiftOff, ...]:
+def lift_offs(values: Trajectory) -> tuple[LiftOff, ...]:
     """Where contacts that are only pushed, or do not say that they are held, would have to pull."""
     found = contacts_of(values).values() if values.has_forces and bool((values.status() == OK).any()) else ()
     return tuple(lift for contact in found for lift in contact.lift_off)
 
 
-def overlaps(values: Values) -> tuple[Overlap, ...]:
+def overlaps(values: Trajectory) -> tuple[Overlap, ...]:
     """Where the elements of contacts cut into each other."""
     return tuple(overlap for contact in contacts_of(values).values() for overlap in contact.overlap)
 
 
-def contact_columns(values: Values) -> Iterator[tuple[str, Array, tuple[int, int, int]]]:
+def contact_columns(values: Trajectory) -> Iterator[tuple[str, Array, tuple[int, int, int]]]:
     """Columns of the table: ``B path on plane:x``, ``B normal force``, ``B sliding speed``, ...; of gears force and sliding speed.
 
     Paths are seen in the frames of the markers of the pair on these links.

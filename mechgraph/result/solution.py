@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -12,6 +11,7 @@ from urllib.parse import quote
 import numpy as np
 from numpy.typing import NDArray
 
+from mechgraph import methods
 from mechgraph.document import Document, Shown, to_text
 from mechgraph.equations.terms import State
 from mechgraph.errors import DeclarationError, visible
@@ -33,6 +33,7 @@ from mechgraph.result.contacts import (
     place_of_contact,
 )
 from mechgraph.result.summary import solution_data, summary
+from mechgraph.result.trajectory import Trajectory
 from mechgraph.result.values import (
     OK,
     Checks,
@@ -42,11 +43,9 @@ from mechgraph.result.values import (
     Mask,
     MaterialPoint,
     PassedCrossing,
-    Places,
     Unbalanced,
-    Values,
 )
-from mechgraph.result.views import CouplingResult, LinkResult, PairResult
+from mechgraph.result.views import CouplingResult, LinkResult, PairResult, PositionLabels
 
 if TYPE_CHECKING:
     import pandas
@@ -66,7 +65,7 @@ class Column(NamedTuple):
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
 
-def table_of(s: Values, include: Sequence[Include] = ()) -> list[Column]:
+def table_of(s: Trajectory, include: Sequence[Include] = ()) -> list[Column]:
     """All columns: coordinates, rates, efforts, reaction components, status and checks.
 
     Names are ``B.Tz``, ``B.Tz velocity``, ``B.Tz effort`` (of the drive), ``B.Tz applied effort`` (of springs, dampers, given efforts),
@@ -127,14 +126,14 @@ def _point(name: str, p: MaterialPoint) -> Iterator[Extra]:
         yield from _vector(name + label, values, (1, 0, -order))
 
 
-def _points(s: Values) -> Iterator[Extra]:
+def _points(s: Trajectory) -> Iterator[Extra]:
     """Motion of the named points of links: ``bucket.tip:x``, ``bucket.tip velocity:x``, ..."""
     for i, link in enumerate(s.mechanism.links):
         for name, p in link.points.items():
             yield from _point(f"{link.name}.{name}", s.link_point(i, p))
 
 
-def _links(s: Values) -> Iterator[Extra]:
+def _links(s: Trajectory) -> Iterator[Extra]:
     """Poses of the links: origin of the frame ``crank:x``, rotation matrix ``crank:Rxx``, and angular rates."""
     for i, link in enumerate(s.mechanism.links):
         pose, twist, acceleration = s.link(i)
@@ -146,14 +145,14 @@ def _links(s: Values) -> Iterator[Extra]:
         yield from _vector(f"{link.name} angular acceleration", acceleration[..., :3], (0, 0, -2))
 
 
-def _centers(s: Values) -> Iterator[Extra]:
+def _centers(s: Trajectory) -> Iterator[Extra]:
     """Motion of the mass centres: ``crank center:x``, ``crank center velocity:x``, ..."""
     for i, link in enumerate(s.mechanism.links):
         if link.center is not None:
             yield from _point(f"{link.name} center", s.link_point(i, None))
 
 
-def _loads(s: Values) -> Iterator[Extra]:
+def _loads(s: Trajectory) -> Iterator[Extra]:
     """What loads do: coordinate, rate and force of laws, efforts, else wrenches on links about the global origin; and their power."""
     m = s.mechanism
     for i, load in enumerate(m.loads):
@@ -172,7 +171,7 @@ def _loads(s: Values) -> Iterator[Extra]:
 
 
 Include = Literal["points", "links", "centers", "loads", "contacts"]
-MORE: dict[str, Callable[[Values], Iterator[Extra]]] = {
+MORE: dict[str, Callable[[Trajectory], Iterator[Extra]]] = {
     "points": _points,
     "links": _links,
     "centers": _centers,
@@ -187,12 +186,12 @@ ROWS_TOGETHER = 1024
 Path = str | os.PathLike[str]
 
 
-def to_csv(s: Values, path: Path, include: Sequence[Include] = ()) -> None:
+def to_csv(s: Trajectory, path: Path, include: Sequence[Include] = ()) -> None:
     """Write one row a position; numbers with all digits. The rows are made as they are written, some at a time."""
     write_whole(path, _csv_pieces(s, include))
 
 
-def _csv_pieces(s: Values, include: Sequence[Include]) -> Iterator[str]:
+def _csv_pieces(s: Trajectory, include: Sequence[Include]) -> Iterator[str]:
     count = s.status().size
     for first in range(0, max(count, 1), ROWS_TOGETHER):
         table = table_of(s.part(slice(first, first + ROWS_TOGETHER)), include)
@@ -200,7 +199,7 @@ def _csv_pieces(s: Values, include: Sequence[Include]) -> Iterator[str]:
         yield csv_of([column.label for column in table] if not first else (), rows)
 
 
-def to_pandas(s: Values, include: Sequence[Include] = ()) -> pandas.DataFrame:
+def to_pandas(s: Trajectory, include: Sequence[Include] = ()) -> pandas.DataFrame:
     """The table as a DataFrame; several batch axes become index levels, units by column stand in ``attrs`` too."""
     pd = optional("pandas", "pandas")
     table = table_of(s, include)
@@ -211,7 +210,7 @@ def to_pandas(s: Values, include: Sequence[Include] = ()) -> pandas.DataFrame:
     return frame
 
 
-def to_parquet(s: Values, path: Path, include: Sequence[Include] = ()) -> None:
+def to_parquet(s: Trajectory, path: Path, include: Sequence[Include] = ()) -> None:
     """Write the DataFrame as Parquet; ``pandas.read_parquet`` gives back an equal one, ``attrs`` included."""
     frame = to_pandas(s, include).rename(columns=visible)
     frame.attrs["units"] = {visible(name): unit for name, unit in frame.attrs["units"].items()}
@@ -219,7 +218,7 @@ def to_parquet(s: Values, path: Path, include: Sequence[Include] = ()) -> None:
         frame.to_parquet(temporary, engine="pyarrow")
 
 
-def to_xarray(s: Values, include: Sequence[Include] = ()) -> xarray.Dataset:
+def to_xarray(s: Trajectory, include: Sequence[Include] = ()) -> xarray.Dataset:
     """The table as a Dataset over the batch axes: units as attributes, times and what is prescribed as coordinates.
 
     One row of rising times is the dimension ``t``, every other last axis is ``position``.
@@ -235,7 +234,7 @@ def to_xarray(s: Values, include: Sequence[Include] = ()) -> xarray.Dataset:
     return xr.Dataset(data, attrs=_facts(s)).set_coords(coordinates)
 
 
-def to_netcdf(s: Values, path: Path, include: Sequence[Include] = ()) -> None:
+def to_netcdf(s: Trajectory, path: Path, include: Sequence[Include] = ()) -> None:
     """Write the Dataset as NetCDF 4; ``xarray.open_dataset`` gives it back.
 
     A slash separates groups there and a space coordinates: they are quoted as in an address (``urllib.parse.unquote`` undoes it).
@@ -256,12 +255,12 @@ FORMATS = (
 """What a solution can be written as."""
 
 
-def write(s: Values, path: Path, include: Sequence[Include] = ()) -> None:
+def write(s: Trajectory, path: Path, include: Sequence[Include] = ()) -> None:
     """Write the table in the format that the suffix says."""
     format_of(path, FORMATS).write(s, path, include)
 
 
-def _facts(s: Values) -> dict[str, str]:
+def _facts(s: Trajectory) -> dict[str, str]:
     """What the solution is of, and how it was made; texts alone."""
     m = s.mechanism
     texts = {"mechanism": m.name, "description": m.description, "source": m.source, "engine": s.engine}
@@ -292,7 +291,7 @@ class Solution(Shown):
 
     _wanted = "a Solution; mg.solve(mechanism) makes one"
 
-    def __init__(self, values: Values) -> None:
+    def __init__(self, values: Trajectory) -> None:
         self._values = values
 
     @property
@@ -662,8 +661,7 @@ class Solution(Shown):
         MissingExtraError
             Without anywidget.
         """
-        # up to a room above: a user looks for it here
-        return importlib.import_module("mechgraph.show.page.write").view(self)
+        return methods.call("view", self)
 
     def place(self, index: int) -> str:
         """Describe a position of the flat batch: driver values, or time.
@@ -683,7 +681,9 @@ class Solution(Shown):
         >>> mg.kinematics(mg.load("four-bar"), {"A": [0.0, 0.5]}).place(1)
         'A.Rz = 28.648 deg'
         """
-        return Places(self._values).full_name(place_among(index, self.status.size, "index", "place of a position"))
+        return PositionLabels(self._values).full_name(
+            place_among(index, self.status.size, "index", "place of a position")
+        )
 
     def state(self, index: int | slice | tuple[int, ...] = ()) -> State:
         """Return screws, loads and coordinates at one position, for ``Formulation.assemble``.

@@ -17,19 +17,19 @@ from mechgraph.maths.se3 import Array, Index
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import FORCE, PRESSURE, force_hint, unit_of
 from mechgraph.result.contacts import LiftOff, Overlap, contacts_of, lift_offs, overlaps
+from mechgraph.result.trajectory import Trajectory
 from mechgraph.result.values import (
     OK,
     SHOWN_AS_ZERO,
     LoadBearing,
     Mask,
     PassedCrossing,
-    Places,
-    Values,
     bracket,
     coupling_unit,
     number,
     with_unit,
 )
+from mechgraph.result.views import PositionLabels
 
 TIE = 1e-9
 """Relative difference below which two values share the extreme; the first position is named."""
@@ -52,7 +52,7 @@ class Greatest:
         self.at = np.where(better, places[first], self.at)
 
 
-class Range:
+class RowRange:
     """Least (as greatest of what is turned round) and greatest values of some rows, and which rows are not unique somewhere."""
 
     def __init__(self, count: int) -> None:
@@ -86,18 +86,18 @@ class Reactions:
     touched: Mask
 
 
-def multipliers(values: Values) -> Range:
+def multipliers(values: Trajectory) -> RowRange:
     """Ranges of the multipliers of all couplings."""
     found, loose = values.multipliers()
-    out = Range(len(found))
+    out = RowRange(len(found))
     if len(found):
         out.look(found, np.arange(found.shape[1]), loose)
     return out
 
 
-def efforts(values: Values) -> tuple[Range, Range]:
+def efforts(values: Trajectory) -> tuple[RowRange, RowRange]:
     """Ranges of own and of applied efforts of all freedoms."""
-    own, applied = (Range(len(values.whole.freedom_names())) for _ in range(2))
+    own, applied = (RowRange(len(values.whole.freedom_names())) for _ in range(2))
     for places in values.blocks():
         mine, given, loose = values.efforts_at(places)
         own.look(mine, places, loose)
@@ -105,7 +105,7 @@ def efforts(values: Values) -> tuple[Range, Range]:
     return own, applied
 
 
-def reactions(values: Values) -> Reactions:
+def reactions(values: Trajectory) -> Reactions:
     """The greatest reactions of all pairs."""
     P = len(values.whole.pairs)
     force, moment, loose = Greatest(P), Greatest(P), np.zeros((2, P), dtype=bool)
@@ -124,7 +124,7 @@ def reactions(values: Values) -> Reactions:
     return Reactions(force, moment, loose, kept, touched)
 
 
-def _of_what_is_unique(values: Values) -> tuple[tuple[Greatest, Greatest], Mask]:
+def _of_what_is_unique(values: Trajectory) -> tuple[tuple[Greatest, Greatest], Mask]:
     """The greatest forces and moments of the components that are unique everywhere, and which are not.
 
     Where a block shows another one that is not, all is begun again without it; nearly always the first one shows them all.
@@ -265,9 +265,9 @@ class SolutionData:
     work: Annotated[Mapping[str, int], "how much was computed"]
 
 
-def solution_data(values: Values) -> SolutionData:
+def solution_data(values: Trajectory) -> SolutionData:
     """All that a summary tells."""
-    places, checks = Places(values), values.checks()
+    places, checks = PositionLabels(values), values.checks()
     forces = values.has_forces and bool(places.solved.any())
     own, applied = efforts(values) if forces else (None, None)
     worst = [
@@ -305,7 +305,7 @@ def solution_data(values: Values) -> SolutionData:
     )  # fmt: skip
 
 
-def _at(places: Places, found: Greatest, k: int, sign: float = 1.0) -> At | None:
+def _at(places: PositionLabels, found: Greatest, k: int, sign: float = 1.0) -> At | None:
     """An extreme with its place; none where there is no number."""
     if not np.isfinite(found.best[k]):
         return None
@@ -314,28 +314,28 @@ def _at(places: Places, found: Greatest, k: int, sign: float = 1.0) -> At | None
     return At(sign * float(found.best[k]), at, there)
 
 
-def _effort(places: Places, found: Range, k: int, name: str) -> EffortRange:
+def _effort(places: PositionLabels, found: RowRange, k: int, name: str) -> EffortRange:
     m = places.values.whole
     pair, j = m.freedom(name)
     unit = unit_of(m.units, (2 if m.pairs[pair].type.efforts[j].is_couple else 1, 1, -2))
     return EffortRange(name, unit, *_ends(places, found, k))
 
 
-def _multipliers(places: Places) -> tuple[MultiplierRange, ...]:
+def _multipliers(places: PositionLabels) -> tuple[MultiplierRange, ...]:
     found, m = multipliers(places.values), places.m
     return tuple(
         MultiplierRange(c.name, coupling_unit(m, c), *_ends(places, found, k)) for k, c in enumerate(m.couplings)
     )
 
 
-def _ends(places: Places, found: Range, k: int) -> tuple[bool, At | None, At | None]:
+def _ends(places: PositionLabels, found: RowRange, k: int) -> tuple[bool, At | None, At | None]:
     """Whether a quantity is unique, and its extremes where it has a value."""
     loose = bool(found.loose[k])
     known = not loose or places.values.least_norm
     return not loose, *((_at(places, found.low, k, -1.0), _at(places, found.high, k)) if known else (None, None))
 
 
-def _reactions(places: Places) -> tuple[ReactionData, ...]:
+def _reactions(places: PositionLabels) -> tuple[ReactionData, ...]:
     values, m = places.values, places.m
     found = reactions(values)
     units = [unit_of(m.units, (power, 1, -2)) for power in (1, 2)]
@@ -371,7 +371,7 @@ NO_VALUE = (
 )
 
 
-def summary(values: Values, asked: bool = True, more_checks: tuple[tuple[str, Any], ...] = ()) -> Document:
+def summary(values: Trajectory, asked: bool = True, more_checks: tuple[tuple[str, Any], ...] = ()) -> Document:
     """Positions solved and not solved, ranges of the drivers' efforts, greatest reactions and where, checks, and the work.
 
     Angles of drivers are shown in degrees. Forces and moments are those of ``s[pair].force`` and ``s[pair].moment``: of the
@@ -382,7 +382,7 @@ def summary(values: Values, asked: bool = True, more_checks: tuple[tuple[str, An
     asked : whether the summary was asked for: unasked it leaves out what takes long, and says how long.
     more_checks : names of further checks, and their values over the positions.
     """
-    view = _View(values)
+    view = _SummaryText(values)
     blocks: list[Block] = [*view.positions(), *view.driver_table()]
     if values.has_forces and view.solved.any():
         size = len(view.m.pairs) * view.status.size
@@ -396,16 +396,16 @@ def summary(values: Values, asked: bool = True, more_checks: tuple[tuple[str, An
     return Document(f"Solution of {view.m.name}", tuple(blocks))
 
 
-class _View(Places):
+class _SummaryText(PositionLabels):
     """One solution with its positions laid out flat, and what is told of it."""
 
-    def __init__(self, values: Values) -> None:
+    def __init__(self, values: Trajectory) -> None:
         super().__init__(values)
         self.force_unit = unit_of(self.m.units, (1, 1, -2))
         self.moment_unit = unit_of(self.m.units, (2, 1, -2))
 
     @cached_property
-    def ranges(self) -> tuple[Range, Range]:
+    def ranges(self) -> tuple[RowRange, RowRange]:
         """Ranges of own and of applied efforts of all freedoms."""
         return efforts(self.values)
 
@@ -508,7 +508,7 @@ class _View(Places):
             yield from self._ranges("Multipliers of the couplings", "coupling", multipliers(self.values), every, heads)
 
     def _ranges(
-        self, title: str, what: str, found: Range, columns: list[int], heads: list[str], largest: float = 0.0
+        self, title: str, what: str, found: RowRange, columns: list[int], heads: list[str], largest: float = 0.0
     ) -> Iterator[Block]:
         rows: list[tuple[str, ...]] = []
         for k in columns[:LISTED]:

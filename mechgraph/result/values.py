@@ -1,19 +1,17 @@
-"""Where a solution takes its values from (``Values``), the records among them, positions as people call them, numbers for people."""
+"""Records that a solution hands out: checks, points, loads, warnings; and numbers for people."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.document import Document, Shown, Table
-from mechgraph.equations.terms import State
-from mechgraph.maths.newton import Work
-from mechgraph.maths.se3 import Array, Index
+from mechgraph.document.render import Shown
+from mechgraph.document.tree import Document, Table
+from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import CHECKS, PATH
 from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.loads import Load
@@ -265,126 +263,6 @@ class Unbalanced(_Worst):
         return self.text
 
 
-class Values(Protocol):
-    """Where a Solution takes its values from (see ``result.trajectory``); every method returns batch-first arrays.
-
-    ``mechanism`` is the one that was solved, with the freedoms that take efforts as its drives; ``whole`` the same with the free pairs
-    through which the motion of points and links is prescribed, behind its own; ``prescribed`` and ``actuated`` are freedoms of that.
-    ``least_norm``: reactions that are not unique have the value of least norm, not NaN; ``radius``: the mean radius L.
-    """
-
-    mechanism: Mechanism
-    whole: Mechanism
-    prescribed: tuple[str, ...]
-    actuated: tuple[str, ...]
-    batch: tuple[int, ...]
-    t: Any
-    has_forces: bool
-    engine: Literal["dense", "sparse", "compiled"]
-    method: str | None
-    work: Work
-    least_norm: bool
-    radius: float
-
-    def status(self) -> NDArray[np.str_]:
-        """Named outcomes, one a position."""
-
-    def checks(self) -> Checks:
-        """Closure, equilibrium, power and accuracy."""
-
-    def coordinates(self, pair: int) -> tuple[Array, Array, Array]:
-        """Coordinates, rates and accelerations of the freedoms of a pair, ``(..., f)``."""
-
-    def reaction(self, pair: int) -> Array:
-        """Reaction of a pair about the global origin, ``(..., 6)``."""
-
-    def total(self, pair: int) -> Array:
-        """Total wrench of a pair about the global origin, ``(..., 6)``."""
-
-    def on_link(self, pair: int, link: int) -> tuple[Array, Mask, Array]:
-        """What a pair transmits to one of its links, (M, F) in its frame about the marker there, and whether unique, ``(..., 6)``;
-        sizes of what is unique of M and F ``(..., 2)``.
-        """
-
-    def magnitude(self, pair: int) -> Array:
-        """Size of what is unique of the force of the reaction, ``(...)``."""
-
-    def reaction_at_pair(self, pair: int) -> Array:
-        """Reaction about the origin of marker B, global directions, ``(..., 6)``."""
-
-    def components(self, pair: int) -> dict[str, Array]:
-        """Reaction components by name, ``(...)``."""
-
-    def directions(self, pair: int) -> Array:
-        """Forces of the unit reaction components of a pair, global directions, ``(..., 3, 6 - f)``."""
-
-    def screws(self, pair: int) -> Array:
-        """Twists of the freedoms of a pair at unit rates about the global origin, ``(..., 6, f)``."""
-
-    def frame_origin(self, pair: int, k: int) -> Array:
-        """Origin of frame k of a pair, global, ``(..., 3)``."""
-
-    def unique(self, pair: int) -> dict[str, Array]:
-        """Which reaction components and efforts of drives are unique, by name, ``(...)``."""
-
-    def efforts(self, pair: int) -> tuple[Array, Array]:
-        """What the drive supplies, and what springs, dampers and given efforts do, ``(..., f)`` each."""
-
-    def multiplier(self, coupling: int) -> Array:
-        """Multiplier of a coupling, ``(...)``."""
-
-    def contact(self, coupling: int) -> tuple[Array, Array]:
-        """Force of gears on the second one, and the point where it acts, ``(..., 3)``."""
-
-    def multipliers(self) -> tuple[Array, Mask]:
-        """Multipliers of all couplings ``(n, T)``, of least norm where redundant, and where they are not unique."""
-
-    def blocks(self) -> Iterator[Index]:
-        """The solved flat places in parts, for ``..._at``: all pairs at some places ``(n,)``, the batch last."""
-
-    def reactions_at(self, places: Index) -> tuple[Array, Mask]:
-        """Reactions about the origins of markers B ``(6, P, n)``, of least norm where redundant, and which numbers are not unique."""
-
-    def components_at(self, places: Index) -> tuple[Array, Mask]:
-        """Components ``(6, P, n)`` by the pair table, 0 beyond those of a pair, and which are not unique."""
-
-    def efforts_at(self, places: Index) -> tuple[Array, Array, Mask]:
-        """Own and applied efforts ``(F, n)``, and which of the former are not unique."""
-
-    def link(self, link: int) -> tuple[Array, Array, Array]:
-        """Pose ``(..., 4, 4)``, twist and its rate ``(..., 6)`` of a link."""
-
-    def link_hold(self, link: int) -> Array:
-        """Wrench that keeps a passive body at rest, about the global origin, ``(..., 6)``."""
-
-    def link_point(self, link: int, p: Any) -> MaterialPoint:
-        """A material point given in the link's frame; the mass centre where it is None."""
-
-    def kinetic_energy(self) -> Array:
-        """Kinetic energy of all links, ``(...)``."""
-
-    def shaking(self) -> Array:
-        """Wrench of all that acts on the frame about the global origin, ``(..., 6)``."""
-
-    def load(self, index: int) -> LoadResult:
-        """What one load does."""
-
-    def passive_efforts(self) -> dict[str, Array]:
-        """What keeps passive bodies at rest, by name."""
-
-    def load_bearing(self) -> tuple[LoadBearing, ...]:
-        """Passive freedoms that the loads would move."""
-
-    def crossings(self) -> tuple[PassedCrossing, ...]:
-        """Crossings of branches that the path was led over."""
-
-    def state(self, index: Any) -> State:
-        """Screws and loads at one position, in the declared units about the global origin."""
-
-    def part(self, places: slice) -> Values:
-        """The values at a range of flat positions."""
-
-
 OK = "ok"
 """Status of a solved position."""
 
@@ -405,58 +283,3 @@ def coupling_unit(m: Mechanism, coupling: BaseCoupling) -> str:
     """The unit of the multiplier: a force where all freedoms are slides, else a moment."""
     slides = not any(m.turns(name) for name in coupling.freedoms)
     return unit_of(m.units, (1 if slides else 2, 1, -2))
-
-
-class Places:
-    """The positions of a solution laid out flat."""
-
-    def __init__(self, values: Values) -> None:
-        self.values = values
-        self.m: Mechanism = values.mechanism
-        self.status = np.asarray(values.status()).reshape(-1)
-        self.solved = self.status == OK
-        self.drivers = values.prescribed
-
-    @cached_property
-    def driver_values(self) -> list[Array]:
-        """Coordinates of the drivers."""
-        return [self.coordinates(name)[0] for name in self.drivers]
-
-    def coordinates(self, name: str) -> tuple[Array, Array]:
-        """Coordinate and rate of a freedom, one value a position."""
-        k, j = self.values.whole.freedom(name)
-        position, velocity, _ = self.values.coordinates(k)
-        return self.flat(position[..., j]), self.flat(velocity[..., j])
-
-    def flat(self, values: Any) -> Array:
-        """One value a position."""
-        return np.asarray(values, dtype=float).reshape(self.status.size)
-
-    def runs(self) -> list[tuple[int, int]]:
-        """First and last index of every run of equal statuses."""
-        cuts = np.flatnonzero(self.status[1:] != self.status[:-1])
-        starts = [0, *(int(c) + 1 for c in cuts)]
-        ends = [*(int(c) for c in cuts), self.status.size - 1]
-        return list(zip(starts, ends, strict=True)) if self.status.size else []
-
-    def coordinate(self, name: str, value: float) -> str:
-        """A driver's value with its unit."""
-        return coordinate(self.values.whole, name, value)
-
-    def name(self, index: int) -> str:
-        """The driver values of a position; where these are not known its time, or its number."""
-        found = [
-            self.coordinate(n, v[index])
-            for n, v in zip(self.drivers, self.driver_values, strict=True)
-            if np.isfinite(v[index])
-        ]
-        if not found and self.values.t is not None:
-            t = np.broadcast_to(np.asarray(self.values.t, dtype=float), self.values.batch).reshape(-1)[index]
-            return f"t = {with_unit(number(t), unit_of(self.m.units, (0, 0, 1)))}"
-        return ", ".join(found) or f"position {index}"
-
-    def full_name(self, index: int) -> str:
-        """The same with the names of the drivers, ``A.Rz = 30 deg``."""
-        values = zip(self.drivers, self.driver_values, strict=True)
-        found = [driver_value(self.values.whole, n, v[index]) for n, v in values if np.isfinite(v[index])]
-        return ", ".join(found) or self.name(index)

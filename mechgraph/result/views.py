@@ -1,8 +1,9 @@
-"""What a solution hands out by name: values of pairs, couplings and links, and their ranges for people."""
+"""What a solution hands out by name: values of pairs, couplings and links, their ranges for people, and labels of positions."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,10 +13,78 @@ from mechgraph.errors import DeclarationError
 from mechgraph.fields import vector_fault
 from mechgraph.maths.se3 import Array
 from mechgraph.model.couplings import Contact
+from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.quantities import unit_of
-from mechgraph.result.values import MaterialPoint, Places, Values, bracket, coupling_unit, ranges
+from mechgraph.result.trajectory import Trajectory
+from mechgraph.result.values import (
+    OK,
+    MaterialPoint,
+    bracket,
+    coordinate,
+    coupling_unit,
+    driver_value,
+    number,
+    ranges,
+    with_unit,
+)
+
+
+class PositionLabels:
+    """The positions of a solution laid out flat."""
+
+    def __init__(self, values: Trajectory) -> None:
+        self.values = values
+        self.m: Mechanism = values.mechanism
+        self.status = np.asarray(values.status()).reshape(-1)
+        self.solved = self.status == OK
+        self.drivers = values.prescribed
+
+    @cached_property
+    def driver_values(self) -> list[Array]:
+        """Coordinates of the drivers."""
+        return [self.coordinates(name)[0] for name in self.drivers]
+
+    def coordinates(self, name: str) -> tuple[Array, Array]:
+        """Coordinate and rate of a freedom, one value a position."""
+        k, j = self.values.whole.freedom(name)
+        position, velocity, _ = self.values.coordinates(k)
+        return self.flat(position[..., j]), self.flat(velocity[..., j])
+
+    def flat(self, values: Any) -> Array:
+        """One value a position."""
+        return np.asarray(values, dtype=float).reshape(self.status.size)
+
+    def runs(self) -> list[tuple[int, int]]:
+        """First and last index of every run of equal statuses."""
+        cuts = np.flatnonzero(self.status[1:] != self.status[:-1])
+        starts = [0, *(int(c) + 1 for c in cuts)]
+        ends = [*(int(c) for c in cuts), self.status.size - 1]
+        return list(zip(starts, ends, strict=True)) if self.status.size else []
+
+    def coordinate(self, name: str, value: float) -> str:
+        """A driver's value with its unit."""
+        return coordinate(self.values.whole, name, value)
+
+    def name(self, index: int) -> str:
+        """The driver values of a position; where these are not known its time, or its number."""
+        found = [
+            self.coordinate(n, v[index])
+            for n, v in zip(self.drivers, self.driver_values, strict=True)
+            if np.isfinite(v[index])
+        ]
+        if not found and self.values.t is not None:
+            t = np.broadcast_to(np.asarray(self.values.t, dtype=float), self.values.batch).reshape(-1)[index]
+            return f"t = {with_unit(number(t), unit_of(self.m.units, (0, 0, 1)))}"
+        return ", ".join(found) or f"position {index}"
+
+    def full_name(self, index: int) -> str:
+        """The same with the names of the drivers, ``A.Rz = 30 deg``."""
+        values = zip(self.drivers, self.driver_values, strict=True)
+        found = [driver_value(self.values.whole, n, v[index]) for n, v in values if np.isfinite(v[index])]
+        return ", ".join(found) or self.name(index)
+
 
 UNASKED = 1_000_000
 """Links times positions up to which motions are evaluated again without being asked for."""
@@ -24,9 +93,9 @@ Row = tuple[str, Any]
 """A quantity and its values, one a position."""
 
 
-def pair_document(values: Values, k: int) -> Document:
+def pair_document(values: Trajectory, k: int) -> Document:
     """Coordinates, rates, efforts and reaction of a pair."""
-    places, pair = Places(values), values.whole.pairs[k]
+    places, pair = PositionLabels(values), values.whole.pairs[k]
     blocks: list[Block] = [
         Paragraph(f"{pair.type.symbol}, {pair.type.name}, from {pair.a} on {pair.b}; {_solved(places)}."),
         ranges(_pair_rows(values, pair, k), places.name),
@@ -40,7 +109,7 @@ def pair_document(values: Values, k: int) -> Document:
     return Document(f"Pair {pair.name} of {values.mechanism.name}", tuple(blocks))
 
 
-def _pair_rows(values: Values, pair: Pair, k: int) -> Iterator[Row]:
+def _pair_rows(values: Trajectory, pair: Pair, k: int) -> Iterator[Row]:
     units, coordinates = values.mechanism.units, values.coordinates(k)
     for j, freedom in enumerate(pair.type.freedoms):
         turns = freedom.turns
@@ -68,9 +137,9 @@ def _pair_rows(values: Values, pair: Pair, k: int) -> Iterator[Row]:
             yield f"{name}{bracket(moment if couples.get(name) else force)}", of
 
 
-def link_document(values: Values, k: int) -> Document:
+def link_document(values: Trajectory, k: int) -> Document:
     """Motion of the mass centre and the named points of a link, and how it turns."""
-    m, places = values.mechanism, Places(values)
+    m, places = values.mechanism, PositionLabels(values)
     link = m.links[k]
     if _large(values):
         shown: Block = Paragraph(_asked(values, f"s.link({link.name!r}).pose"))
@@ -79,7 +148,7 @@ def link_document(values: Values, k: int) -> Document:
     return Document(f"Link {link.name} of {m.name}", (Paragraph(f"{_solved(places).capitalize()}."), shown))
 
 
-def _link_rows(values: Values, k: int) -> Iterator[Row]:
+def _link_rows(values: Trajectory, k: int) -> Iterator[Row]:
     m = values.mechanism
     link = m.links[k]
     length, speed, rate = (bracket(unit_of(m.units, (1, 0, -n))) for n in range(3))
@@ -94,10 +163,10 @@ def _link_rows(values: Values, k: int) -> Iterator[Row]:
         yield f"angular {what}{bracket(unit_of(m.units, (0, 0, -n)))}", np.linalg.norm(of[..., :3], axis=-1)
 
 
-def coupling_document(values: Values, k: int) -> Document:
+def coupling_document(values: Trajectory, k: int) -> Document:
     """The relation that a coupling imposes, and its multiplier."""
     m = values.mechanism
-    coupling, places = m.couplings[k], Places(values)
+    coupling, places = m.couplings[k], PositionLabels(values)
     unit = bracket(coupling_unit(m, coupling))
     blocks: list[Block] = [Paragraph(f"{coupling.text}; {_solved(places)}.")]
     if values.has_forces:
@@ -109,16 +178,16 @@ def coupling_document(values: Values, k: int) -> Document:
     return Document(f"Coupling {coupling.name} of {m.name}", tuple(blocks))
 
 
-def _solved(places: Places) -> str:
+def _solved(places: PositionLabels) -> str:
     of = places.status.size
     return f"solved {int(places.solved.sum())} of {of} position{'s' * (of != 1)}"
 
 
-def _large(values: Values) -> bool:
+def _large(values: Trajectory) -> bool:
     return len(values.mechanism.links) * int(np.prod(values.batch)) > UNASKED
 
 
-def _asked(values: Values, call: str) -> str:
+def _asked(values: Trajectory, call: str) -> str:
     """What is said in place of what would take long."""
     size = f"{len(values.mechanism.links):,} links at {int(np.prod(values.batch)):,} positions"
     return f"What follows from the motion was not evaluated ({size}): {call} does it."
@@ -127,7 +196,7 @@ def _asked(values: Values, call: str) -> str:
 class PairResult(Shown):
     """Values of one pair; see the properties."""
 
-    def __init__(self, values: Values, index: int) -> None:
+    def __init__(self, values: Trajectory, index: int) -> None:
         self._values, self._index = values, index
 
     def document(self) -> Document:
@@ -236,7 +305,7 @@ def pair_units(units: Mapping[str, str], row: PairType) -> dict[str, Any]:
 class CouplingResult(Shown):
     """Values of one coupling ``sum c_i q_i = constant``."""
 
-    def __init__(self, values: Values, index: int) -> None:
+    def __init__(self, values: Trajectory, index: int) -> None:
         self._values, self._index = values, index
 
     def document(self) -> Document:
@@ -283,7 +352,7 @@ class CouplingResult(Shown):
 class LinkResult(Shown):
     """Motion of one link in the global frame."""
 
-    def __init__(self, values: Values, index: int) -> None:
+    def __init__(self, values: Trajectory, index: int) -> None:
         self._values, self._index = values, index
 
     def document(self) -> Document:
