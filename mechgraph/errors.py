@@ -21,10 +21,6 @@ MOST_FAULTS = 30
 """Faults that a message lists."""
 MOST_NAMES = 30
 """Names that a fault lists."""
-LONGEST_NAME = 100
-"""Characters of a wrong name that are compared with known ones."""
-LONGEST_FAULT = 2000
-"""Characters of one fault: what was given may be of any size."""
 
 HIDDEN = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 """Characters that a terminal obeys instead of showing them, that turn the direction of a text, or that cannot be encoded."""
@@ -44,7 +40,8 @@ def listed(names: Iterable[object], most: int = MOST_NAMES) -> str:
 
 def near_names(name: str, known: Iterable[str], least: float = 0.5) -> list[str]:
     """The known names, at most four, that may be meant by a wrong one: as like it as ``least`` (1: the same) or more."""
-    return difflib.get_close_matches(name[:LONGEST_NAME], list(known), n=4, cutoff=least)
+    # characters of a wrong name that are compared with known ones
+    return difflib.get_close_matches(name[:100], list(known), n=4, cutoff=least)
 
 
 def did_you_mean(near: Sequence[str]) -> str:
@@ -60,7 +57,8 @@ def counted(number: int, name: str) -> str:
 
 def shortened(text: str) -> str:
     """A text without its middle, where it is too long to be read."""
-    half = LONGEST_FAULT // 2
+    # characters of one fault: what was given may be of any size
+    half = 2000 // 2
     left_out = len(text) - 2 * half
     return f"{text[:half]} ... ({left_out} characters) ... {text[-half:]}" if left_out > 0 else text
 

@@ -56,8 +56,6 @@ from mechgraph.outcome import FollowedPositions, Options, Outcome, Starts
 from mechgraph.quantities import door
 from mechgraph.result.solution import Solution
 
-CLOSING = 1e-13
-"""Part of the condition number within which a start is not told from a dead point: some hundred roundings of its closing."""
 Made = TypeVar("Made")
 
 
@@ -183,7 +181,9 @@ class Pipeline:
         f = self.solver.factored(here, self.solver.chosen(here, np.full(1, -1)))
         if f.condition[0] <= PATH.singular and not self.freedoms.undriven:
             near = distance_to_dead_point(here, f, columns)[0]
-            if f.condition[0] < PATH.doubtful or near > CLOSING * f.condition[0]:
+            # part of the condition number within which a start is not told from a dead point: some hundred roundings of its
+            # closing
+            if f.condition[0] < PATH.doubtful or near > 1e-13 * f.condition[0]:
                 return
         ways = branches(self.system, self.x, columns, self.freedoms.passive)
         if ways:
@@ -270,8 +270,6 @@ ReachName = Literal["raise", "flag"]
 RedundantName = Literal["nan", "minimum_norm"]
 ON_REACH: tuple[ReachName, ...] = ("raise", "flag")
 REDUNDANT: tuple[RedundantName, ...] = ("nan", "minimum_norm")
-AXES_TRIED = 4
-"""Axes of spheres that are tried for a path: each keeps far from what is known of it, which may be a part."""
 SOLVED = (Status.OK.value, Status.CHANGE_POINT.value, Status.ACTUATORS_REST.value)
 """Outcomes that are no reason to raise."""
 DEAD = "At a dead point the drivers do not determine the motion; drive another freedom, leave the position out, or use on_reach='flag'"
@@ -428,7 +426,8 @@ def _run(
     m: Mechanism, motions: Mapping[str, Any] | None, options: Options, actuate: Iterable[str] | None
 ) -> tuple[Mechanism, Pipeline, Outcome]:
     """All positions; again with other axes of spheres where some of them, or what ends the path, lie beside poles: of that mechanism."""
-    for _ in range(AXES_TRIED):
+    # axes of spheres that are tried for a path: each keeps far from what is known of it, which may be a part
+    for _ in range(4):
         line = Pipeline(DriverMotion(m, motions, actuate), options)
         outcome = line.run()
         meant_with = m.changes.tol if isinstance(m, SnappedMechanism) else None

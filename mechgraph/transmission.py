@@ -33,9 +33,6 @@ from mechgraph.result.solution import Solution
 from mechgraph.result.values import OK, ranges
 from mechgraph.result.views import PositionLabels
 
-UNMOVED = 1e-12
-"""What wrenches on the output could do for a unit effort, below which nothing is transmitted."""
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Transmission(Shown):
@@ -175,7 +172,8 @@ def _index(s: Solution, output: str, drivers: tuple[str, ...]) -> Array:
         does = does + (F * v).sum(axis=-1) + (M * w).sum(axis=-1)
         could = could + _size(F) * _size(v) + _size(M) * _size(w)
     efforts = [s[m.pairs[i].name].effort[..., n] for i, n in map(m.freedom, drivers)]
-    held = np.isfinite(np.sum(efforts, axis=0)) & (could > UNMOVED)
+    # what wrenches on the output could do for a unit effort, below which nothing is transmitted
+    held = np.isfinite(np.sum(efforts, axis=0)) & (could > 1e-12)
     return np.where(held, np.minimum(np.abs(does) / np.where(held, could, 1.0), 1.0), np.nan)
 
 

@@ -79,14 +79,11 @@ def _values(texts: Sequence[str], turns: bool, where: str) -> list[float]:
     return out
 
 
-MANY_TURNS = 2.0
-"""Turns from which on an angle typed without a unit is more likely meant in degrees."""
-
-
 def _doubt(texts: Sequence[str], values: Sequence[float], where: str) -> None:
     """Warn of angles typed without a unit that are many turns."""
     most = max(values, key=abs) / (2 * np.pi)
-    if abs(most) > MANY_TURNS and not any(_number(text, where)[1] for text in texts):
+    # turns from which on an angle typed without a unit is more likely meant in degrees
+    if abs(most) > 2.0 and not any(_number(text, where)[1] for text in texts):
         as_degrees = f"{texts[-1].strip()}deg"
         warnings.warn(
             f"{where}: read as radians, {most:.4g} turns; where degrees are meant write {as_degrees}, where radians {texts[-1].strip()}rad",

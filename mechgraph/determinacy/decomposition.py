@@ -95,7 +95,8 @@ class Constraints:
         _, s, Vt = np.linalg.svd(A)
         rank = int((s > RANKS.position * s[0]).sum()) if s.size else 0
         motions = Vt[rank:].reshape(-1, len(mine), self.b)
-        still = np.abs(motions).max(axis=(0, 2), initial=0.0) < AT_REST
+        # part of a motion of size one below which a link stands still
+        still = np.abs(motions).max(axis=(0, 2), initial=0.0) < 1e-7
         return {link for link, at_rest in zip(mine, still, strict=True) if not at_rest}
 
     def determined(self, links: Iterable[int], solved: Iterable[int]) -> set[int]:
@@ -148,10 +149,6 @@ class LinkRows(Constraints):
                     rows[a], rows[b] = rows.get(a, 0.0) - row, rows.get(b, 0.0) + row
             out.append(Constraint(len(self.position.graph.ends) + i, rows))
         return out
-
-
-AT_REST = 1e-7
-"""Part of a motion of size one below which a link stands still."""
 
 
 MOST_SPLIT = 40

@@ -42,9 +42,6 @@ from mechgraph.maths.se3 import Array, Index, skew
 from mechgraph.maths.tolerances import MOTIONS, RANKS
 from mechgraph.model.parameters import Parameters
 
-MOST_MOTIONS = 200
-"""Mobility up to which the motions of pairs of other kinds are looked at."""
-
 
 @dataclass(frozen=True)
 class Kind:
@@ -129,7 +126,8 @@ def kind_of_mechanism(freedoms: Freedoms, motion: FiniteMotion | None) -> Kind:
     """The kind of all pairs, else of the motions beside the passive ones at a position nearby."""
     rows = freedoms.position.rows
     kind = kind_of(rows.S)
-    look = motion and not kind.name and freedoms.mobility <= MOST_MOTIONS
+    # mobility up to which the motions of pairs of other kinds are looked at
+    look = motion and not kind.name and freedoms.mobility <= 200
     nearby = motion.closure_nearby if motion and look else None
     if nearby is None:
         return kind
@@ -156,9 +154,6 @@ def _moves_so(kind: Kind, freedoms: Freedoms, nearby: ClosureRank) -> bool:
 
 COLUMNS = ("Tx", "Ty", "Tz", "Rx", "Ry", "Rz")
 """Columns of a mobility table."""
-MOTION_STEPS = (0.02, 0.06, 0.11, 0.17, -0.04, -0.09, -0.15)
-"""Lengths (radians, or lengths / L) of the steps along a motion at which the links are looked at."""
-DIRECTIONS_SEED = 19
 SPAN = 1e-6
 """Singular value of twists of size one below which they do not span a direction: a direction that bends by the square of a step shows."""
 
@@ -336,12 +331,13 @@ def _along(freedoms: Freedoms, driven: Index, motion: FiniteMotion) -> list[Free
     if not motion.begin or not motion.mobility:
         return []
     start, _ = motion.begin
-    rng = np.random.default_rng(DIRECTIONS_SEED)
+    rng = np.random.default_rng(19)
     system = start.system
     out = []
     for _ in range(1 if start.N.shape[1] == 1 else 3):
         v = start.random(rng)
-        reached = [start.moved(np.sign(h) * v, abs(h)) for h in MOTION_STEPS]
+        # lengths (radians, or lengths / L) of the steps along a motion at which the links are looked at
+        reached = [start.moved(np.sign(h) * v, abs(h)) for h in (0.02, 0.06, 0.11, 0.17, -0.04, -0.09, -0.15)]
         out += [freedoms_at(Position.at(Configuration(system, x[:, None])), driven) for x in reached if x is not None]
     return out
 

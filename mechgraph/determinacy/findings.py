@@ -641,6 +641,3 @@ def variants(m: Mechanism, freedoms: Freedoms, driven: Index, engine: EngineName
         e = effect(freedoms, driven, chosen, engine)
         if e.redundancy[1] == 0 and e.mobility[1] == e.mobility[0]:
             yield Advice(e.text, tuple(item for item, *_ in e.changes), effect=e, mechanism=m)
-
-
-"""Most freedoms named for one motion."""

@@ -55,18 +55,10 @@ STROKE = 0.35
 """Length over which a motion is followed."""
 RESOLUTION = 0.01
 """Parts in which that length is given: just where it ends is a matter of step control."""
-STEP_KEPT = 0.5
-"""Part of a step in one direction that must be left for it to count: about 1 on a motion, 0 where it returns."""
 MOVED = 0.05
 """Part of a step that must be left for the position reached to count as another one."""
-RANDOM_STEPS = 6
-"""Random steps away from a position that is not regular."""
-FROZEN = 12
-"""Corrections with the equations of the position left."""
 SLOW = 0.2
 """Part of the closure error that such a correction may leave."""
-MOST_GIVEN = 200
-"""Freedoms up to which a motion is followed with all of them given; of more a trial step says enough, and takes no gigabytes of rates."""
 STEPS_SEED = 7
 
 
@@ -123,7 +115,8 @@ class _Closed:
 
     def steps(self, rng: np.random.Generator) -> Iterator[tuple[Array, Array]]:
         """States to which random steps lead, and the increments from here; those that do not close or come back left out."""
-        for _ in range(RANDOM_STEPS):
+        # random steps away from a position that is not regular
+        for _ in range(6):
             x = self.moved(self.random(rng), TRIAL_STEPS[0])
             if x is not None and np.abs(self.change(x)).max() > MOVED * TRIAL_STEPS[0]:
                 yield x, self.change(x)
@@ -149,7 +142,8 @@ class _Closed:
     def dimension(self) -> int:
         """Number of directions in which a step is kept."""
         table = np.stack([self.kept(v, TRIAL_STEPS[1]) for v in np.eye(self.N.shape[1])])
-        return int((np.linalg.svd(table, compute_uv=False) > STEP_KEPT).sum())
+        # part of a step in one direction that must be left for it to count: about 1 on a motion, 0 where it returns
+        return int((np.linalg.svd(table, compute_uv=False) > 0.5).sum())
 
     def followed(self, v: Array) -> float:
         """Length over which the motion ``N v`` goes on with the loops closed, as many single freedoms given as move independently.
@@ -158,7 +152,9 @@ class _Closed:
         """
         single = np.flatnonzero(self.system.single_rows >= 0)
         given = np.array(independent_rows(self.N, single.tolist(), self.N.shape[1]), dtype=np.intp)
-        if len(given) > MOST_GIVEN:
+        # freedoms up to which a motion is followed with all of them given; of more a trial step says enough, and takes no
+        # gigabytes of rates
+        if len(given) > 200:
             return 0.0
         ahead = STROKE * self.increments(v)[given]
         if not np.abs(ahead).max(initial=0.0) > MOVED * TRIAL_STEPS[0]:
@@ -252,7 +248,8 @@ def _near_by(start: _Closed, rng: np.random.Generator) -> FiniteMotion:
 def _corrected(system: System, x: Array, rows: ReducedRows) -> Array | None:
     """The loops closed from ``x`` in the kept rows of a nearby position alone; None where that does not converge quickly."""
     before, goal = np.inf, max(CLOSURE_GOAL, rows.rounding)
-    for _ in range(FROZEN):
+    # corrections with the equations of the position left
+    for _ in range(12):
         residual = Configuration(system, x[:, None]).residual[:, 0]
         error = float(np.abs(rows.kept_part(residual[:, None])).max(initial=0.0))
         if error <= goal or (error < 10 * goal and error > SLOW * before):
@@ -264,14 +261,8 @@ def _corrected(system: System, x: Array, rows: ReducedRows) -> Array | None:
     return None
 
 
-STARTS = 64
-"""Random starts of the search; k self-stresses that are not those of a regular position allow 2^k branches."""
-STARTS_SEED = 5
-"""Of these starts."""
 BRANCH_RESIDUAL = 1e-9
 """Residual of a branch."""
-FREEDOMS_LISTED = 8
-"""Most freedoms listed of a branch."""
 MOST_BRANCHES = 16
 """Most branches that are told apart."""
 BRANCHING_MOTIONS = 24
@@ -330,7 +321,8 @@ def branches(
         N = U[:, s > 0.5]
     if found.rank == found.count or N.shape[1] > BRANCHING_MOTIONS:
         return ()
-    rng = np.random.default_rng(STARTS_SEED)
+    # of these starts
+    rng = np.random.default_rng(5)
     # so many random combinations of the self-stresses say as much about N.shape[1] motions as all of them
     stress = found.random_stress(rng, min(found.count - found.rank, N.shape[1] + 1))
     ways = _ways(_Curvature(system, x, N, stress, N[columns]), rng)
@@ -350,7 +342,8 @@ def branches(
 
 def _ways(curvature: _Curvature, rng: np.random.Generator) -> list[Array]:
     """The rates ``(F,)`` that have no residual, found from random starts."""
-    first = rng.normal(size=(curvature.N.shape[1], STARTS))
+    # random starts of the search; k self-stresses that are not those of a regular position allow 2^k branches
+    first = rng.normal(size=(curvature.N.shape[1], 64))
     a, error = closest_zeros(curvature.at, _CurvaturePoint.steps, np.add, first, tolerance=BRANCH_RESIDUAL)
     ways: list[Array] = []
     for one in (curvature.N @ a[:, error < 1e3 * BRANCH_RESIDUAL]).T:
@@ -361,7 +354,8 @@ def _ways(curvature: _Curvature, rng: np.random.Generator) -> list[Array]:
 
 def branches_text(ways: Sequence[dict[str, float]], driver: str) -> str:
     """Branches by the rates of the freedoms in which they differ, in words."""
-    differ = [name for name in ways[0] if np.ptp([way[name] for way in ways]) > SAME][:FREEDOMS_LISTED]
+    # most freedoms listed of a branch
+    differ = [name for name in ways[0] if np.ptp([way[name] for way in ways]) > SAME][:8]
     texts = [
         (f"{driver} at rest, " if not way[driver] else "")
         + ", ".join(f"{n} {way[n]:.4g}" for n in differ if n != driver)

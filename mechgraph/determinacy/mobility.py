@@ -164,8 +164,6 @@ class Position:
 
 DIFFERENCE_STEP = 1e-4
 """Step of the central differences that tell whether a pair element leaves its place."""
-LONGEST_SERIES = 40
-"""Pairs of one series up to which any two are tried as a border; in longer ones neighbours only."""
 
 
 @dataclass(frozen=True)
@@ -307,7 +305,8 @@ def _sets(search: _Search, left: Array) -> Iterator[tuple[int, ...]]:
             seen.add(links)
             yield links
     for in_series in search.series():
-        few = len(in_series) <= LONGEST_SERIES
+        # pairs of one series up to which any two are tried as a border; in longer ones neighbours only
+        few = len(in_series) <= 40
         for one, two in combinations(in_series, 2) if few else pairwise(in_series):
             if search.common_twist(one, two):
                 cut = search.cut_off(one, two)

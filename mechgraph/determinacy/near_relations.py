@@ -25,8 +25,6 @@ COMPLEX_STEP = 1e-30
 """Step of the complex-step derivatives: exact, as the residuals are analytic."""
 LONG = 10.0
 """Lengths of fewer tolerances than this are not compared."""
-LONGEST_ARM = 10.0
-"""Longest arm (over L) that counts: lines that come nearest farther away are as good as parallel."""
 
 
 @dataclass(frozen=True)
@@ -152,7 +150,8 @@ class Relations:
         for a, i in enumerate(placed):
             rest = np.array(placed[a + 1 :], dtype=np.intp)
             apart, arms = self._apart(i, rest, 2 * tol)
-            near = (apart <= tol * (2.0 + np.minimum(arms, LONGEST_ARM))) & (self.owner[rest] != self.owner[i])
+            # longest arm (over L) that counts: lines that come nearest farther away are as good as parallel
+            near = (apart <= tol * (2.0 + np.minimum(arms, 10.0))) & (self.owner[rest] != self.owner[i])
             for j, miss in zip(rest[near].tolist(), apart[near].tolist(), strict=True):
                 f, g = self.features[i], self.features[j]
                 if f.is_line and g.is_line:

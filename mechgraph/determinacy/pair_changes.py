@@ -44,7 +44,6 @@ CHANGES_SHOWN = 6
 """Largest number of single changes, and of sets of changes, reported."""
 LARGEST_FOR_SETS = 120
 """Redundancy up to which sets of changes that remove all of it are sought; the work grows as its cube (half a second here)."""
-CHANGES_SEED = 29
 
 EFFORTS = {"C": 0, "S": 0, "Sg": 1, "U": 1}
 """How hard pair types are to build: locating and floating bearings first, then what is both, or has two pins; then the others."""
@@ -135,7 +134,7 @@ def building_effort(old: PairType, new: PairType) -> int:
 def stresses_of(freedoms: Freedoms) -> Array:
     """Orthonormal self-stresses (drivers free) in the closure rows: all of them where sets of changes are sought, else random ones."""
     count = freedoms.redundancy if freedoms.redundancy <= LARGEST_FOR_SETS else PROBES
-    return np.linalg.qr(freedoms.closure.random_stress(np.random.default_rng(CHANGES_SEED), count))[0]
+    return np.linalg.qr(freedoms.closure.random_stress(np.random.default_rng(29), count))[0]
 
 
 def changes_of(freedoms: Freedoms) -> list[Change]:
@@ -259,9 +258,6 @@ def effect(before: Freedoms, driven: Index, changes: tuple[Change, ...], engine:
 CYLINDER = ("S", "C", "S")
 """Pair types of a cylinder that carries force along its line alone: ball joint, piston in a round bore, ball joint."""
 
-BEAM = 12
-"""Partial sets of changes kept while searching."""
-
 
 def relieving(
     position: Position, changes: list[Change], redundancy: int, until: float
@@ -361,7 +357,8 @@ def _complete_sets(
         if grown and grown[0][0] > most:
             most, largest = grown[0][0], []
         largest = [(*mine.chosen, i) for removed, mine, i in grown[:2] if removed == most] + largest
-        going = [(mine, i) for removed, mine, i in grown if removed < redundancy][:BEAM]
+        # partial sets of changes kept while searching
+        going = [(mine, i) for removed, mine, i in grown if removed < redundancy][:12]
         beam = [mine.with_change(i, items, added) for mine, i in going]
     return [tuple(exact[i] for i in s) for s in complete], [tuple(exact[i] for i in s) for s in largest]
 
@@ -429,10 +426,6 @@ def _completed(chosen: list[Change], exact: list[Change]) -> list[Change]:
     return out
 
 
-TRIED = 2
-"""Most shafts for which the effect is computed, each on a mechanism of its own."""
-
-
 def with_spline(m: Mechanism, link: str) -> Mechanism:
     """The mechanism with a spline in a link of two pairs, along the line of their points.
 
@@ -472,7 +465,8 @@ def splines(freedoms: Freedoms, driven: Index, engine: EngineName = "auto") -> I
             continue
         line = points[:, pairs[1]] - points[:, pairs[0]]
         length = float(np.linalg.norm(line))
-        if tried == TRIED or length < MOTIONS.still:
+        # most shafts for which the effect is computed, each on a mechanism of its own
+        if tried == 2 or length < MOTIONS.still:
             continue
         if np.abs(line @ states[:, pairs[0]]).max(initial=0.0) > STRESSES.relieved * length:
             tried += 1
@@ -539,8 +533,6 @@ def _sets(exact: list[Change], bases: list[Array], redundancy: int, size: int) -
 
 Item = TypeVar("Item")
 
-BY_SPLINE = 1
-"""How hard a spline is to build (see ``pair_changes.EFFORTS``)."""
 FREEING = 3
 """Changes reported that let a structure move."""
 FEW_CHANGES, LARGEST_SET = 80, 3
@@ -577,7 +569,8 @@ def advice(
                 continue
             if new.inputs[1] == new.inputs[0] and new.redundancy[1] < new.redundancy[0] and new not in effects:
                 found.append((max(c.effort for c in chosen), new))
-        found += [(BY_SPLINE, new) for new in timely(splines(freedoms, driven, engine), until)]
+        # how hard a spline is to build (see ``pair_changes.EFFORTS``)
+        found += [(1, new) for new in timely(splines(freedoms, driven, engine), until)]
         found.sort(key=lambda item: (item[0] == PLANE, item[1].redundancy[1] > 0, item[0]))
         threes = [tuple(position.m.pairs[k].name for k in three) for three in cylinders(position)]
         effects += [replace(new, cylinders=_among(threes, new)) for _, new in found]

@@ -36,8 +36,6 @@ from mechgraph.maths.se3 import Array, Index, cross
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Declared
 
-FIRMLY_MEANT = (0.25, 0.0625)
-"""Parts of the tolerance: relations that are nearer than others stay, where not all let the mechanism move."""
 SLACK = 1.001
 """A tolerance is met up to this factor: it may be the printed size of the change itself."""
 MANY = 0.7
@@ -46,20 +44,12 @@ ROUNDS = 25
 """Most linearizations; each leaves a part of the size of the change."""
 NEARER, FARTHER = 0.12, 0.3
 """Steps between the positions along a motion: at first, and once the loops close at those."""
-LOOSE = 1e-10
-"""Hundredth of the residual with which positions near the start, which tell little from each other, lead on to farther ones."""
 POSITIONS = 5
 """Positions along a motion each way."""
-DIRECTIONS = 4
-"""Random motions that are followed, each both ways; one where there is but one."""
 MOST_ROWS = 60
 """Closure rows up to which motions are followed: dense decompositions. Larger mechanisms are left to the relations."""
 FAR = 4.0
 """Tolerances beyond which a change on the way is given up: the first linearizations overshoot."""
-DENSE = 1200
-"""Numbers to be changed from which on relations are met by an iterative least-norm solution."""
-SEARCH_SEED = 11
-"""Seed of these motions."""
 
 
 TOOK_TOO_LONG = "the search took longer than it may"
@@ -78,7 +68,8 @@ def least_change(placed: PlacedPairs, tol: float) -> tuple[Array, tuple[Relation
     change, met, dropped = _meeting(placed, found, found.near(tol), tol)
     if placed.system.n_rows > MOST_ROWS:
         return change, met, dropped, False
-    sure = [{r.text for r in found.near(tol * part)} for part in FIRMLY_MEANT]
+    # parts of the tolerance: relations that are nearer than others stay, where not all let the mechanism move
+    sure = [{r.text for r in found.near(tol * part)} for part in (0.25, 0.0625)]
     sets = dict.fromkeys((met, *(tuple(r for r in met if r.text in texts) for texts in sure), ()))
     for mobility in range(_mobility(declared, placed.x, tol), _mobility(placed.changed(change), placed.x, 0.0), -1):
         for relations in sets:
@@ -171,7 +162,8 @@ def _solved(
 
 def _least_norm(A: scipy.sparse.csr_array, b: Array, cut: float) -> Array:
     """The smallest ``x`` with least ``|A x - b|``; singular values below ``cut`` times the largest are dropped."""
-    if A.shape[1] > DENSE:
+    # numbers to be changed from which on relations are met by an iterative least-norm solution
+    if A.shape[1] > 1200:
         return np.asarray(
             scipy.sparse.linalg.lsmr(A, b, atol=1e-15, btol=1e-15, conlim=1 / cut, maxiter=20 * A.shape[0])[0]
         )
@@ -192,7 +184,9 @@ def _moving(
         if states is None:
             return None
         change, rest = _solved(placed, partial(_rows_along, placed, found, relations, states, rank), change, FAR * tol)
-        if rest.max() > (LOOSE if step == NEARER else EXACT) * 100 or np.max(placed.moved(change)) > SLACK * tol:
+        # hundredth of the residual with which positions near the start, which tell little from each other, lead on to farther
+        # ones
+        if rest.max() > (1e-10 if step == NEARER else EXACT) * 100 or np.max(placed.moved(change)) > SLACK * tol:
             return None
     return change
 
@@ -208,9 +202,11 @@ def _rows_along(
 
 def _followed(system: System, x: Array, rank: int, step: float, open_: float) -> Array | None:
     """States ``(nx, T)`` along the motions that are left where only ``rank`` rows count, as far as the loops close to ``open_``."""
-    rng = np.random.default_rng(SEARCH_SEED)
+    # seed of these motions
+    rng = np.random.default_rng(11)
     mobility, out = system.n_freedoms - rank, []
-    for _ in range(DIRECTIONS if mobility > 1 else 1):
+    # random motions that are followed, each both ways; one where there is but one
+    for _ in range(4 if mobility > 1 else 1):
         wish = rng.normal(size=system.n_freedoms)
         for sign in (1.0, -1.0):
             at, way = x[:, None], sign * wish

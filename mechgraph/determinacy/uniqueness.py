@@ -157,10 +157,6 @@ def labels_of(pair: Pair, driven: Index) -> list[Label]:
     return out + [(pair.name, f"effort {pair.type.freedoms[j].name}") for j in driven]
 
 
-COMBINED = 300
-"""Number of components of a group up to which combinations across pairs are computed."""
-
-
 @dataclass(frozen=True, repr=False)
 class SelfStress:
     """A reaction state without load: coefficients by ``pair:component``, the largest 1, moments divided by L so that they compare."""
@@ -253,7 +249,8 @@ def combinations(basis: Basis, labels: list[Label], known: set[int]) -> tuple[tu
     for group in range(basis.groups):
         mine = basis.states[:, starts[group] : starts[group + 1]]
         touched = [int(i) for i in np.unique(mine.indices[np.abs(mine.data) > STRESSES.shown]) if int(i) not in known]
-        if len(touched) > COMBINED or group in basis.partly:
+        # number of components of a group up to which combinations across pairs are computed
+        if len(touched) > 300 or group in basis.partly:
             unsought += 1
             continue
         rows = mine.tocsr()[touched].toarray()
@@ -301,10 +298,6 @@ def _echelon(columns: Array) -> Array:
         A -= pivot[:, :, None] * A[each, i][:, None, :]
         A[:, :, done] = pivot
     return A
-
-
-ZERO_ENTRY = 5e-13
-"""Entry of a unit direction that counts as zero for its sign."""
 
 
 @dataclass(frozen=True)
@@ -387,7 +380,8 @@ def _named(components: Components, pair: int, kind: str, axes: Index, unique: Ar
     inner = null_space(unique.T, 1e-9) if across else unique
     direction = np.zeros(3)
     direction[axes] = inner[:, 0]
-    direction = np.where(np.abs(direction) < ZERO_ENTRY, 0.0, direction)
+    # entry of a unit direction that counts as zero for its sign
+    direction = np.where(np.abs(direction) < 5e-13, 0.0, direction)
     direction = direction * np.sign(direction[np.flatnonzero(direction)[0]])
     name = components.system.m.pairs[pair].name
     return UniqueDirection(name, kind, tuple(direction.tolist()), across, tuple((R @ direction).tolist()))
@@ -407,8 +401,6 @@ def _dependent(unique: Array, rows: list[int]) -> list[int]:
     return chosen
 
 
-BASIS = 48
-"""Number of self-stresses up to which all of them tell what is unique; more are represented by random ones."""
 CONNECTING = 200
 """Number of self-stresses that connect loops up to which they are computed; their echelon form is dense, of that width."""
 
@@ -578,7 +570,8 @@ def uniqueness(
     """
     components = Components(here, driven)
     closure = closure or closure_rank(here, driven, engine)
-    few = closure.count - closure.rank <= BASIS
+    # number of self-stresses up to which all of them tell what is unique; more are represented by random ones
+    few = closure.count - closure.rank <= 48
     probes = closure.orthonormal_stress() if few else closure.random_stress(np.random.default_rng(SEED), PROBES)
     coefficients = np.abs(here.system.coupling_matrix[:, :, 0]).max(axis=1, initial=0.0)
     multipliers = probes[6 * here.system.graph.n_loops :]

@@ -219,7 +219,8 @@ def _least_on_flanks(
     flank = wrenches.multipliers
     if not lines:
         return _least(here, wrenches, f, task, lines, flank), flank
-    for _ in range(FLANKS):
+    # how often flanks are changed in search of multipliers of least norm
+    for _ in range(3):
         found = _least(here, _relieved(wrenches, lines, flank), f, task, lines, flank)
         moved = ((found.multipliers < 0.0) != (flank < 0.0)).any(axis=0)
         if not moved.any():
@@ -299,10 +300,6 @@ def _stress(here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: F
     """The self-stresses of total wrenches, orthonormal where they are all there are."""
     split = orthonormal_stress if f.complete else split_stress
     return split(here, wrenches.stress, wrenches.multiplier_stress, _acting(here, task))
-
-
-FLANKS = 3
-"""How often flanks are changed in search of multipliers of least norm."""
 
 
 def _least_multipliers(

@@ -160,8 +160,6 @@ class PairFrames:
         return np.asarray(np.einsum("ijt,j...t->i...t", batch_last(inverse), shifted)[: 6 - g.row.f])
 
 
-ENTRIES_TOGETHER = 4_000_000
-"""Largest number of matrix entries solved in one batch."""
 BAD_CONDITION = 1e8
 """Condition number above which other independent rows and columns are chosen."""
 
@@ -287,7 +285,8 @@ def _by_choice(f: Formulation, state: State, T: int) -> tuple[Array, Array]:
     rows, cols, _, _ = f.pattern
     entries, right = f.entries(state), f.right_side(state)
     shape = (len(f.equations), len(f.unknowns))
-    size = max(1, ENTRIES_TOGETHER // max(1, shape[0] * shape[1]))
+    # largest number of matrix entries solved in one batch
+    size = max(1, 4_000_000 // max(1, shape[0] * shape[1]))
     known: list[Choice] = []
     parts = []
     for begin in range(0, T, size):

@@ -260,12 +260,6 @@ def stretches(values: Trajectory, below: Mask, of: Array) -> Iterator[Stretch]:
         yield Stretch(first, end - 1, *at, where, float(-np.nanmin(fact[first:end])))
 
 
-PULL = 1e-10
-"""Part of the greatest normal force of a contact below which a pull is rounding."""
-STANDS = 1e-10
-"""Part of the greatest velocity of a link at a contact below which it is rounding."""
-
-
 def place_of_contact(values: Trajectory, name: str) -> int:
     """The number of the pair of that name.
 
@@ -353,7 +347,8 @@ class ContactResult(ContactGeometry, Shown):
         pushed = np.asarray(self._sense * self._parts[..., 0])
         if not (self._pair.closed == "force" or (not self._pair.closed and is_open(self._pair))):
             return np.zeros(pushed.shape, dtype=bool)
-        least = PULL * float(np.nanmax(np.linalg.norm(self._parts, axis=-1), initial=0.0))
+        # part of the greatest normal force of a contact below which a pull is rounding
+        least = 1e-10 * float(np.nanmax(np.linalg.norm(self._parts, axis=-1), initial=0.0))
         return np.asarray(pushed < -least)
 
     @property
@@ -511,7 +506,8 @@ class ContactResult(ContactGeometry, Shown):
         dV = self._values.link(m.place_of_link(link))[2]
         a = dV[..., 3:] + np.cross(dV[..., :3], point) + np.cross(w, v)
         size = np.linalg.norm(v, axis=-1, keepdims=True)
-        return np.where(size <= STANDS * np.nanmax(size, initial=0.0), a, v)
+        # part of the greatest velocity of a link at a contact below which it is rounding
+        return np.where(size <= 1e-10 * np.nanmax(size, initial=0.0), a, v)
 
 
 def _between(radius: float, k: Array) -> Array:

@@ -276,8 +276,6 @@ def about_origin(one: PointLoad) -> Array:
 
 FIRST_NODE = 900_001
 """Number of the first node of a deck: beyond those of a mesh."""
-LONGEST_LINE = 120
-"""Characters of a comment in a deck."""
 Path = str | os.PathLike[str]
 
 
@@ -457,7 +455,8 @@ class _Deck:
             max((float(np.abs(w[part]).max()) for _, w in wrenches), default=0.0) for part in (slice(3, 6), slice(0, 3))
         )
         arm = max(float(np.linalg.norm(one.point)) for one in self.body.acting)
-        floor = NOT_WRITTEN * np.repeat([max(moment, arm * force), force], 3)
+        # part of the largest force or moment of a case below which one is not written
+        floor = 1e-14 * np.repeat([max(moment, arm * force), force], 3)
         applied: dict[tuple[int, int], float] = {}
         held: dict[tuple[int, int], float] = {}
         for one, wrench in wrenches:
@@ -505,8 +504,6 @@ def _listed(loads: dict[tuple[int, int], float]) -> list[tuple[int, int, float]]
 
 _ARMS = np.kron(np.eye(3), [[1.0], [-1.0]])
 """Where the six nodes of couples stand around theirs."""
-NOT_WRITTEN = 1e-14
-"""Part of the largest force or moment of a case below which one is not written."""
 
 
 def _line(*values: float) -> str:
@@ -527,7 +524,8 @@ def _named(body: BalancedLoads, case: Case) -> str:
 
 def _comment(text: str) -> list[str]:
     """A text as comment lines."""
-    return [f"** {line}" for line in textwrap.wrap(plain(text), LONGEST_LINE - 3)]
+    # characters of a comment in a deck
+    return [f"** {line}" for line in textwrap.wrap(plain(text), 120 - 3)]
 
 
 FORMATS = (

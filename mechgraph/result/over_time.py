@@ -29,8 +29,6 @@ SAME_TIME = 1e-6
 """Part of the duration by which drivers may disagree about the time of a position."""
 RETURNED = 1e-6
 """Part of the range of a coordinate (at least 1 rad for a turn) within which it is back where it was."""
-STEPS_TO_CLOSE = 2.0
-"""So many of its largest steps may part the last value of a coordinate from the first where the end of a cycle is left out."""
 
 
 @dataclass(frozen=True)
@@ -143,10 +141,9 @@ def _returned(values: Array, name: str, s: Solution, ended: bool) -> bool:
     if np.isfinite(period):
         gap -= period * round(gap / period)
     size = float(np.ptp(values)) + float(np.abs(values).max())
+    # so many of its largest steps may part the last value of a coordinate from the first where the end of a cycle is left out
     return abs(gap) <= (
-        RETURNED * max(size, 1e-300)
-        if ended
-        else STEPS_TO_CLOSE * float(np.abs(np.diff(values)).max()) + RETURNED * size
+        RETURNED * max(size, 1e-300) if ended else 2.0 * float(np.abs(np.diff(values)).max()) + RETURNED * size
     )
 
 
@@ -183,10 +180,6 @@ def _time_of(q: Array, v: Array) -> Array:
         return np.asarray((q - q[0]) / v[0])
     slowness = scipy.interpolate.CubicSpline(q * np.sign(q[-1] - q[0]), 1.0 / np.abs(v))
     return np.asarray(slowness.antiderivative()(slowness.x))
-
-
-DOUBTFUL = 0.01
-"""Part of an RMS value above which its error is said."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -376,7 +369,8 @@ class OverTime(Shown):
 def _with_error(one: Figures) -> str:
     """The RMS value, with its error where that is not small."""
     value, error = float(one.rms), float(one.error)
-    return f"{number(value)} ± {error:.1g}" if error > DOUBTFUL * abs(value) else number(value)
+    # part of an RMS value above which its error is said
+    return f"{number(value)} ± {error:.1g}" if error > 0.01 * abs(value) else number(value)
 
 
 @door

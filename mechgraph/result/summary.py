@@ -31,9 +31,6 @@ from mechgraph.result.values import (
 )
 from mechgraph.result.views import PositionLabels
 
-TIE = 1e-9
-"""Relative difference below which two values share the extreme; the first position is named."""
-
 
 class Greatest:
     """The greatest values ``best (n,)`` of some rows, and the flat places ``at (n,)`` at which they are reached first."""
@@ -45,7 +42,8 @@ class Greatest:
         """Take note of values ``(n, T)`` at places that follow those seen so far; NaN counts for nothing."""
         values = np.where(np.isnan(values), -np.inf, values)
         high = values.max(axis=1)
-        room = TIE * np.abs(values).max(axis=1, where=np.isfinite(values), initial=0.0)
+        # relative difference below which two values share the extreme; the first position is named
+        room = 1e-9 * np.abs(values).max(axis=1, where=np.isfinite(values), initial=0.0)
         first = np.argmax(values >= (high - room)[:, None], axis=1)
         better = high > self.best + room
         self.best = np.where(better, high, self.best)

@@ -76,10 +76,6 @@ class KernelRecords(Protocol):
         """That part, component axes first and positions last."""
 
 
-RETAINED = 40_000
-"""Links times positions up to which motions evaluated again are retained (some 30 MB), as readers ask for one pair after another."""
-
-
 def flat_place(batch: tuple[int, ...], index: Any) -> int:
     """Place in the flat batch of the one position that an index names.
 
@@ -299,7 +295,9 @@ class Trajectory:
     @property
     def _small(self) -> bool:
         """Whether motions that were evaluated are retained."""
-        return len(self.mechanism.links) * self._count <= RETAINED
+        # links times positions up to which motions evaluated again are retained (some 30 MB), as readers ask for one pair after
+        # another
+        return len(self.mechanism.links) * self._count <= 40_000
 
     def _motion(self, places: Index) -> BlockMotion:
         """The motion at some places, evaluated again."""

@@ -60,8 +60,6 @@ def _value(value: float, scale: float) -> str:
 
 
 Mask = NDArray[np.bool_]
-RATES_APART = 1e-6
-"""Difference of rates on two branches from which on they are shown."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -197,8 +195,9 @@ class PassedCrossing:
     def text(self) -> str:
         """The warning in one sentence."""
         at = ", ".join(f"{name} = {value:.6g}" for name, value in self.drivers.items())
+        # difference of rates on two branches from which on they are shown
         ways = [
-            ", ".join(f"{k} {v:.4g}" for k, v in way.items() if abs(v - self.branches[0][k]) > RATES_APART)
+            ", ".join(f"{k} {v:.4g}" for k, v in way.items() if abs(v - self.branches[0][k]) > 1e-6)
             for way in self.branches[1:]
         ]
         ways = [way for way in ways if way]
