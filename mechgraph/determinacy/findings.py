@@ -105,12 +105,6 @@ def plural(count: int, one: str, many: str = "") -> str:
     return f"{count} {one if count == 1 else many or one + 's'}"
 
 
-def listed(names: Sequence[str], most: int = NAMED) -> str:
-    """Names in a row, the first few of many."""
-    more = len(names) - most
-    return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
-
-
 def joined(names: Sequence[str], word: str = "and", most: int = NAMED) -> str:
     """``A, B and C``, the first few of many."""
     shown = [*names[:most], *([f"{len(names) - most} more"] if len(names) > most else [])]
@@ -352,14 +346,9 @@ def loop_facts(
 # --- passive and locked freedoms ------------------------------------------------------------------------------------------
 
 
-def number(value: float) -> str:
-    """A coordinate for people: four digits, no negative zero."""
-    return f"{0.0 if abs(value) < 1e-9 else value:.4g}"
-
-
 def vector(values: tuple[float, ...]) -> str:
-    """A point or direction for people."""
-    return f"({', '.join(number(v) for v in values)})"
+    """A point or direction for people: four digits, no negative zero."""
+    return f"({', '.join(f'{0.0 if abs(v) < 1e-9 else v:.4g}' for v in values)})"
 
 
 def screw_axis(system: System, twist: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:

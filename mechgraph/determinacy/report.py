@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from mechgraph.determinacy import sentences
 from mechgraph.determinacy.facts import Facts, Geometry
-from mechgraph.determinacy.findings import LIMIT, Rounding, component_words, listed, plural, rounding
+from mechgraph.determinacy.findings import LIMIT, Rounding, component_words, plural, rounding
 from mechgraph.determinacy.finite_motion import branches_text
 from mechgraph.determinacy.mobility import FreeMotion, free_motion
 from mechgraph.determinacy.near_relations import EXACT
@@ -23,7 +23,7 @@ from mechgraph.determinacy.sentences import assumed, here_only, kind_line, loop_
 from mechgraph.determinacy.snapping import TOOK_TOO_LONG, SearchEnded, meant
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table, to_markdown, to_text
 from mechgraph.equations.terms import Ledger
-from mechgraph.errors import AssemblyError, DeadPointError, IndeterminateError, MechgraphError
+from mechgraph.errors import AssemblyError, DeadPointError, IndeterminateError, MechgraphError, listed
 from mechgraph.files import Json, json_text, members, plain, schema_of
 from mechgraph.graph.linkgraph import link_graph
 from mechgraph.kernel import build

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from mechgraph.determinacy.facts import Facts
 from mechgraph.determinacy.families import Kind
-from mechgraph.determinacy.findings import KINDS, NAMED, alternatives, component_words, joined, listed, plural, vector
+from mechgraph.determinacy.findings import KINDS, NAMED, alternatives, component_words, joined, plural, vector
 from mechgraph.determinacy.uniqueness import Uniqueness
 from mechgraph.document import Block, Bullets, Document, Paragraph, to_text
+from mechgraph.errors import listed
 from mechgraph.maths.se3 import Index
 from mechgraph.maths.tolerances import RANKS
 from mechgraph.model.pair import second_direction
@@ -178,12 +179,12 @@ def _others(r: Facts, sets: list[Pattern]) -> str:
         return _of_pairs(sets)
     words, turning = KINDS[r.kind.name], any(f.turns for p in r.mechanism.pairs for f in p.type.freedoms)
     names = list(dict.fromkeys(name for _, pairs, _ in sets for name in pairs))
-    which = f" of {listed(names)}" if len(names) < len(r.pairs) else ""
+    which = f" of {listed(names, NAMED)}" if len(names) < len(r.pairs) else ""
     return (words.others if turning else words.without_pins) + which
 
 
 def _of_pairs(sets: list[Pattern]) -> str:
-    shown = [f"{words} of {listed(pairs)}" for words, pairs, _ in sets[:SETS]]
+    shown = [f"{words} of {listed(pairs, NAMED)}" for words, pairs, _ in sets[:SETS]]
     if len(sets) > SETS:
         shown.append(f"others of {plural(sum(len(pairs) for _, pairs, _ in sets[SETS:]), 'further pair')}")
     return "; ".join(shown)
