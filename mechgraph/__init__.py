@@ -7,9 +7,8 @@ from mechgraph import methods
 from mechgraph.determinacy.decomposition import Decomposition, Group
 from mechgraph.determinacy.equivalent import equivalent, multiple_joints, split_joint
 from mechgraph.determinacy.families import Families
-from mechgraph.determinacy.report import DeterminacyReport, check
+from mechgraph.determinacy.report import DeterminacyReport, Structure, check, groups, structure
 from mechgraph.determinacy.snapping import snapped
-from mechgraph.determinacy.structure import Structure, groups, structure
 from mechgraph.equations.build import formulate
 from mechgraph.equations.formulation import Formulation
 from mechgraph.errors import (

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from mechgraph.determinacy.families import kind_of
 from mechgraph.determinacy.mobility import Freedoms, Position, drive_order, single_freedoms
-from mechgraph.determinacy.near_relations import EXACT
 from mechgraph.determinacy.pair_changes import (
     LEFT_OUT,
     RIGID,
@@ -30,7 +29,7 @@ from mechgraph.determinacy.pair_changes import (
     self_aligning_sets,
     with_spline,
 )
-from mechgraph.determinacy.snapping import TOOK_TOO_LONG, SearchEnded, SnappedMechanism, candidates, snapped
+from mechgraph.determinacy.snapping import EXACT, TOOK_TOO_LONG, SearchEnded, SnappedMechanism, candidates, snapped
 from mechgraph.errors import MechgraphError
 from mechgraph.files import patch
 from mechgraph.force.block import hold_at_rest, hold_names, is_idle
