@@ -506,7 +506,7 @@ class Facts(GraphFacts):
     def self_stresses(self) -> tuple[SelfStress, ...]:
         """Reaction states without load, with the declared drivers: a canonical sparse basis.
 
-        Those that connect loops are left out where they are more than ``structure.uniqueness.CONNECTING``.
+        Those that connect loops are left out where they are more than ``determinacy.uniqueness.CONNECTING``.
         """
         return self.reactions.states if self.reactions else ()
 

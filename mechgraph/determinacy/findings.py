@@ -96,7 +96,7 @@ KINDS = {
     ),
     "spherical": KindWords("moments about the centre", "forces through the centre", "forces through the centre"),
 }
-"""By the kind of ``structure.kind``."""
+"""By the kind of ``determinacy.families``."""
 
 
 def plural(count: int, one: str, many: str = "") -> str:

@@ -7,7 +7,7 @@ the redundancy falls by ``rank(S^T n_k)``. A coupling left out adds one freedom 
 Source of the idea: Reshetov, Self-Aligning Mechanisms, 1982.
 
 Sets of changes that together remove redundancy: searched for the smallest, or put together from cylinders between balls and the rest.
-With the power of every change on the self-stresses (``structure.pair_changes``), changes remove as many of them together as the rank of
+With the power of every change on the self-stresses, changes remove as many of them together as the rank of
 their powers one below the other.
 
 Self-aligning variants: all choices of wider pairs that take away the whole redundancy and leave the mobility as it is.

@@ -111,7 +111,7 @@ class BlockForces:
     (6, N, T)`` inertia, applied wrenches and what holds passive bodies (``hold (6, N, T)`` that alone, or None), self-stresses
     ``stress (6, P, s, T)`` with ``stress_efforts (F, s, T)``, ``coupled (F, T)`` efforts of couplings, ``shaking (6, T)``;
     ``balance (T,)`` and ``power (T,)`` the residuals of equilibrium and power, ``largest`` the largest term of each; ``holds`` and
-    ``hold_terms (p, T)`` of the passive motions (see ``force.passive_hold``). ``multipliers (n, T)`` of the closure rows behind those of
+    ``hold_terms (p, T)`` of the passive motions. ``multipliers (n, T)`` of the closure rows behind those of
     the loops with ``multiplier_stress (n, s, T)``, of which ``coupled_stress (F, s, T)`` are the efforts in freedoms.
     """
 
@@ -214,7 +214,7 @@ def _least_on_flanks(
     """See ``_least``; with the signs of the multipliers ``(n, T)`` that tell on which flanks gears touch each other.
 
     Where multipliers are not unique those of least norm may touch on other flanks than the first ones found: then once more on these, and
-    where that does not settle under the condition that they keep the signs of their flanks (see ``force.flanks``).
+    where that does not settle under the condition that they keep the signs of their flanks (see ``force.reactions.least_under_signs``).
     """
     flank = wrenches.multipliers
     if not lines:

@@ -40,7 +40,7 @@ NOT_FINITE = "gives a value that is not finite at some position; check its calla
 class Site:
     """Collects loads on links and efforts in freedoms; speaks the user's units, about the internal origin.
 
-    Implements ``model.load.LoadSite``. ``wrenches (6, N, T)``, ``efforts (F, T)``; ``largest`` is the largest single contribution
+    Implements ``model.loads.LoadSite``. ``wrenches (6, N, T)``, ``efforts (F, T)``; ``largest`` is the largest single contribution
     (internal units), against which a sum that cancels is rounding.
     """
 
@@ -173,7 +173,7 @@ class Site:
         self._add(slice(None), cross(at, force), force)
 
     def weight_energy(self, acceleration: Any) -> Array:
-        """See ``model.load.LoadSite``."""
+        """See ``model.loads.LoadSite``."""
         par, X = self.here.system.par, self.here.poses
         at = self.L * (rotate(X[:, :3], par.center) + X[:, 3]) + par.origin[:, None, None]
         return -np.asarray((par.mass * np.asarray(acceleration, dtype=float).reshape(3, 1, 1) * at).sum(axis=(0, 1)))
