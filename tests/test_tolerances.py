@@ -75,7 +75,7 @@ CALLS = {
     "respond": lambda m, t: mg.respond(m.replace(drives=[]), [0.0, 0.01], tolerances=t),
     "assemblies": lambda m, t: mg.assemblies(m, {"A": 0.2}, tolerances=t),
     "study": lambda m, t: mg.study(
-        m, {"B.point.x": [0.0, 1e-3]}, "A.effort", tolerances=t, engine="dense", executor=ThreadPoolExecutor(1)
+        m, {"B.point.x": [0.0, 1e-3]}, "A.effort", 2, tolerances=t, engine="dense", executor=ThreadPoolExecutor(1)
     ),
 }
 
