@@ -399,13 +399,13 @@ class MissingExtraError(MechgraphError, ImportError):
     --------
     >>> import mechgraph as mg
     >>> print(mg.MissingExtraError("matplotlib", "plot"))
-    this needs matplotlib: pip install 'mechgraph[plot]'
+    matplotlib is not installed. Run: pip install 'mechgraph[plot]'
     """
 
     def __init__(self, package: str, extra: str) -> None:
         self.package = package
         self.extra = extra
-        super().__init__(f"this needs {package}: pip install 'mechgraph[{extra}]'")
+        super().__init__(f"{package} is not installed. Run: pip install 'mechgraph[{extra}]'")
 
 
 def _restored(kind: type[MechgraphError], message: tuple[Any, ...], data: dict[str, Any]) -> MechgraphError:

@@ -154,11 +154,15 @@ def text_of(path: Path, kind: str) -> str:
         raise FileError(path, f"cannot be read: {error.strerror or error}") from None
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise FileError(path, f"is no {kind}: line {line}: not in UTF-8; save it in that encoding") from None
+        raise FileError(
+            path, f"is not a valid {kind} file: line {line}: not in UTF-8; save it in that encoding"
+        ) from None
     except ValueError as error:  # a path with a null character
         raise FileError(path, f"cannot be read: {error}") from None
     if text.startswith("\ufeff"):
-        raise FileError(path, f"is no {kind}: line 1 begins with a byte-order mark; save it as UTF-8 without one")
+        raise FileError(
+            path, f"is not a valid {kind} file: line 1 begins with a byte-order mark; save it as UTF-8 without one"
+        )
     return text
 
 
@@ -170,7 +174,7 @@ def toml_of(path: Path, text: str) -> dict[str, Any]:
             raise FileError(path, f"cannot be read: line {text.count(chr(10), 0, long.start()) + 1}: nested too deeply")
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise FileError(path, f"is no TOML: {error}") from None
+        raise FileError(path, f"is not valid TOML: {error}") from None
     except (RecursionError, ValueError) as error:
         what = (
             "nested too deeply" if isinstance(error, RecursionError) else "an integer of more digits than can be read"
@@ -322,7 +326,7 @@ def writable(path: str | os.PathLike[str]) -> Path:
     except FileNotFoundError:
         target = Path(os.path.realpath(path))
         if not target.parent.is_dir():
-            raise FileError(path, f"cannot be written: there is no folder {target.parent}") from None
+            raise FileError(path, f"cannot be written: no such folder: {target.parent}") from None
         return target
     except (OSError, ValueError) as error:
         raise _cannot(path, error) from None

@@ -272,19 +272,20 @@ ON_REACH: tuple[ReachName, ...] = ("raise", "flag")
 REDUNDANT: tuple[RedundantName, ...] = ("nan", "minimum_norm")
 SOLVED = (Status.OK.value, Status.CHANGE_POINT.value, Status.ACTUATORS_REST.value)
 """Outcomes that are no reason to raise."""
-DEAD = "At a dead point the drivers do not determine the motion; drive another freedom, leave the position out, or use on_reach='flag'"
-FLAG = "Use on_reach='flag' for the positions that can be reached"
+DEAD = (
+    "The drivers do not determine the motion there. Drive another freedom, omit the position, or pass on_reach='flag'"
+)
+FLAG = "Pass on_reach='flag' to keep the reachable positions"
 WITHOUT_BOUND, BEFORE_END = 1e3, 0.01
 """Slides of so many lengths L that have doubled within so much of the path before its end grow without bound."""
 REFUSED = {
     Status.DEAD_POINT: f"is a dead point{{meet}}. {DEAD}",
     Status.BEYOND_DEAD_POINT: f"is beyond a dead point; reached {{at}}{{meet}}. {DEAD}",
-    Status.OUT_OF_REACH: f"is out of reach; reached {{at}}{{far}}. {FLAG}",
-    Status.NOT_CLOSED: f"is within reach, but its loops could not be closed to rounding; the path was followed to {{at}}. {FLAG}",
-    Status.NOT_FOLLOWED: "was not reached: the path to it takes more steps than are made; it was followed to {at}. Start nearer to it, "
-    "or use on_reach='flag'",
-    Status.BEYOND_TOLERANCE: "is beyond the tolerance: there the loops of the declared geometry close to {miss:.3g} only, over all "
-    "positions to {most:.3g}. Give a larger tol, or use on_reach='flag'",
+    Status.OUT_OF_REACH: f"is not reachable (status 'out of reach'); the motion stops at {{at}}{{far}}. {FLAG}",
+    Status.NOT_CLOSED: f"is reachable, but the closure residual stays above round-off; last position {{at}}. {FLAG}",
+    Status.NOT_FOLLOWED: "was not reached: step limit; last position {at}. Start closer, or pass on_reach='flag'",
+    Status.BEYOND_TOLERANCE: "exceeds tol; closure residual of the declared geometry: {miss:.3g}, over all positions {most:.3g}. "
+    "Pass a larger tol, or on_reach='flag'",
 }
 """Why a position was not solved, by its outcome."""
 
@@ -317,13 +318,14 @@ def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exceptio
         most=np.max(misses, where=np.isfinite(misses), initial=0.0),
     )
     if still:
-        why = f"is out of reach: the loops do not stay closed over any stroke from {_listed(reached.items())} (see mechgraph.check)"
+        why = "is not reachable (status 'out of reach'): no finite motion keeps the loops closed from "
+        why += f"{_listed(reached.items())} (see mechgraph.check)"
     if outcome.found.left[first]:
-        why = f"is out of reach: {outcome.found.left[first]} comes to the end of its curve or surface. {FLAG}"
+        why = f"is not reachable (status 'out of reach'): {outcome.found.left[first]} reaches the end of its curve or surface. {FLAG}"
     elif pole := ends_at_pole(line.m, line.system, outcome.found, int(outcome.found.track[first])):
         why = (
-            f"lies behind a pole of the sphere of {pole} (reached {_listed(reached.items())}), whose axis is kept because Tu or Tv are "
-            "driven, loaded or coupled; give the surface another axis"
+            f"lies behind a pole of the sphere of {pole} (last position {_listed(reached.items())}); its axis cannot change "
+            "because Tu or Tv is driven, loaded or coupled. Give the surface another axis"
         )
     asked = _listed(zip(line.drive.names, wanted, strict=True))
     text = f"mechanism {line.m.name!r}: position {first} ({asked}) {why}"
@@ -357,10 +359,10 @@ def _check_drivers(line: Pipeline, outcome: Outcome) -> None:
         return
     names, mobility = ", ".join(line.drive.names), line.freedoms.mobility
     why = (
-        f"the drivers {names} contradict each other: no position meets all their motions (mobility {mobility}, "
-        f"{len(line.columns)} drivers). Remove a driver, or give motions that agree"
+        f"the drivers {names} conflict: no position satisfies all prescribed motions (mobility {mobility}, "
+        f"{len(line.columns)} drivers). Remove a driver, or prescribe consistent motions"
         if len(line.columns) > 1
-        else f"the driver {names} is locked: no other position meets its motion (mobility {mobility}). Drive another freedom"
+        else f"the driver {names} is locked: no other position satisfies its motion (mobility {mobility}). Drive another freedom"
     )
     raise IndeterminateError(f"mechanism {line.m.name!r}: {why}", check(line.drive.m))
 

@@ -347,7 +347,7 @@ def test_faults_come_all_at_once_with_their_lines(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("OndselSolver", "[mechanism]", "is no FreeCAD assembly: line 1"),
+        ("OndselSolver", "[mechanism]", "is not a valid FreeCAD assembly file: line 1"),
         ("\nAssembly\n", "\nPart\n", "there is no line Assembly"),
         ("\t\t0\t0\t0", "\t\t0\tzero\t0", "Position3D = '0 zero 0': expected 3 finite numbers"),
         ("\t\t0\t0\t0", "\t\t0\t0\tnan", "expected 3 finite numbers"),
@@ -371,7 +371,7 @@ def test_file_reading_rules_are_those_of_toml(tmp_path):
     with pytest.raises(mg.FileError, match="cannot be read"):
         mg.load(file)
     file.write_bytes(b"OndselSolver\nAssembly\n\xff\xfe")
-    with pytest.raises(mg.FileError, match="is no FreeCAD assembly: line 3: not in UTF-8"):
+    with pytest.raises(mg.FileError, match="is not a valid FreeCAD assembly file: line 3: not in UTF-8"):
         mg.load(file)
     file.write_bytes(four_bar().text().replace("\n", "\r\n").encode())
     assert len(mg.load(file).pairs) == 4
@@ -612,7 +612,7 @@ def test_the_command_line_reads_an_assembly_and_compares(tmp_path, command):
 
 
 def test_the_command_line_compares_assemblies_only(tmp_path):
-    assert "is no FreeCAD assembly" in run("check", "four-bar", "--compare").stderr
+    assert "is not a FreeCAD assembly" in run("check", "four-bar", "--compare").stderr
     file = tmp_path / "x.asmt"
     file.write_text(four_bar().text())
     result = run("check", file, "--compare")

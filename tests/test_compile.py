@@ -292,7 +292,9 @@ def test_without_a_compiler(monkeypatch, tmp_path):
     build.installed.cache_clear()
     module._functions.cache_clear()
     try:
-        with pytest.raises(mg.MissingExtraError, match=r"^this needs a C compiler: pip install 'mechgraph\[fast\]'$"):
+        with pytest.raises(
+            mg.MissingExtraError, match=r"^a C compiler is not installed\. Run: pip install 'mechgraph\[fast\]'$"
+        ):
             mg.compile(mg.load("four-bar"))
     finally:
         build.installed.cache_clear()

@@ -232,7 +232,7 @@ def test_self_stress_names_every_driver_of_a_pair() -> None:
 def test_second_direction_that_was_left_out_is_named() -> None:
     """A universal joint without its second direction: what was taken is said, and not where it is given."""
     pair = mg.Pair("A", "U", "frame", "body", point=(0, 0, 0), axis=Z)
-    line = "A (U): its second direction is (1, 0, 0), as taken where none is given."
+    line = "A (U): its second direction is (1, 0, 0), by default."
     assert line in str(mg.check(mg.Mechanism("gimbal", pairs=[pair])))
     given = pair.replace(second=(0, 1, 0))
     assert "second direction" not in str(mg.check(mg.Mechanism("gimbal", pairs=[given])))
@@ -266,7 +266,7 @@ def slider_crank(drive: str) -> mg.Mechanism:
 def test_a_driver_at_its_dead_point_is_replaced() -> None:
     report = mg.check(slider_crank("D"))
     assert report.verdict.startswith(
-        "Badly driven: mobility 1, but the driver D.Tz cannot move it here (a dead point)."
+        "Singular drive: mobility 1, but the driver D.Tz cannot move it here (a dead point)."
     )
     assert (report.suggested_drives, report.replaced_drives) == (("A.Rz",), ("D.Tz",))
     assert report.advice[0].text == "drive A.Rz instead of D.Tz: then every freedom is driven or passive"

@@ -246,7 +246,7 @@ def test_a_report_holds_the_same_at_any_size(n: int) -> None:
     assert report.reactions is not None
     assert report.reactions.groups == 1
     assert len(report.self_stresses) == 3 * n
-    assert "Motion checked" in text
+    assert "Motion verified" in text
     assert "form one self-stress group" in text
     assert "not sought as" not in text
 

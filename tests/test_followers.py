@@ -245,7 +245,7 @@ def test_a_roller_larger_than_the_radius_of_curvature_is_refused():
 
 def test_a_slot_must_be_plane_and_a_contact_needs_a_curve():
     helix = mg.Curve.helix(radius=1.0, pitch=0.2)
-    with pytest.raises(mg.DeclarationError, match="is no plane curve, as a pair Ps needs"):
+    with pytest.raises(mg.DeclarationError, match="is not planar; a planar curve is required by pair Ps"):
         mg.Mechanism("m", None, [mg.Pair("K", "Ps", "a", "b", curve=helix)])
     with pytest.raises(mg.DeclarationError, match="type Kc needs a curve"):
         mg.Mechanism("m", None, [mg.Pair("K", "Kc", "a", "b", point=(0, 0, 0), axis=(0, 0, 1))])

@@ -72,7 +72,9 @@ def test_what_was_made_of_another_text_is_not_taken(compiled, cache, tmp_path):
 def test_without_a_compiler_the_extra_is_named(cache, monkeypatch, tmp_path):
     without_compilers(monkeypatch, tmp_path / "none")
     assert build.installed() is None
-    with pytest.raises(mg.MissingExtraError, match=r"^this needs a C compiler: pip install 'mechgraph\[fast\]'$"):
+    with pytest.raises(
+        mg.MissingExtraError, match=r"^a C compiler is not installed\. Run: pip install 'mechgraph\[fast\]'$"
+    ):
         build.built()
 
 

@@ -54,7 +54,7 @@ def test_a_missing_library_names_both_places(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["rscr", "../library/rcsr", "schema", "rcsr.toml", ""])
 def test_an_unknown_name_lists_the_known(tmp_path: Path, name: str) -> None:
     module = module_installed_in(tmp_path, "library")
-    with pytest.raises(mg.FileError, match="there are: 7r, bennett, rcsr"):
+    with pytest.raises(mg.FileError, match="available: 7r, bennett, rcsr"):
         module.library_path(name)
 
 

@@ -200,7 +200,7 @@ def test_what_has_no_time_or_no_forces_is_refused() -> None:
     m = crank()
     q = uneven(12)
     for s, words in (
-        (mg.solve(m, {"A": q}), "the positions have no times: give the motion t="),
+        (mg.solve(m, {"A": q}), "the positions have no times. Pass t="),
         (mg.solve(m, {"A": 0.3}), "one position has no duration"),
         (mg.kinematics(m, {"A": mg.Motion(q, 1.0)}), r"no forces: use solve\(\)"),
         (mg.solve(m, {"A": mg.Motion(q, 1.0, t=np.zeros(12))}), "do not rise"),

@@ -392,9 +392,9 @@ def test_loads_along_motions_without_inertia_are_refused(function):
     pairs = [*rotor().pairs, mg.Pair("B", "R", "rotor", "light", point=(1, 0, 0), axis=Z)]
     tail = mg.Mechanism("tail", links, pairs, loads=[mg.Wrench("light", force=(0, 1.0, 0), point=(2, 0, 0))])
     for m in (massless, tail):
-        with pytest.raises(mg.ResponseError, match="there is a motion that no inertia resists"):
+        with pytest.raises(mg.ResponseError, match="one motion has no inertia"):
             mg.respond(m, (0, 1))
-    with pytest.raises(mg.ResponseError, match="there is a motion that no inertia resists"):
+    with pytest.raises(mg.ResponseError, match="one motion has no inertia"):
         mg.respond(massless.replace(loads=[]), (0, 1), rates={"A": 1.0})
     # unloaded, what is carried goes along and is not moved
     r = mg.respond(tail.replace(loads=[]), (0, 1), rates={"A": 1.0})

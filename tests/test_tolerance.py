@@ -180,7 +180,7 @@ def test_a_position_beyond_the_tolerance_is_not_solved() -> None:
     assert 0 < beyond.sum() < len(beyond)
     np.testing.assert_array_equal(s.checks.closure > tol, beyond)
     assert np.isnan(s["O2"].position[beyond]).all()
-    with pytest.raises(mg.ReachError, match="beyond the tolerance"):
+    with pytest.raises(mg.ReachError, match="exceeds tol"):
         mg.kinematics(m, {"O1": np.linspace(0, 3, 40)}, tol=tol)
 
 
@@ -194,7 +194,7 @@ def test_markers_that_meet_to_1e_6() -> None:
         for k, (name, a, b) in enumerate(zip("ABCD", links, [*links[1:], "frame"], strict=True))
     ]  # fmt: skip
     m = mg.Mechanism("loose", pairs=pairs, drives=["A"], start={"A": 1.0, "B": -0.6})
-    with pytest.raises(mg.AssemblyError, match=r"Pass tol=\S+ to take it so"):
+    with pytest.raises(mg.AssemblyError, match=r"Pass tol=\S+ to treat it as exact"):
         mg.kinematics(m, {"A": POSITIONS + 1})
     s = mg.kinematics(m, {"A": POSITIONS + 1}, tol=1e-5)
     assert s.checks.closure.max() < 1e-5

@@ -241,16 +241,16 @@ def test_whatever_stands_in_a_field_the_error_is_ours(name: str) -> None:
 
 
 def test_no_toml_and_no_file_are_file_errors(tmp_path: Path) -> None:
-    with pytest.raises(mg.FileError, match="is no TOML"):
+    with pytest.raises(mg.FileError, match=r"is not (valid TOML|a valid TOML file)"):
         mg.load(written(tmp_path, "name = = 3"))
     (tmp_path / "latin.toml").write_bytes(b'name = "\xe9"')
-    with pytest.raises(mg.FileError, match="is no TOML"):
+    with pytest.raises(mg.FileError, match=r"is not (valid TOML|a valid TOML file)"):
         mg.load(tmp_path / "latin.toml")
     with pytest.raises(mg.FileError, match="cannot be read"):
         mg.load(tmp_path / "absent.toml")
     with pytest.raises(mg.FileError, match="cannot be read"):
         mg.load(tmp_path)
-    with pytest.raises(mg.FileError, match="no mechanism of that name"):
+    with pytest.raises(mg.FileError, match="neither a library mechanism"):
         mg.load("no-such-mechanism")
 
 
@@ -264,7 +264,7 @@ DEEP = 5000
         (FOUR_BAR + f"\n[extra]\nx = {10**400}\n", "field 'extra': an integer beyond 64 bits"),
         (f"a = 1\nx = {'[' * DEEP}{']' * DEEP}", "line 2: nested too deeply"),
         (f"\n\nx = {'{a = ' * DEEP}1{'}' * DEEP}", "line 3: nested too deeply"),
-        (f"{'[' * 100}{']' * 100}", "is no TOML"),
+        (f"{'[' * 100}{']' * 100}", "is not valid TOML"),
         (f"x = {'[' * 100}{']' * 100}", "field 'x': nested more than 32 levels deep"),
         ("a = 1\n" + ".".join(["b"] * 20000) + " = 1", "line 2: nested too deeply"),
         (b"\xef\xbb\xbf" + FOUR_BAR.encode(), "line 1 begins with a byte-order mark"),

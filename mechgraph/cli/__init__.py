@@ -36,8 +36,7 @@ __all__ = ["app"]
 app = typer.Typer(
     name="mechgraph",
     cls=Program,
-    help="Spatial mechanisms as graphs of links and pairs: determinacy, equations, motion, driver efforts and reactions.\n\n"
-    + EXIT_STATUS,
+    help="Analyze spatial mechanisms: determinacy, equations, motion, driver efforts and reactions.\n\n" + EXIT_STATUS,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,

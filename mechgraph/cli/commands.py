@@ -70,7 +70,7 @@ from mechgraph.result.solution import FORMATS
 
 
 def list_library(json: AsJson = False) -> None:
-    """Name the mechanisms of the library, with what they are.
+    """List the library mechanisms.
 
     Example: mechgraph list --json
     """
@@ -93,14 +93,12 @@ def save(
         typer.Option(
             "--out",
             metavar="FILE",
-            help=f"What is written; the suffix says how: .toml, {formats_text(WRITERS)}; others are TOML.",
+            help=f"The file; the extension selects the format: .toml, {formats_text(WRITERS)}; others are TOML.",
         ),
     ],
     advice: Annotated[
         int | None,
-        typer.Option(
-            "--advice", metavar="NUMBER", help="Changed as 'check --json' advises, by the number of the advice from 0."
-        ),
+        typer.Option("--advice", metavar="NUMBER", help="Apply recommendation NUMBER (from 0) of 'check --json'."),
     ] = None,
     json: AsJson = False,
 ) -> None:
@@ -138,11 +136,12 @@ def check(
     limit: Annotated[
         str | None,
         typer.Option(
-            metavar="TIME", help="How long each search of the report may take, 20s by itself; it says what was left."
+            metavar="TIME",
+            help="Time for each search of the report, default 20s; the report lists unfinished searches.",
         ),
     ] = None,
 ) -> None:
-    """Print the determinacy report: the verdict, what to do, and what may be trusted; with --full all of it.
+    """Print the determinacy report: verdict, recommended changes, determinacy. --full prints everything.
 
     Example: mechgraph check four-bar --at A=30deg --full
 
@@ -223,7 +222,7 @@ def equations(
     csv: Annotated[bool, typer.Option("--csv", help="The table of nonzero coefficients as CSV.")] = False,
     unknowns: Annotated[
         Literal["kinetostatics", "response"],
-        typer.Option(help="What is sought: forces for a given motion, or accelerations beside the reactions."),
+        typer.Option(help="Unknowns: forces for a given motion, or accelerations and reactions."),
     ] = "kinetostatics",
     at: EquationsAt = None,
     out: Annotated[
@@ -231,7 +230,7 @@ def equations(
         typer.Option(
             "--out",
             metavar="FILE",
-            help=f"Write them; the suffix says how: {formats_text(WRITINGS)}, the first compiles.",
+            help=f"Write them; the extension selects the format: {formats_text(WRITINGS)}, the first compiles.",
         ),
     ] = None,
     json: AsJson = False,
@@ -291,7 +290,7 @@ def solve(
     over_time: OverTime = False,
     json: AsJson = False,
 ) -> None:
-    """Solve positions, efforts of the drivers and all reactions, print a summary and write a table.
+    """Solve motion, driver torques and reactions; print a summary and write a table.
 
     Example: mechgraph solve 7r --drive O1=0:360:5deg@10 --out 7r.csv
 
@@ -351,7 +350,7 @@ def respond(
     mechanism: Named,
     span: Annotated[
         str | None,
-        typer.Option("--for", metavar="TIME", help="How long: 10s. Left out, as [response] of the file says."),
+        typer.Option("--for", metavar="TIME", help="Duration, e.g. 10s. Default: [response] of the file."),
     ] = None,
     start: Annotated[
         list[str] | None, typer.Option("--start", metavar="FREEDOM=VALUE", help="Coordinate at the beginning (repeat).")
@@ -364,7 +363,7 @@ def respond(
     ] = None,
     points: Annotated[
         int | None,
-        typer.Option("--points", min=2, help="Number of output times, evenly spread; without it the steps taken."),
+        typer.Option("--points", min=2, help="Number of evenly spread output times. Default: the steps taken."),
     ] = None,
     out: Out = None,
     include: Include = None,
@@ -372,14 +371,14 @@ def respond(
         Literal["auto", "RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"] | None,
         typer.Option(help="Stepper of scipy; Radau for stiff loads."),
     ] = None,
-    rtol: Annotated[float | None, typer.Option(help="Relative tolerance of a step, 1e-8 by itself.")] = None,
+    rtol: Annotated[float | None, typer.Option(help="Relative tolerance of a step. Default: 1e-8.")] = None,
     atol: Annotated[
         float | None,
-        typer.Option(help="Absolute tolerance (radians, lengths / L, and their rates), 1e-10 by itself."),
+        typer.Option(help="Absolute tolerance (radians, lengths / L, and their rates). Default: 1e-10."),
     ] = None,
     max_step: Annotated[
         str | None,
-        typer.Option("--max-step", metavar="TIME", help="Longest step: 5ms. By itself as the tolerances allow."),
+        typer.Option("--max-step", metavar="TIME", help="Longest step, e.g. 5ms. Default: as the tolerances allow."),
     ] = None,
     passive: Annotated[
         Literal["free", "held"] | None, typer.Option(help="Whether passive freedoms move freely, or are held at rest.")
@@ -439,7 +438,9 @@ def loads(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", metavar="FILE", help=f"Write the loads; the suffix says how: {formats_text(LOAD_FILES)}."
+            "--out",
+            metavar="FILE",
+            help=f"Write the loads; the extension selects the format: {formats_text(LOAD_FILES)}.",
         ),
     ] = None,
     at: Annotated[
@@ -460,7 +461,7 @@ def loads(
     tol: Tolerance = None,
     json: AsJson = False,
 ) -> None:
-    """Print what acts on a link over the positions, in its own frame and in balance, and write it as a table or a load deck.
+    """Print the loads on a link in its own frame; write a table or an FE input deck.
 
     Example: mechgraph loads 7r link3 --drive O1=0:360:5deg@10 --at all
 
@@ -491,17 +492,18 @@ def loads(
 def compile_(
     mechanism: Named,
     out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="FILE", help=f"The suffix says how: {formats_text(WRITTEN)}.")
+        Path,
+        typer.Option("--out", "-o", metavar="FILE", help=f"The extension selects the format: {formats_text(WRITTEN)}."),
     ],
     name: Annotated[
         str | None,
-        typer.Option("--name", metavar="NAME", help="What symbols begin with; left out, the name of the file."),
+        typer.Option("--name", metavar="NAME", help="Prefix of the symbols. Default: the name of the file."),
     ] = None,
     inputs: Annotated[
         InputsName,
         typer.Option(
             "--inputs",
-            help="What is given of the drives: their motion, or their efforts, under which the motion is followed as well.",
+            help="Inputs: motion of the drives, or their efforts (then the motion is integrated).",
         ),
     ] = "motion",
     json: AsJson = False,

@@ -102,7 +102,7 @@ def plot(
         typer.Option(
             "--out",
             metavar="FILE",
-            help=f"The file; the suffix says how: {formats_text(PICTURES)}, of a skeleton also {formats_text(FILMS[:2])}. "
+            help=f"The file; the extension selects the format: {formats_text(PICTURES)}, of a skeleton also {formats_text(FILMS[:2])}. "
             "Left out, NAME.png here.",
         ),
     ] = None,
@@ -119,12 +119,13 @@ def plot(
         typer.Option(
             "--over",
             metavar="FREEDOM",
-            help="What curves are drawn over: a freedom, t, or position; the first driver without it.",
+            help="Abscissa: a freedom, t, or position. Default: the first driver.",
         ),
     ] = None,
     position: Annotated[int, typer.Option("--position", help="Number of the position that a skeleton shows.")] = 0,
     frames: Annotated[
-        int | None, typer.Option("--frames", min=1, help="Frames of a film; without it one a position, at most 72.")
+        int | None,
+        typer.Option("--frames", min=1, help="Frames of an animation. Default: one per position, at most 72."),
     ] = None,
     forces: Annotated[bool, typer.Option("--forces", help="Reaction forces as arrows in a skeleton.")] = False,
     moment: Annotated[bool, typer.Option("--moment", help="Moments rather than forces of reactions.")] = False,
@@ -134,7 +135,7 @@ def plot(
     tol: Tolerance = None,
     json: AsJson = False,
 ) -> None:
-    """Draw a picture, or a film of the skeleton.
+    """Draw a figure or an animation.
 
     Example: mechgraph plot four-bar reaction --of B --out B.svg
 
@@ -189,7 +190,7 @@ def report(
     tol: Tolerance = None,
     json: AsJson = False,
 ) -> None:
-    """Write a page to pass on: verdict, determinacy report, the mechanism in space, curves, tables, equations.
+    """Write a self-contained HTML report: verdict, determinacy report, the mechanism in space, curves, tables, equations.
 
     Without --drive the stored motion is solved, where all drivers store one; else the page shows the mechanism as it stands.
 
@@ -225,12 +226,14 @@ def report(
 
 Picture = Annotated[
     Path | None,
-    typer.Option("--out", metavar="FILE", help=f"Also draw them; the suffix says how: {formats_text(PICTURES)}."),
+    typer.Option(
+        "--out", metavar="FILE", help=f"Also plot them; the extension selects the format: {formats_text(PICTURES)}."
+    ),
 ]
 
 
 def assemblies(mechanism: Named, at: At = None, out: Picture = None, json: AsJson = False) -> None:
-    """Find all real assemblies with drivers at given values, and say how sure it is that these are all.
+    """Find all real assemblies with drivers at given values, and report whether the list is complete.
 
     Declared drives stay at their start, those that --at does not name as well.
 
@@ -260,7 +263,7 @@ def branches(
             "--driver",
             metavar="FREEDOM",
             autocompletion=freedoms,
-            help="The driver; left out, the first declared drive.",
+            help="The driver. Default: the first declared drive.",
         ),
     ] = None,
     output: Annotated[

@@ -57,7 +57,7 @@ def _number(text: str, where: str, examples: str = "30deg, 0.5rad or 0.02") -> t
     found = NUMBER.fullmatch(text.strip())
     value = float(found["number"]) if found else np.nan
     if found is None or not np.isfinite(value):
-        refuse(where, f"{text!r} is no number; write e.g. {examples}")
+        refuse(where, f"{text!r} is not a number; write e.g. {examples}")
     return value, found["unit"]
 
 
@@ -86,7 +86,7 @@ def _doubt(texts: Sequence[str], values: Sequence[float], where: str) -> None:
     if abs(most) > 2.0 and not any(_number(text, where)[1] for text in texts):
         as_degrees = f"{texts[-1].strip()}deg"
         warnings.warn(
-            f"{where}: read as radians, {most:.4g} turns; where degrees are meant write {as_degrees}, where radians {texts[-1].strip()}rad",
+            f"{where}: read as radians, {most:.4g} turns; for degrees write {as_degrees}, for radians {texts[-1].strip()}rad",
             MechgraphWarning,
             stacklevel=3,
         )
@@ -263,9 +263,7 @@ NO_ANSWERS = (mg.AssemblyError, mg.ReachError, mg.DeadPointError, mg.Indetermina
 """Errors that say that the mechanism has no answer; every other error is bad input."""
 
 
-EXIT_STATUS = (
-    "Exit status: 0 done; 1 the mechanism has no answer, and the message says why; 2 wrong usage or bad input."
-)
+EXIT_STATUS = "Exit status: 0 success; 1 no solution (see message); 2 usage or input error."
 
 
 def fail(message: str, status: int) -> NoReturn:
@@ -317,7 +315,7 @@ def outcome() -> Iterator[None]:
     except mg.MechgraphError as error:
         fail(str(error), BAD_INPUT)
     except MemoryError:
-        fail("not enough memory for so many positions; take fewer", BAD_INPUT)
+        fail("out of memory; request fewer positions", BAD_INPUT)
     except KeyboardInterrupt:
         fail("interrupted", INTERRUPTED)
     except OSError as error:  # of files there is a FileError: this is the output itself
@@ -362,9 +360,7 @@ Named = Annotated[
         help=f"A mechanism of the library (see 'list'), a TOML file, or one of another program ({', '.join(READERS)}).",
     ),
 ]
-AsJson = Annotated[
-    bool, typer.Option("--json", help="As JSON for scripts; output.schema.json beside the library describes it.")
-]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON (schema: library/output.schema.json).")]
 Engine = Annotated[
     Literal["auto", "dense", "sparse"],
     typer.Option(help="Dense or sparse matrices, or the faster ones for the size; the results are the same."),
@@ -380,20 +376,18 @@ Tolerance = Annotated[
     typer.Option(
         "--tol",
         metavar="TOL",
-        help="Accuracy to which directions (radians) and distances (over the mean radius L) are meant, e.g. 1e-4.",
+        help="Accuracy of directions [rad] and distances (relative to L), e.g. 1e-4.",
     ),
 ]
-Bookkeeping = Annotated[Literal["lee", "minimal"], typer.Option(help="How the unknowns of a pair are written.")]
+Bookkeeping = Annotated[Literal["lee", "minimal"], typer.Option(help="Choice of unknowns.")]
 Method = Annotated[Literal["loop_wrench", "newton_euler", "printed"], typer.Option(help="How the forces are solved.")]
 Redundant = Annotated[
     Literal["nan", "minimum_norm"],
-    typer.Option(
-        help="What stands for reactions that are not unique: no value, or the least (all pairs equally stiff)."
-    ),
+    typer.Option(help="Indeterminate reactions: NaN or the minimum-norm solution."),
 ]
 OnReach = Annotated[
     Literal["raise", "flag"],
-    typer.Option("--on-reach", help="Stop at a position that cannot be reached, or flag it and go on."),
+    typer.Option("--on-reach", help="Unreachable positions: stop, or flag and continue."),
 ]
 At = Annotated[
     list[str] | None,
@@ -407,7 +401,7 @@ At = Annotated[
 Drivers = Annotated[
     list[str] | None,
     typer.Option(
-        "--driver", metavar="FREEDOM", autocompletion=freedoms, help="Driver instead of those declared (repeat)."
+        "--driver", metavar="FREEDOM", autocompletion=freedoms, help="Driver in place of the declared ones (repeat)."
     ),
 ]
 EquationsAt = Annotated[
@@ -438,7 +432,7 @@ Actuate = Annotated[
         "--actuate",
         metavar="FREEDOM",
         autocompletion=freedom_names,
-        help="A freedom in which an unknown effort stands, in place of those that are moved (repeat: as many as these).",
+        help="Freedom that carries an actuator, if not the prescribed one (repeat: one per prescribed motion).",
     ),
 ]
 Out = Annotated[
@@ -446,7 +440,7 @@ Out = Annotated[
     typer.Option(
         "--out",
         metavar="FILE",
-        help=f"Write everything, one row a position; the suffix says how: {formats_text(FORMATS)}.",
+        help=f"Write a table, one row per position; the extension selects the format: {formats_text(FORMATS)}.",
     ),
 ]
 Include = Annotated[
@@ -459,13 +453,11 @@ Outputs = Annotated[
         "--transmission",
         metavar="FREEDOM",
         autocompletion=freedom_names,
-        help="Also how well the drivers move this output: its transmission and deviation angle (repeat).",
+        help="Also print transmission and deviation angle of this output (repeat).",
     ),
 ]
 
-Compare = Annotated[
-    bool, typer.Option("--compare", help="Also the results stored in a FreeCAD assembly (.asmt) beside ours.")
-]
+Compare = Annotated[bool, typer.Option("--compare", help="Compare with results stored in a FreeCAD assembly (.asmt).")]
 OverTime = Annotated[
     bool,
     typer.Option(
@@ -482,8 +474,8 @@ def loaded(name: str) -> mg.Mechanism:
     path = Path(name)
     if os.path.lexists(path) or path.suffix.lower() in (".toml", *READERS) or len(path.parts) > 1:
         return mg.load(path)
-    hint = did_you_mean(near_names(name.lower(), known)) or f"there are: {', '.join(known)}"
-    raise mg.FileError(name, f"no mechanism of that name in the library, and no such file; {hint}")
+    hint = did_you_mean(near_names(name.lower(), known)) or f"available: {', '.join(known)}"
+    raise mg.FileError(name, f"neither a library mechanism nor an existing file; {hint}")
 
 
 def refuse_own_file(out: Path, mechanism: str) -> None:
@@ -502,6 +494,6 @@ def check_out(out: Path | None, mechanism: str, formats: Sequence[Format]) -> No
 def show_compared(mechanism: str) -> None:
     """What FreeCAD stored beside what comes out here, below a report or summary."""
     if Path(mechanism).suffix.lower() != ".asmt":
-        refuse(f"--compare {mechanism!r}", "is no FreeCAD assembly (.asmt)")
+        refuse(f"--compare {mechanism!r}", "is not a FreeCAD assembly (.asmt)")
     write("\n")
     show(compare(mechanism).document())

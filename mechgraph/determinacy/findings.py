@@ -68,7 +68,7 @@ LINES = {
 PARTS = {
     "C": "floating bearing",
     "S": "ball joint or self-aligning bearing",
-    "Sg": "self-aligning bearing that floats",
+    "Sg": "floating self-aligning bearing",
     "U": "universal joint",
     "E": "plane contact",
     "Cp": "cylinder on a plane",
@@ -92,9 +92,9 @@ class KindWords:
 
 KINDS = {
     "planar": KindWords(
-        "in-plane forces", "forces along and moments across the pins", "forces across the plane and moments in it"
+        "in-plane forces", "axial forces and tilting moments at the pins", "forces across the plane and moments in it"
     ),
-    "spherical": KindWords("moments about the centre", "forces through the centre", "forces through the centre"),
+    "spherical": KindWords("moments about the center", "forces through the center", "forces through the center"),
 }
 """By the kind of ``determinacy.families``."""
 
@@ -249,12 +249,12 @@ def _worded(exact: SnappedMechanism, tol: float, verdict: tuple[Any, ...]) -> Ro
     unit = exact.units.get("length", "")
     meant = []
     if angle > EXACT:
-        meant.append(f"directions taken as meant to {np.degrees(angle):.2g} deg")
+        meant.append(f"directions accurate to {np.degrees(angle):.2g} deg")
     if distance > EXACT * exact.changes.L:
-        meant.append(f"distances {'' if meant else 'taken as meant '}to {distance:.2g} {unit}".rstrip())
+        meant.append(f"distances {'' if meant else 'accurate '}to {distance:.2g} {unit}".rstrip())
     kind = kind_of(closed_start(exact).S[:, :, 0]).name
     moves = f"moves (mobility {mobility})" if mobility else "is a structure (mobility 0)"
-    off = {"planar": "off the normal", "spherical": "off the line through the centre"}.get(kind, "off")
+    off = {"planar": "off the normal", "spherical": "off the line through the center"}.get(kind, "off")
     # most pairs that are named
     misses = tuple(
         f"Axis of {c.pair}: {np.degrees(c.angle):.2g} deg {off}"
@@ -264,7 +264,8 @@ def _worded(exact: SnappedMechanism, tol: float, verdict: tuple[Any, ...]) -> Ro
     )
     advised = _rounded_up(max(tol, SAFE * exact.changes.largest))
     text = f"With {' and '.join(meant) or f'loops that close to {exact.changes.closure:.2g}'} the mechanism "
-    text += f"{f'is {kind} and ' if kind else ''}{moves}. {'. '.join(misses)}{'. ' if misses else ''}Pass tol={advised:g} to take it so"
+    text += f"{f'is {kind} and ' if kind else ''}{moves}. {'. '.join(misses)}{'. ' if misses else ''}"
+    text += f"Pass tol={advised:g} to treat it as exact"
     return Rounding(advised, angle, distance, kind, mobility, misses, text + ".")
 
 

@@ -43,12 +43,12 @@ TERMS = 4
 LISTED = 20
 """Most items of one kind that are printed; all are in the JSON."""
 NOT_UNIQUE = (
-    "Unique: equilibrium alone gives it. Not unique: it also depends on fits, stiffness and temperature; a rigid-body program can only "
-    "assume it, and how much force a misfit locks in it cannot know."
+    "Unique: determined by equilibrium. Not unique: it also depends on fits, stiffness and temperature; a rigid-body model cannot "
+    "determine it."
 )
 MEANINGS = (
-    "A self-stress is a set of reactions that balance each other without any load: any multiple of it may be built in. Components "
-    "in which no self-stress has a part are proved unique. Moments are divided by L = {L:.4g} so that they compare with forces."
+    "A self-stress is a self-equilibrated set of reactions at zero load: assembly can preload any multiple of it. Components "
+    "in which every self-stress vanishes are proved unique. Moments are divided by L = {L:.4g} so that they compare with forces."
 )
 
 
@@ -113,7 +113,7 @@ def _drivers(r: Facts) -> Iterator[Block]:
     able = [name for f in r.drivable for name in f.freedoms]
     lines = [f"can drive: {listed(able, LISTED)}" if able else "no freedom can drive"]
     if r.contradicting_drives and r.mobility and not r.suggested_drives:
-        lines.append("the declared drivers depend on each other: take one away")
+        lines.append("the declared drivers are dependent; remove one")
     lines += [f"only one of {listed(group, LISTED)} (they move in proportion)" for group in r.dependent_drives]
     names_by_reason: dict[str, list[str]] = {}
     for f in r.not_drivable:
@@ -249,7 +249,7 @@ def _checks(r: Facts) -> Iterator[Block]:
     if r.geometry:
         dropped = r.dropped or 0.0
         size = "rounding" if dropped < RANKS.doubt else f"{dropped:.2g} of the largest"
-        yield Paragraph(f"Rank decided by the {r.engine} engine; largest value taken for zero: {size}.")
+        yield Paragraph(f"Rank decided by the {r.engine} engine; largest value treated as zero: {size}.")
 
 
 SECTIONS = (

@@ -36,10 +36,10 @@ def _near(r: Facts) -> str:
     if not r.near or r.margin is None or r.dropped is None or _over_driven(r):
         return ""
     if r.dead_point:
-        return f" Near a dead point: {weakest_drive(r)} hardly moves when the mechanism does."
+        return f" Near a dead point: {weakest_drive(r)} is almost stationary while the mechanism moves."
     # part of the margin above which a dropped singular value is reported rather than the margin
     if r.dropped > r.margin * 1e-9:
-        return f" Near another verdict: a singular value of {r.dropped:.2g} of the largest was taken for zero."
+        return f" Near another verdict: a singular value of {r.dropped:.2g} (relative) was treated as zero."
     if not r.near_other_rank and r.reactions:
         return f" Near another verdict: {_doubtful_part(r.reactions)}."
     return f" Nearly singular: margin {r.margin:.2g}."
@@ -79,10 +79,8 @@ def _of_position(r: Facts) -> str:
     if r.contradicting_drives and r.mobility:
         if drivers <= r.mobility:
             dead = "a dead point" if drivers == 1 else "a dead point, or dependent drivers"
-            return f"Badly driven: mobility {r.mobility}, but {weakest_drive(r)} cannot move it here ({dead})."
-        return (
-            f"Over-driven: mobility {r.mobility}, {plural(drivers, 'driver')} that cannot all be moved independently."
-        )
+            return f"Singular drive: mobility {r.mobility}, but {weakest_drive(r)} cannot move it here ({dead})."
+        return f"Over-driven: mobility {r.mobility}, {plural(drivers, 'driver')} that are not independent."
     if r.undriven:
         return _left_free(r)
     if not r.mobility and drivers:
@@ -107,7 +105,7 @@ def _bearing(r: Facts) -> str:
     bearing = [f"{p.name} by {p.size}" for p in r.passive if p.load_bearing]
     if not bearing:
         return ""
-    return f"Load-bearing passive freedom, on which reactions rest: no part holds {listed(bearing, SETS)}. With that held: "
+    return f"Load-bearing passive freedom that nothing holds: {listed(bearing, SETS)}. If constrained: "
 
 
 def _left_free(r: Facts) -> str:
@@ -133,7 +131,7 @@ def here_only(names: Sequence[str]) -> str:
 def _driven_structure(r: Facts) -> str:
     """A structure with drivers on it."""
     one = len(r.mechanism.drives) == 1
-    who = f"{weakest_drive(r)} only strains it" if one else "its drivers only strain it"
+    who = f"{weakest_drive(r)} can only load it" if one else "its drivers can only load it"
     rest = (
         f"without {'it' if one else 'them'} every reaction is unique"
         if not r.redundancy
@@ -150,7 +148,7 @@ def _state(r: Facts) -> str:
     if not r.mobility:
         return "A structure (mobility 0)"
     if _shaky(r):
-        return f"Shaky structure: its mobility {r.mobility} is only infinitesimal"
+        return f"Shaky structure: mobility {r.mobility} is infinitesimal only"
     return f"Moves with mobility {r.finite_mobility}" + (f" ({len(r.passive)} of it {spins(r)})" if r.passive else "")
 
 
@@ -165,7 +163,7 @@ def _not_unique(r: Facts, known: Uniqueness) -> str:
     if r.own_forces_unique:
         efforts = " and the driver effort" if len(r.mechanism.drives) == 1 else " and driver efforts"
         words = f"{KINDS[r.kind.name].own}{efforts if r.mechanism.drives else ''}"
-        return f", {r.kind.name}: all {words} are unique; what is not: {_others(r, sets)} (redundancy {r.redundancy})"
+        return f", {r.kind.name}: all {words} are unique; not unique: {_others(r, sets)} (redundancy {r.redundancy})"
     total = sum(count for *_, count in sets)
     components = "reaction component is" if total == 1 else "reaction components are"
     more = f"; {tied}" if loose else ""
@@ -265,8 +263,8 @@ def reasons(r: Facts) -> list[str]:
 def assumed(r: Facts) -> list[str]:
     """Second directions, where the pair type needs one, that are those taken where none is given."""
     return [
-        f"{p.name} ({p.type.symbol}): its second direction is ({', '.join(f'{v:.4g}' for v in p.second)}), as taken where none is "
-        "given. Give second=... if the marker has another."
+        f"{p.name} ({p.type.symbol}): its second direction is ({', '.join(f'{v:.4g}' for v in p.second)}), by default. "
+        "Pass second= to change it."
         for p in r.mechanism.pairs
         if p.type.square_second and p.point is not None and p.second == second_direction(p.axis)
     ]
@@ -277,12 +275,12 @@ def _excess(r: Facts) -> list[str]:
     if excess["structural"]:
         places = "; ".join(f"{n} in the {loop_names(r, loops)}" for n, loops in r.generic.places[:SETS])
         out.append(
-            f"Structural excess {excess['structural']}: this many constraints are redundant whatever the dimensions ({places})."
+            f"Structural excess {excess['structural']}: this many constraints are redundant for any dimensions ({places})."
         )
     if excess.get("dimensions") and not _shaky(r):
         out.append(
-            f"Overconstrained by its dimensions, by {excess['dimensions']}: special lengths or directions of axes make constraints "
-            "agree all along the motion; with other dimensions they would not."
+            f"Overconstrained by its dimensions, by {excess['dimensions']}: constraints are redundant throughout the "
+            "motion, only for these lengths and axis directions."
         )
     elif excess.get("dimensions"):
         out.append(
@@ -296,7 +294,7 @@ def _excess(r: Facts) -> list[str]:
 def _finite(r: Facts) -> list[str]:
     """What part of the mobility is finite, where not all of it is."""
     if _shaky(r):
-        return ["Shaky: the mobility is infinitesimal only; the loops stay closed over no finite stroke."]
+        return ["Shaky: the mobility is infinitesimal only; no finite motion keeps the loops closed."]
     if r.mobility and r.finite_mobility is not None and r.finite_mobility < r.mobility:
         return [
             f"Of mobility {r.mobility} here, {r.finite_mobility} is finite; the rest is instantaneous, in this position only."
@@ -307,7 +305,7 @@ def _finite(r: Facts) -> list[str]:
 def motion_line(r: Facts) -> list[str]:
     """The stroke over which a motion was followed."""
     length = f"a stroke of {r.stroke:.2g} (radians, or lengths / L)" if r.stroke else ""
-    return [f"Motion checked: followed over {length} with the loops closed."] if length else []
+    return [f"Motion verified over {length}: all loops stay closed."] if length else []
 
 
 def _margin(r: Facts) -> list[str]:
@@ -318,7 +316,7 @@ def _margin(r: Facts) -> list[str]:
         ]
     out = []
     if r.near_other_rank:
-        gap = f", largest taken for zero {r.dropped:.1g}" if (r.dropped or 0.0) > RANKS.doubt else ""
+        gap = f", largest treated as zero {r.dropped:.1g}" if (r.dropped or 0.0) > RANKS.doubt else ""
         out.append(
             f"Near another verdict: smallest singular value kept {r.margin:.2g} of the largest{gap}. A small change of dimensions or "
             "position may change mobility and uniqueness; forces may be large."
@@ -382,16 +380,18 @@ def count_line(r: Facts) -> str:
         "here": "in this position only",
     }
     parts = ", ".join(f"{r.excess[key]} {words}" for key, words in why.items() if r.excess.get(key))
-    verb = "repeats" if r.redundancy == 1 else "repeat"
-    return f"{line}: {r.redundancy} of {r.equation_count} closure equations {verb} others (redundancy; {parts})."
+    verb = "is" if r.redundancy == 1 else "are"
+    return f"{line}: {r.redundancy} of {r.equation_count} closure equations {verb} redundant ({parts})."
 
 
 LINES = 25
 """Most lines of text on 80 columns."""
 CHANGES = 4
 """Most changes of pairs that are advised here."""
-HOW_MUCH = "What is not unique depends on fits, stiffness and temperature; how much force a misfit locks in, a rigid model cannot know."
-MORE = "All the facts: report.text(full=True), mechgraph check --full."
+HOW_MUCH = (
+    "The rest depends on fits, stiffness and temperature; a rigid-body model cannot predict preload from misalignment."
+)
+MORE = "Full report: report.text(full=True), mechgraph check --full."
 
 
 def document(r: Facts, first: tuple[Paragraph, ...] = ()) -> Document:
@@ -415,14 +415,14 @@ def _to_do(r: Facts) -> Iterator[str]:
     """What to change, the drivers first; for a determinate mechanism nothing."""
     yield from (a.text for a in r.advice if a.effect is None)
     if r.contradicting_drives and r.mobility and not r.suggested_drives:
-        yield "the declared drivers depend on each other: take one away"
+        yield "the declared drivers are dependent; remove one"
     bearing = [p for p in r.passive if p.load_bearing]
     for p in bearing:
         what = "couple" if p.turns else "force"
         yield f"hold {p.name} or balance the load on it: a {what} of {p.size} moves it, and no part takes that"
     yield from alternatives(r.advice)[:CHANGES]
     if r.determinate and not r.near and not bearing:
-        yield "nothing: equilibrium alone gives every force"
+        yield "none needed: equilibrium determines every force"
 
 
 def _trusted(r: Facts) -> Iterator[str]:
@@ -438,7 +438,7 @@ def _trusted(r: Facts) -> Iterator[str]:
         # most pairs named for one set of components
         some = [f"{words} of {listed(pairs, 4)}" for words, pairs, _ in patterns(known, known.is_unique)]
         some = ["every reaction"] if known.all_unique else some
-        yield f"unique, as equilibrium alone gives it: {'; '.join(some + driven) or 'nothing'}"
+        yield f"determined by equilibrium: {'; '.join(some + driven) or 'nothing'}"
         if not known.all_unique:
             yield HOW_MUCH
     yield from doubts(r)
@@ -452,5 +452,5 @@ def _sentence(text: str) -> str:
     return f"{text[0].upper()}{text[1:].removesuffix('.')}."
 
 
-PARTS: dict[str, Callable[[Facts], Iterator[str]]] = {"What to do:": _to_do, "What may be trusted:": _trusted}
+PARTS: dict[str, Callable[[Facts], Iterator[str]]] = {"Recommended changes:": _to_do, "Determinacy:": _trusted}
 """The parts of the page."""

@@ -268,12 +268,14 @@ class AsmtReader:
     def __init__(self, path: Path, text: str) -> None:
         lines = text.splitlines()
         if not lines or lines[0].strip() not in FIRST_LINES:
-            raise FileError(path, f"is no FreeCAD assembly: line 1 is {shown(lines[0][:80] if lines else '')}")
+            raise FileError(
+                path, f"is not a valid FreeCAD assembly file: line 1 is {shown(lines[0][:80] if lines else '')}"
+            )
         end = next((k for k, line in enumerate(lines) if line.startswith(RESULTS)), len(lines))
         self.results, self.results_line = lines[end:], end + 1
         top = tree_of(lines[1:end], 2).child("Assembly")
         if top is None:
-            raise FileError(path, "is no FreeCAD assembly: there is no line Assembly")
+            raise FileError(path, "is not a valid FreeCAD assembly file: there is no line Assembly")
         self.top = top
         self.faults: list[str] = []
         self.notes: list[str] = []

@@ -162,10 +162,12 @@ def read_xml(path: Path, kind: str, root: str) -> XmlElement:
     try:
         parser.Parse(text, True)
     except expat.ExpatError as error:
-        raise FileError(path, f"is no {kind}: line {error.lineno}: {expat.ErrorString(error.code)}") from None
+        raise FileError(
+            path, f"is not a valid {kind} file: line {error.lineno}: {expat.ErrorString(error.code)}"
+        ) from None
     found = top.children[0]
     if found.tag != root:
-        raise FileError(path, f"is no {kind}: its root is <{shown(found.tag)[1:-1]}>, expected <{root}>")
+        raise FileError(path, f"is not a valid {kind} file: its root is <{shown(found.tag)[1:-1]}>, expected <{root}>")
     return found
 
 

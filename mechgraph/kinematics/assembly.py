@@ -294,7 +294,7 @@ def _closed_start(m: Mechanism, preferred: Mapping[str, float], tol: float) -> C
         turned = _opposite_axis(m, preferred, error)
         best = dict(zip(m.freedom_names(), system.coordinates_of(x[:, None])[:, 0].tolist(), strict=True))
         raise AssemblyError(
-            f"mechanism {m.name!r}: the loops cannot be closed near start; the smallest closure error found is {error:.3g} "
+            f"mechanism {m.name!r}: no closed configuration near start; best closure residual {error:.3g} "
             f"(largest of angle in radians and length / L, L = {system.par.L:.4g}). "
             f"{turned or 'Check the dimensions, or give another start'}",
             error,
@@ -451,7 +451,7 @@ def _not_reached(
     return AssemblyError(
         f"mechanism {m.name!r}: cannot be assembled at {asked}; "
         f"came to {reached}{f'; {why}' if why else f', {error:.3g} short (radians, or lengths / L)'}. "
-        "Take a value in reach, or another start or guess",
+        "Choose a reachable value or another start",
         error,
         best,
     )

@@ -272,7 +272,7 @@ def _kind_faults(m: Parts) -> list[str]:
         if set(map(type, items)) <= set(kind):
             continue
         strange = [item for item in items if not isinstance(item, kind)]
-        faults += [f"{what} {shown(item)}: is no {what}; use {_maker(what)}" for item in strange]
+        faults += [f"{what} {shown(item)}: is not a {what}; use {_maker(what)}" for item in strange]
     return faults
 
 
@@ -336,7 +336,7 @@ def _end_faults(m: Parts, names: Sequence[str]) -> list[str]:
             elif isinstance(end, str) and end not in known:
                 faults.append(f"pair {pair.name!r}: link {end!r} is not declared (links: {', '.join(names)})")
     if not isinstance(m.frame, str) or m.frame not in known:
-        faults.append(f"frame {shown(m.frame)}: is no link (links: {', '.join(names)})")
+        faults.append(f"frame {shown(m.frame)}: is not a link (links: {', '.join(names)})")
     elif all_known and len(names) == len(m.links):
         faults += _connection_faults(m)
     return faults
@@ -436,7 +436,7 @@ def _connection_faults(m: Parts) -> list[str]:
     _, part = scipy.sparse.csgraph.connected_components(graph, directed=False)
     names = m.link_names()
     return [
-        f"link {names[i]!r} is not connected to the frame {m.frame!r} by any chain of pairs; add the pair that holds it"
+        f"link {names[i]!r} is not connected to the frame {m.frame!r}. Add the missing pair"
         for i in np.flatnonzero(part != part[place[m.frame]])
         if place[names[i]] == i
     ]

@@ -76,7 +76,7 @@ class SpurGears(Contact):
     def misfits(self, axes: Axes, fitting: float) -> list[str]:
         """See ``Contact``."""
         if np.abs(cross(axes.za, axes.zb)).max() > fitting:
-            return ["the axes are not parallel; bevel and worm gears are for axes that intersect or cross"]
+            return ["the axes are not parallel. Use BevelGears (intersecting) or WormGear (crossed)"]
         distance = float(np.linalg.norm(axes.across))
         if distance == 0.0:
             return ["both gears have the same axis; their axes must be apart"]

@@ -214,7 +214,7 @@ class Marker(Described):
             if not found and abs(off := cosine(self.axis, self.second)) > most:
                 found.append(
                     f"{where}second = {self.second!r}: not perpendicular to the axis {self.axis!r} (cosine {off:.3g}); "
-                    "this pair type needs the true direction; where numbers are rounded, pass tol= to Mechanism (tol = ... in a file)"
+                    "this type needs a perpendicular direction. For rounded numbers pass tol= to Mechanism (tol = ... in a file)"
                 )
         return found
 

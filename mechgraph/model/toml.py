@@ -71,7 +71,7 @@ def library_path(name: str | None = None) -> Path:
         return folder
     names = _stems(folder)
     if name not in names:
-        raise FileError(folder, f"no mechanism {name!r} in the library; there are: {', '.join(names)}")
+        raise FileError(folder, f"no mechanism {name!r} in the library; available: {', '.join(names)}")
     return folder / f"{name}.toml"
 
 
@@ -371,7 +371,7 @@ def load(name: str | os.PathLike[str]) -> Mechanism:
     if not is_path and text not in library_names():
         raise FileError(
             text,
-            f"no mechanism of that name in the library ({', '.join(library_names())}), and no path to a .toml file",
+            f"neither a library mechanism nor an existing .toml file (library: {', '.join(library_names())})",
         )
     path = Path(text) if is_path else library_path(text)
     data = toml_of(path, text_of(path, "TOML"))

@@ -287,7 +287,7 @@ class Finder:
         x = searched(q.system, q.x, q.columns, drive, guesses, turns, self.rng, self.progress)
         x = np.concatenate([x, *([q.start.x] if np.allclose(q.start.x[self.family.rows, 0], drive) else [])], axis=1)
         why = (
-            f"No class is known: {self.fault}. Searched from {guesses} random guesses within {turns:g} turns of the start; "
+            f"No homotopy available: {self.fault}. Searched from {guesses} random guesses within {turns:g} turns of the start; "
             "others may exist."
         )
         system = q.system
@@ -443,7 +443,7 @@ def _of_class(family: Family, start: StartSet) -> tuple[str, tuple[str, ...]]:
     if known is not None and known.count == N:
         return "proved", (f"The class has at most {N}: {known.source}.",)
     if not trace.passed:
-        return "searched", (loops, "No trace test was passed, so that others may exist.")
+        return "searched", (loops, "No trace test passed; solutions may be missing.")
     words = (
         f"Trace test passed: over {trace.samples} random mechanisms of the class a sum over all assemblies is a rational function of "
         f"degree {trace.degree} (the singular values of its Loewner matrix end there: {trace.last:.1g}, {trace.beyond:.1g})."

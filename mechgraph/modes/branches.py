@@ -460,9 +460,9 @@ class Branches(Shown):
         )
         step = f"{in_degrees(m, driver, self.resolution):.3g}{unit_of(m, driver)}"
         words = [
-            f"Completeness of the assemblies at the samples: {self.completeness}; samples every {step}. A branch that begins and ends "
-            "between two samples is not seen.",
-            *(["Each fold is a double point: the assemblies of two branches are one there."] if folds else []),
+            f"Completeness of the assemblies at the samples: {self.completeness}; samples every {step}. Branches "
+            "between two samples are missed.",
+            *(["At each fold two branches meet in a double root."] if folds else []),
         ]
         if self.open_ends:
             words.append(

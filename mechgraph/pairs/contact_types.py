@@ -316,7 +316,7 @@ def curve_faults(row: Any, curve: Curve, curve_b: Any, roller: Any, point: Any, 
         )
     plane = roller or any(place.tangent == X for place in places)
     found += [
-        f"{where}{name}: is no plane curve, as a pair {row.symbol}{' with a roller' if roller else ''} needs"
+        f"{where}{name}: is not planar; a planar curve is required by pair {row.symbol}{' with a roller' if roller else ''}"
         for name, given in curves.items()
         if plane and not given.once(Travel).is_plane
     ]

@@ -126,9 +126,7 @@ class RestPlace:
         self.task = Task(system, Loads.of(m.loads), still, columns, engine_for(system.n_rows, 1, engine))
         self.go(x)
         if not self.n:
-            raise DeclarationError(
-                f"{call} {m.name!r}", ["nothing can move while its drives are held; m.replace(drives=[]) frees them"]
-            )
+            raise DeclarationError(f"{call} {m.name!r}", ["every freedom is driven; m.replace(drives=[]) frees them"])
 
     def go(self, x: Array) -> None:
         """Lay out a chart at a closed state."""

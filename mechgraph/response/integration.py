@@ -357,7 +357,7 @@ class Integration:
         left = (end - t) * RESPONSE.look / (t - self.segments[-RESPONSE.look].begin)
         message = (
             f"at the length of the last {RESPONSE.look} steps of {self.method}, some {left:.0e} more lead to t = {end:g}; "
-            "where loads are stiff, method='Radau' takes far fewer. Loads that jump, as dry friction does, want to be smoothed"
+            "where loads are stiff, method='Radau' takes far fewer. Smooth discontinuous loads such as dry friction"
         )
         # steps to come from which on the motion is given up: hours and days
         if left > 1e8:

@@ -296,8 +296,8 @@ def _inertia(here: Configuration, V: Array, A: Array) -> Array:
 
 
 NO_INERTIA = (
-    "there is a motion that no inertia resists, so that its acceleration under loads has no bound. Give mass or inertia to what moves "
-    "so, or prescribe its motion"
+    "the mass matrix is singular: one motion has no inertia. Add mass or inertia to the moving links, or prescribe "
+    "that motion"
 )
 
 

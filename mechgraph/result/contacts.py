@@ -368,7 +368,7 @@ class ContactResult(ContactGeometry, Shown):
             if pair.closed == "force":
                 return (
                     f"{pair.name}: {pair.b} lifts off {pair.a} {found.where}: the contact would have to pull with up to {pull}. "
-                    "Forces there are not real; press harder, or hold it on both sides, closed='form'"
+                    "Forces there are not physical. Add preload, or use closed='form' to hold it on both sides"
                 )
             return (
                 f"{pair.name}: {pair.a} pulls {pair.b} {found.where} with up to {pull}, and its profile is open: nothing is said to "

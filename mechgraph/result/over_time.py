@@ -163,7 +163,7 @@ def _times(s: Solution, row: _Row) -> Array:
         raise DeclarationError(
             subject,
             [
-                "the positions have no times: give the motion t=, or a driver that runs one way velocity=; all positions must be solved"
+                "the positions have no times. Pass t=, or velocity= for a driver that never reverses; all positions must be solved"
             ],
         )
     for (one, t), (other, u) in pairwise(found.items()):

@@ -359,10 +359,7 @@ UNASKED = 1_000_000
 RATE = 1e6
 """Reactions that are looked through in a second, about."""
 
-LEAST_NORM = (
-    "Any self-stress can be added to these components; the values shown are those of least norm, an assumption: all pairs equally "
-    "stiff, links rigid, nothing strained at assembly."
-)
+LEAST_NORM = "Statically indeterminate; minimum-norm values (equal pair stiffness, rigid links, no preload)."
 NO_VALUE = (
     "Any self-stress can be added to these components, so they have no value (NaN). The table above shows what is unique; where "
     "components are missing, those that it contains are named in brackets."
@@ -469,8 +466,8 @@ class _SummaryText(PositionLabels):
     def left_out(self, size: int) -> str:
         """What is said in place of the extremes of ``size`` reactions."""
         return (
-            f"The extremes of efforts and reactions ({len(self.m.pairs):,} pairs at {self.status.size:,} positions) were not looked for: "
-            f"s.summary() finds them, in about {max(1, round(size / RATE))} s."
+            f"The extremes of efforts and reactions ({len(self.m.pairs):,} pairs at {self.status.size:,} positions) were not computed; "
+            f"s.summary() computes them, in about {max(1, round(size / RATE))} s."
         )
 
     def forces(self) -> Iterator[Block]:
@@ -556,7 +553,7 @@ class _SummaryText(PositionLabels):
         if P > LISTED:
             yield Paragraph(f"Those of the other {P - LISTED:,} pairs are smaller: s['name'].force, s.to_pandas().")
         of = f"; 'at' is the value of {', '.join(self.drivers)}" if self.drivers else ""
-        held = " *: rests on an effort that no part supplies, see the passive freedoms." if resting else ""
+        held = " *: depends on an artificial holding effort, see the passive freedoms." if resting else ""
         least = " ~: some component of it is not unique, and taken to be that of least norm." if marked else ""
         yield Paragraph(f"Moments are about the pair's own point on link 'on'{of}.{held}{least}")
 

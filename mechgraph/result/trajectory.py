@@ -322,7 +322,7 @@ class Trajectory:
 
     def _force(self, name: str) -> Array:
         if not self.has_forces and self._solved.any():
-            raise MechgraphError("this solution has no forces: it comes from kinematics(); use solve()")
+            raise MechgraphError("this solution has no forces: kinematics() computes none; call solve()")
         return self._of(name)
 
     def _columns(self, pair: int) -> slice:

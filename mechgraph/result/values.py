@@ -170,8 +170,8 @@ class LoadBearing:
     def text(self) -> str:
         """The warning in one sentence."""
         return (
-            f"{self.name}: load-bearing passive freedom, held by {self.size} at most, which no part supplies: the real linkage would move "
-            f"({', '.join(self.freedoms)}), and the reactions of {', '.join(self.pairs)} rest on it"
+            f"{self.name}: load-bearing passive freedom, held by an artificial {self.size.removeprefix('a ')} (max): "
+            f"the real linkage would move ({', '.join(self.freedoms)}), and the reactions of {', '.join(self.pairs)} depend on it"
         )
 
     def __str__(self) -> str:

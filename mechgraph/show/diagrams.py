@@ -714,7 +714,7 @@ class _Picked:
     def __init__(self, study: Study, output: str, part: int | None) -> None:
         if output not in study.outputs:
             raise DeclarationError(
-                "picture of a study", [f"{output!r} is no output; outputs: {', '.join(study.outputs)}"]
+                "picture of a study", [f"{output!r} is not an output; outputs: {', '.join(study.outputs)}"]
             )
         values, self.output = study.outputs[output], output
         positions = study.status.shape[1]

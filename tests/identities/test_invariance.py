@@ -125,7 +125,7 @@ def test_at_a_dead_point() -> None:
     report = mg.check(m)
     assert report.contradicting_drives
     assert not report.determinate
-    assert report.verdict.startswith(("Badly driven", "Under-driven"))
+    assert report.verdict.startswith(("Singular drive", "Under-driven"))
     assert any("O4.Tz cannot drive: dead point" in found.text for found in report.not_drivable)
 
 

@@ -411,8 +411,8 @@ MOST_POSITIONS = 1500
 """Positions of a cycle that are shown; of more, so many evenly spread."""
 
 ARROWS = (
-    "Arrows: force (one head) and moment (two heads) that the first link of a pair exerts on the second; striped where part of the "
-    "reaction is not unique and left out. A hatched name: not all of the reaction of that pair is unique"
+    "Arrows: force (one head) and moment (two heads) that the first link of a pair exerts on the second; striped: partly "
+    "indeterminate, that part omitted. A hatched name: not all of the reaction of that pair is unique"
 )
 
 
@@ -587,7 +587,7 @@ def _title(stress: SelfStress, number: int) -> str:
 def _told(m: Mechanism, stress: SelfStress, L: float) -> str:
     length = with_unit(f"{L:.4g}", m.units.get("length", ""))
     return (
-        f"Reactions that balance each other without any load; assembly can lock in any multiple: {stress.text or 'efforts of couplings'}. "
+        f"Self-equilibrated reactions; assembly can preload any multiple: {stress.text or 'efforts of couplings'}. "
         f"Arrows: on the second link of each pair, the first takes the opposite; moments (two heads) divided by {length}."
     )
 

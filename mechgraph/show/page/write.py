@@ -330,11 +330,11 @@ def _equations(m: Mechanism) -> Document:
 def _judged(r: DeterminacyReport) -> tuple[str, str]:
     """A colour and a word for the verdict, the word for those who do not see the colour."""
     if not r.mechanism.has_geometry:
-        return "fair", "By its graph alone"
+        return "fair", "Topology only"
     if r.mobility is None or r.undriven or r.contradicting_drives:
-        return "bad", "No answer as it stands"
+        return "bad", "No solution"
     if r.near or any(p.load_bearing for p in r.passive) or not (r.determinate or r.own_forces_unique):
-        return "fair", "To be read with care"
+        return "fair", "See warnings"
     return "good", "All is determined" if r.determinate else f"All that a {r.kind.name} model has is unique"
 
 
