@@ -11,6 +11,7 @@ from mechanisms import hexapod, linked_four_bar, ring
 import mechgraph as mg
 from mechgraph.kinematics.assembly import close_all, closed_start, scaled_start
 from mechgraph.kinematics.state import Configuration
+from mechgraph.maths.tolerances import ModeTolerances
 from mechgraph.modes import certificate as certificates
 from mechgraph.modes.assemblies import Question
 from mechgraph.modes.certificate import Ball, certificate, curvature, loop_rows, rows, told_apart
@@ -96,7 +97,7 @@ def largest_curvature(here: Configuration, rng: np.random.Generator) -> float:
 
 def test_second_derivatives_do_not_pass_their_bound(monkeypatch: pytest.MonkeyPatch) -> None:
     """A turn before slides has the most: its part in them counts twice."""
-    monkeypatch.setattr(certificates, "BALL", 1e-9)
+    monkeypatch.setattr(certificates, "MODES", ModeTolerances(ball=1e-9))
     rng = np.random.default_rng(0)
     found = [Question(hexapod(), dict.fromkeys((f"P{k}" for k in range(1, 7)), 0.0)).form.family.here]
     for letters, arm in (("RRCRC", 1.0), ("RPPPPP", 1.0), ("RPPPPP", 0.1), ("RPPPPP", 3.0), ("RPPPPP", 10.0)):
