@@ -172,8 +172,9 @@ class _Course:
     """One passive motion at rest along all steps.
 
     Its axes ``u (3, steps, points + 2)`` at the places of every step by the ``rule``, references ``e``, ``c (3, steps)`` of the
-    amount, the amount where a step ``begin``s, the Legendre ``series`` of its further change, and by how much it differs after the whole
-    track, where that is a ``period``.
+    amount, the amount where a step ``begin``s, the Legendre ``series`` of its further change, what is ``missing`` to rest where a step
+    begins, how much more is where it ends (``grows``), and by how much the amount differs after the whole track, where that is a
+    ``period``.
     """
 
     rule: Rule
@@ -182,15 +183,23 @@ class _Course:
     c: Array
     begin: Array
     series: Array
+    missing: Array
+    grows: Array
     period: Array
 
-    def missing(self, at: _At, step: Index, t: Array, turns: Index) -> tuple[Array, Array]:
-        """Amounts ``(n,)`` that are missing to rest in steps at ``t`` from -1 to 1, so many periods later; their increments ``(F, n)``."""
+    def left(self, at: _At, step: Index, t: Array, turns: Index, expected: Array | None) -> tuple[Array, Array]:
+        """Amounts ``(n,)`` that are missing to rest in steps at ``t`` from -1 to 1, so many periods later; their increments ``(F, n)``.
+
+        Poses tell a turn but for whole turns, of which there are as many as in what is ``expected``: along the track it grows evenly.
+        """
         nearest = np.argmin(np.abs(t[:, None] - self.rule.places), axis=1)
         at = at.in_sense(self.u[:, step, nearest])
         amount = self.begin[step] + (self.series[step] * self.rule.integrals(t)).sum(axis=1) + turns * self.period[step]
         amount = amount - at.amount(self.e[:, step], self.c[:, step])
-        amount = _wrapped(amount) if at.turns else amount
+        if at.turns:
+            if expected is None:
+                expected = self.missing[step] + 0.5 * (t + 1.0) * self.grows[step] + turns * self.period[step]
+            amount = expected + _wrapped(amount - expected)
         return amount, at.unit * amount
 
 
@@ -262,21 +271,32 @@ class _Carried:
         begin[inner] += series[inner - 1, 0]
         begin = np.cumsum(begin)
         begin += (amount(left[first], first, 0) - begin[first])[of_track]
+        every_step = np.arange(n)
+        missing = begin - amount(left, every_step, 0)
+        grows = begin + series[:, 0] - amount(right, every_step, -1) - missing
         # a track that comes back to where it starts comes back with its passive links moved
         period = begin[last] + series[last, 0] - amount(left[first], last, -1)
+        if here.turns:
+            grows = _wrapped(grows)
+            missing = np.cumsum(grows) - grows
+            missing -= missing[first][of_track]
+            period = missing[last] + grows[last] + _wrapped(period - missing[last] - grows[last])
         period *= np.where((u[:, last, -1] * u[:, first, 0]).sum(axis=0) < 0, -1.0, 1.0)
-        return _Course(self._rule, u, e, c, begin, series, period[of_track])
+        return _Course(self._rule, u, e, c, begin, series, missing, grows, period[of_track])
 
     def turned(self, x: Array, which: Index, track: Index, place: Array, turns: Index) -> tuple[Array, Mask]:
         """States with all passive links moved to where they stand when they are at rest, ``turns`` periods of the track later.
 
         Also where that is beyond doubt.
         """
-        part = np.ones(len(track))
-        for _ in range(MOST_TURNS):
-            amount, dq, sure = self._missing(x, which, track, place, turns)
-            if amount.max(initial=0.0) < UNTURNED:
+        part, left, times = np.ones(len(track)), None, 0
+        while True:
+            amounts, dq, sure = self._missing(x, which, track, place, turns, left)
+            amount = np.abs(list(amounts.values())).max(axis=0)
+            most = MOST_TURNS * (1 + int(amount.max(initial=0.0) / np.pi)) if left is None else most
+            if amount.max(initial=0.0) < UNTURNED or times == most:
                 break
+            times += 1
             # exact where the rates of the motion are constant (ball joints, hinges), so that nothing is left to correct; over a plane it
             # comes nearer with every repetition, by parts of the way that need no large correction
             closed = self.follower.newton.close(self.path.advance(x, part * dq, track), x[self.path.rows], track, which)
@@ -285,6 +305,7 @@ class _Carried:
                 break
             near = closed.done & (closed.correction <= PATH.correction)
             x = np.where(near, closed.x, x)
+            left = {i: a * (1.0 - np.where(near, part, 0.0)) for i, a in amounts.items()}
             easily = near & (closed.correction <= 0.25 * PATH.correction)  # it grows with the square of the part
             part = np.where(easily, np.minimum(2.0 * part, 1.0), np.where(near, part, 0.5 * part))
             # freedoms that held the motion may no longer do so where it has led
@@ -293,22 +314,28 @@ class _Carried:
 
     def spin(self, nodes: Nodes) -> Array:
         """Increments ``(F, nodes)`` from nodes to one period later."""
-        return self._missing(nodes.x, nodes.which, nodes.track, nodes.place, np.ones(len(nodes), dtype=np.intp))[1]
+        return self._missing(nodes.x, nodes.which, nodes.track, nodes.place, np.ones(len(nodes), dtype=np.intp), None)[
+            1
+        ]
 
-    def _missing(self, x: Array, which: Index, track: Index, place: Array, turns: Index) -> tuple[Array, Array, Mask]:
-        """Amounts ``(n,)`` by which states miss rest, increments ``(F, n)`` that lead there, and where the way to it is beyond doubt."""
+    def _missing(
+        self, x: Array, which: Index, track: Index, place: Array, turns: Index, expected: dict[int, Array] | None
+    ) -> tuple[dict[int, Array], Array, Mask]:
+        """Amounts ``(n,)`` by motion by which states miss rest, increments ``(F, n)`` that lead there, and where the way to it is beyond
+        doubt.
+        """
         nodes = self.interpolation.nodes
         tracks = nodes.track[self.interpolation.left]
         moved = np.isin(track, tracks)
         step = self.interpolation.find(np.where(moved, track, tracks[0]), place)
         t = 2.0 * (place - nodes.place[self.interpolation.left[step]]) / self._h[step] - 1.0
         here, _ = self._motions(x, which, track)
-        dq, most = np.zeros((here.rates.shape[0], x.shape[1])), np.zeros(x.shape[1])
+        dq, amounts = np.zeros((here.rates.shape[0], x.shape[1])), {}
         for i, course in self._courses.items():
-            amount, part = course.missing(_At.of(here, i), step, t, turns)
-            most = np.maximum(most, np.abs(np.where(moved, amount, 0.0)))
+            amount, part = course.left(_At.of(here, i), step, t, turns, None if expected is None else expected[i])
+            amounts[i] = np.where(moved, amount, 0.0)
             dq += np.where(moved, part, 0.0)
-        return most, dq, self._sure[step] | ~moved
+        return amounts, dq, self._sure[step] | ~moved
 
 
 def _turning(e: Array, u: Array, du: Array) -> Array:

@@ -402,11 +402,6 @@ class ResponseTolerances:
         float,
         "Difference of poses (and part of the largest term) after a turn of the coordinate up to which the path has come back.",
     ] = 1e-9
-    beside_ends: Annotated[
-        float,
-        "Part of a step beside its ends at which is looked too, so that a height that turns in the first or last part is seen "
-        "to.",
-    ] = 1e-5
     look: Annotated[int, "Steps after which the length of steps is looked at."] = 500
     touching: Annotated[float, "Gap (radians, lengths / L) up to which a stop counts as closed."] = 1e-9
     lowest: Annotated[

@@ -28,7 +28,16 @@ from mechgraph.modes.family import NO_NUMBERS, Array, Family, at_rest
 from mechgraph.modes.form import EquationForm, RodChain, Whole, WithoutRods, rods_of
 from mechgraph.modes.result import Assemblies, AssembliesOver, ComplexModes, Continuum, weakest
 from mechgraph.modes.start_sets import Irregular, StartSet, bound, distinct, keep, kept, start_set
-from mechgraph.modes.targets import MOST_FOLLOWED, REAL, Ends, EquationGroup, Product, Undivided, groups_of, is_real
+from mechgraph.modes.targets import (
+    MOST_FOLLOWED,
+    Ends,
+    EquationGroup,
+    Product,
+    Undivided,
+    groups_of,
+    is_real,
+    least_imaginary,
+)
 from mechgraph.quantities import Count, Positive, door
 from mechgraph.quantities import Index as Seed
 
@@ -314,7 +323,7 @@ class Finder:
         N = prod(start.x.shape[1] for start in self.starts)
         # rods that would need complex turns to be put back are not real
         x, others = self.form.lifted(solved, i), self.form.lifted(np.delete(found.x, real, axis=1), i)
-        complex_ = np.abs(x.imag).max(axis=0, initial=0.0) > REAL
+        complex_ = np.abs(x.imag).max(axis=0, initial=0.0) > least_imaginary()
         system = self.question.system
         off = Configuration(system, x.real).closure
         # closure error of what is real with its rods put back

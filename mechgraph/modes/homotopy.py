@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -229,7 +229,7 @@ class Care:
 
     aim: float = 1e-2
     most: float = 5e-2
-    noise: float = MODES.most_noise
+    noise: float = field(default_factory=lambda: MODES.most_noise)
 
     @property
     def finer(self) -> Care:
@@ -351,7 +351,7 @@ def rounding(size: Array) -> Array:
     return np.asarray(3e-14 * size**3)
 
 
-def polished(leg: Leg, x: Array, t: complex, tracks: Index, most: float = MODES.most_noise) -> tuple[Array, Mask]:
+def polished(leg: Leg, x: Array, t: complex, tracks: Index, most: float | None = None) -> tuple[Array, Mask]:
     """States closed by Newton to rounding at one ``t``, passive bodies turned to where they are least imaginary; which closed."""
     eq = leg.equations
     places = np.full(x.shape[1], t)
@@ -376,7 +376,7 @@ def polished(leg: Leg, x: Array, t: complex, tracks: Index, most: float = MODES.
             # last Newton step at the end of a track
             if (last < 1e-12).all():
                 break
-        noise = np.minimum(here.noise, most)
+        noise = np.minimum(here.noise, MODES.most_noise if most is None else most)
     # last Newton step, against the size of the state, up to which a track has come to its end
     return x, last < 1e-8 * np.maximum(1.0, np.abs(x).max(axis=0)) + noise
 

@@ -445,16 +445,21 @@ def groups_of(family: Family) -> Sequence[Undivided | EquationGroup]:
     return [Undivided(family)]
 
 
-REAL = 0.5 * MODES.one_assembly
-"""Imaginary part of link poses up to which an assembly counts as real: of two that can be told from each other it is larger."""
 MOST_FOLLOWED = 5000
 """Tracks of a group to one position, at most: beyond that only real assemblies of the groups before are gone on with."""
+
+
+def least_imaginary() -> float:
+    """Imaginary part of link poses up to which an assembly counts as real: of two that can be told from each other it is larger."""
+    return 0.5 * MODES.one_assembly
 
 
 def is_real(poses: Array, error: Array) -> Array:
     """Which assemblies count as real, by what tells them apart ``(n, V)``, of which they may be off by an ``error (V,)``."""
     size = np.maximum(1.0, np.abs(poses).max(axis=0, initial=0.0))
-    return np.asarray(np.abs(poses.imag).max(axis=0, initial=0.0) / size < np.clip(error, REAL, MODES.real_singular))
+    return np.asarray(
+        np.abs(poses.imag).max(axis=0, initial=0.0) / size < np.clip(error, least_imaginary(), MODES.real_singular)
+    )
 
 
 class Product:

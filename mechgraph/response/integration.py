@@ -72,8 +72,8 @@ def overlooked(by_time: Callable[[Array], Array], begin: float, end: float, apar
     return bool((missed > 100.0 * allowed).any())
 
 
-WATCHED_IN_STEP = np.union1d(np.linspace(0.0, 1.0, 9), [RESPONSE.beside_ends, 1.0 - RESPONSE.beside_ends])
-"""Places of looks at events in a step of length 1."""
+WATCHED_IN_STEP = np.union1d(np.linspace(0.0, 1.0, 9), [1e-5, 1.0 - 1e-5])
+"""Places of looks at events in a step of length 1; so close to its ends that a height that turns in the first or last part is seen to."""
 LOOKS_IN_STEP = np.union1d(WATCHED_IN_STEP, 0.5 ** np.arange(4, 20))
 """Parts of a step at which stops are looked at: closely behind its beginning, where a freedom may have just left its stop."""
 
