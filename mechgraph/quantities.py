@@ -420,7 +420,7 @@ def with_doors(cls: type) -> None:
 
 def with_memory(cls: type) -> None:
     """Let the public methods and properties of a class go by the tolerances under which an object was made."""
-    ours = [base for base in reversed(cls.__mro__) if base.__module__.startswith("mechgraph")]
+    ours = [base for base in reversed(cls.__mro__) if base is cls or base.__module__.startswith("mechgraph")]
     for name, one in {name: one for base in ours for name, one in vars(base).items()}.items():
         if name.startswith("_") or hasattr(getattr(one, "func", getattr(one, "fget", one)), "__wrapped__"):
             continue

@@ -482,7 +482,7 @@ def test_the_end_of_an_open_curve_ends_the_reach_by_name(reversed_):
         ],
         ["A"],
     )
-    with pytest.raises(mg.ReachError, match=r"X\.Ts comes to the end of its curve"):
+    with pytest.raises(mg.ReachError, match=r"X\.Ts reaches the end of its curve"):
         mg.solve(m, {"A": np.linspace(0, 0.7, 8)})
     s = mg.solve(m, {"A": np.linspace(-0.7, 0.7, 15)}, on_reach="flag")
     assert s.status.tolist() == ["out of reach"] * 2 + ["ok"] * 11 + ["out of reach"] * 2
@@ -526,7 +526,7 @@ def test_two_drivers_come_back_from_beyond_an_end(driver, engine):
             ok = np.abs(q) <= 0.5
             assert s.status.tolist() == np.where(ok, "ok", "out of reach").tolist()
             assert_allclose(s["X"].position[ok, 0], 2 * q[ok], atol=1e-12)
-    with pytest.raises(mg.ReachError, match=r"X\.Ts comes to the end") as error:
+    with pytest.raises(mg.ReachError, match=r"X\.Ts reaches the end") as error:
         mg.kinematics(m, {driver: [0.0, 1.9], "B": [0.0, 0.0]}, engine=engine)
     assert error.value.value[f"{driver}.{'Rz' if driver == 'A' else 'Ts'}"] == pytest.approx(
         1 if driver == "X" else 0.5

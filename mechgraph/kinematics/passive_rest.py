@@ -289,11 +289,12 @@ class _Carried:
 
         Also where that is beyond doubt.
         """
-        part, left, times = np.ones(len(track)), None, 0
+        part, left, times, most = np.ones(len(track)), None, 0, 0
         while True:
             amounts, dq, sure = self._missing(x, which, track, place, turns, left)
             amount = np.abs(list(amounts.values())).max(axis=0)
-            most = MOST_TURNS * (1 + int(amount.max(initial=0.0) / np.pi)) if left is None else most
+            if left is None:
+                most = MOST_TURNS * (1 + int(amount.max(initial=0.0) / np.pi))
             if amount.max(initial=0.0) < UNTURNED or times == most:
                 break
             times += 1

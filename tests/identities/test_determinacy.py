@@ -277,7 +277,7 @@ def test_a_couple_about_the_coupler_has_to_be_held_and_is_returned():
     m = rssr()
     p, q = np.array(m.pair("B").point), np.array(m.pair("C").point)
     couple = 2.0 * (q - p) / np.linalg.norm(q - p)
-    with pytest.warns(mg.MechgraphWarning, match="couple of 2 at most"):
+    with pytest.warns(mg.MechgraphWarning, match=r"couple of 2 \(max\)"):
         held = mg.solve(m, {"A": 0.0}, loads=[mg.Wrench("l2", moment=couple)])
     (value,) = held.passive_effort.values()
     assert abs(value) > 0.5
@@ -313,7 +313,7 @@ def test_drivers_that_contradict_each_other_are_refused():
     with pytest.raises(mg.MechgraphError) as caught:
         mg.solve(m, {"A": mg.Motion([0.0, 0.1], 1.0), "D": mg.Motion([0.0, 0.3], 1.0)})
     assert isinstance(caught.value, mg.IndeterminateError | mg.ReachError)
-    with pytest.raises(mg.IndeterminateError, match="contradict"):
+    with pytest.raises(mg.IndeterminateError, match="conflict"):
         mg.solve(m, {"A": mg.Motion(0.0, 1.0), "D": mg.Motion(0.0, -5.0)})
     s = mg.solve(
         m, {"A": mg.Motion(0.0, 1.0), "D": mg.Motion(0.0, good["D"].velocity[0, 0], good["D"].acceleration[0, 0])}
