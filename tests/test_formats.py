@@ -134,7 +134,9 @@ def test_a_suffix_that_says_nothing(tmp_path: Path) -> None:
 def test_a_missing_package_names_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "h5netcdf", None)
     pytest.importorskip("xarray")
-    with pytest.raises(mg.MissingExtraError, match=r"h5netcdf is not installed. Run: pip install 'mechgraph\[netcdf\]'"):
+    with pytest.raises(
+        mg.MissingExtraError, match=r"h5netcdf is not installed. Run: pip install 'mechgraph\[netcdf\]'"
+    ):
         crank().write(tmp_path / "x.nc")
 
 
