@@ -50,7 +50,7 @@ def unspun(path: DriverPath, found: Positions, passive: tuple[PassiveMotion, ...
     if not len(nodes.steps[0]) or not found.moved.any():
         return found
     carried = (
-        _Carried(path, *parts_of_steps(path, found), found.follower, passive)
+        _Carried(path, found, *parts_of_steps(path, found), passive)
         if are_alone(passive)
         else PassiveSteps(path, Interpolation(path, nodes), found.follower, passive)
     )
@@ -209,12 +209,13 @@ class _Carried:
     def __init__(
         self,
         path: DriverPath,
+        found: Positions,
         interpolation: Interpolation,
         rule: Rule,
-        follower: Follower,
         passive: tuple[PassiveMotion, ...],
     ) -> None:
-        self.path, self.interpolation, self.follower, self.passive = path, interpolation, follower, passive
+        self.path, self.interpolation, self.follower, self.passive = path, interpolation, found.follower, passive
+        self._found = found
         nodes, left = interpolation.nodes, interpolation.left
         self._h = nodes.place[interpolation.right] - nodes.place[left]
         self._rule = rule
@@ -280,9 +281,24 @@ class _Carried:
             grows = _wrapped(grows)
             missing = np.cumsum(grows) - grows
             missing -= missing[first][of_track]
-            period = missing[last] + grows[last] + _wrapped(period - missing[last] - grows[last])
+            # from the start with the turns that count as gained, which need not be those nearest to what the held motion gains
+            unit = here.unit[:, left[first]]
+            of_held = (unit * self._off_gained(left[first], right[last])).sum(axis=0) / (unit * unit).sum(axis=0)
+            of_held *= np.where((u[:, last, -1] * u[:, first, 0]).sum(axis=0) < 0, -1.0, 1.0)
+            expected = missing[last] + grows[last] + of_held
+            period = expected + _wrapped(period - expected)
         period *= np.where((u[:, last, -1] * u[:, first, 0]).sum(axis=0) < 0, -1.0, 1.0)
         return _Course(self._rule, u, e, c, begin, series, missing, grows, period[of_track])
+
+    def _off_gained(self, start: Index, end: Index) -> Array:
+        """Increments ``(F, tracks)`` from the starts of tracks, with what counts as gained in a period, to their ends."""
+        found, nodes = self._found, self.interpolation.nodes
+        out = self.path.difference(nodes.x[:, end], nodes.x[:, start])
+        if found.turns is not None and found.gained is not None:
+            for i, track in enumerate(nodes.track[start]):
+                later = np.flatnonzero((found.track == track) & (found.turns > 0))[:1]
+                out[:, i] -= (found.gained[:, later] / found.turns[later]).sum(axis=1)
+        return out
 
     def turned(self, x: Array, which: Index, track: Index, place: Array, turns: Index) -> tuple[Array, Mask]:
         """States with all passive links moved to where they stand when they are at rest, ``turns`` periods of the track later.

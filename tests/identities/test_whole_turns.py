@@ -65,3 +65,21 @@ def test_periods_of_a_rod_that_turns_are_continued_many_together(monkeypatch):
     assert len(calls) < 1000
     near = mg.kinematics(m, {"A": [1e5 - 2 * np.pi * np.floor(1e5 / (2 * np.pi))]})
     np.testing.assert_allclose(s["D"].position % (2 * np.pi), near["D"].position % (2 * np.pi), atol=1e-8)
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize("turns", [2.4, 10.0, -3.0])
+def test_a_bush_at_rest_counts_every_turn(engine: str, turns: float) -> None:
+    """Between two hinges on one axis of a crank about z: at rest it turns in the crank by the crank's turn times the cosine of the axes."""
+    axes = np.array([[0, 0, 1.0], [0.3, 0.05, 1.0], [0.9, 0.8, 0.7], [-0.3, 1.0, 0.6]])
+    hinges = [
+        ("A", "frame", "a", 0),
+        ("B1", "a", "bush", 1),
+        ("B2", "bush", "b", 1),
+        ("C", "b", "c", 2),
+        ("D", "c", "frame", 3),
+    ]
+    pairs = [mg.Pair(name, "R", a, b, point=1.2 * axes[i], axis=axes[i]) for name, a, b, i in hinges]
+    crank = np.array([0.4, 1.0]) * 2 * np.pi * turns
+    s = mg.kinematics(mg.Mechanism("bush", None, pairs, ["A"]), {"A": crank}, engine=engine)
+    assert np.allclose(s["B1"].position.ravel(), -crank / np.linalg.norm(axes[1]), atol=1e-10)
