@@ -363,8 +363,8 @@ class Wanted(NamedTuple):
 def door(function: Callable[P, R]) -> Callable[P, R]:
     """A public function that refuses arguments which its annotations exclude, and calls without or with too many of them.
 
-    It runs under the tolerances that its first argument carries which carries any, or under those given as ``tolerances``, with which a
-    mechanism is then asked.
+    It runs under the tolerances of its first argument that remembers some (the default ones count), or under those given as
+    ``tolerances``, with which a mechanism is then asked.
 
     Raises
     ------

@@ -569,9 +569,8 @@ def _verdict_of(m: Mechanism, doubt: float | None = None) -> tuple[Any, ...]:
 def hinted(m: Mechanism, error: MechgraphError) -> MechgraphError:
     """An error that also says what tolerance would change the verdict, or make exact what is so to rounding only, where one would."""
     try:
-        found = rounding(
-            m, partial(_verdict_of, doubt=EXACT), 2.0
-        )  # seconds of work that an error may wait for the same
+        # an error may wait for two seconds of work
+        found = rounding(m, partial(_verdict_of, doubt=EXACT), 2.0)
     except SearchEnded:
         return error
     if found is not None:

@@ -71,8 +71,8 @@ def _fault(here: Configuration) -> str:
     i, names = int(lost[np.argmin(part[lost])]), [p.name for p in s.m.pairs]
     return (
         f"lengths are too far apart: {names[pair[i]]} and {names[pair[after[i]]]} are {apart[i] * s.par.L:.3g} apart in the loop "
-        f"{listed(names[k] for k in pair[loop == loop[i]])} of size {size[loop[i]] * s.par.L:.3g}; expected at least {too_near:g} of "
-        "that, or the same point. Make small lengths larger or zero, or replace long links by slides (the end of a link so long "
+        f"{listed(names[k] for k in pair[loop == loop[i]])} of size {size[loop[i]] * s.par.L:.3g}; expected at least {too_near:g} times "
+        "that size, or the same point. Make small lengths larger or zero, or replace long links by slides (the end of a link so long "
         "moves along a line)"
     )
 

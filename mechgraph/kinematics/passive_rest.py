@@ -295,9 +295,11 @@ class _Carried:
         found, nodes = self._found, self.interpolation.nodes
         out = self.path.difference(nodes.x[:, end], nodes.x[:, start])
         if found.turns is not None and found.gained is not None:
-            for i, track in enumerate(nodes.track[start]):
-                later = np.flatnonzero((found.track == track) & (found.turns > 0))[:1]
-                out[:, i] -= (found.gained[:, later] / found.turns[later]).sum(axis=1)
+            later = np.flatnonzero(found.turns > 0)
+            track, first = np.unique(found.track[later], return_index=True)
+            gained = np.zeros((out.shape[0], 1 + max(found.track.max(initial=0), nodes.track.max(initial=0))))
+            gained[:, track] = found.gained[:, later[first]] / found.turns[later[first]]
+            out -= gained[:, nodes.track[start]]
         return out
 
     def turned(self, x: Array, which: Index, track: Index, place: Array, turns: Index) -> tuple[Array, Mask]:
