@@ -13,6 +13,7 @@ import functools
 import random
 import re
 import signal
+import tempfile
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -23,9 +24,8 @@ import scipy
 from public import every_door
 
 import mechgraph as mg
-from mechgraph.model import toml
-from mechgraph.model.toml import library_path
 
+LIBRARY = Path(__file__).resolve().parents[1] / "library"
 PATIENCE = 10
 """Seconds of processor time that one input may take."""
 NAN, INF = float("nan"), float("inf")
@@ -89,7 +89,9 @@ def used(m: mg.Mechanism, rng: random.Random) -> None:
         answered(f.text, "equations")
         if s is not None and len(f.unknowns) <= 400:
             answered(lambda: f.coefficients(s.state(0 if s.batch else ())), "numbers of the equations")
-    answered(lambda: toml.parse(toml.to_data(m), "again"), "to a file and back")
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "m.toml"
+        answered(lambda: (mg.save(m, file), mg.load(file)), "to a file and back")
 
 
 # --- files -------------------------------------------------------------------------------------------------------------------
@@ -153,7 +155,7 @@ NUMBER = re.compile(r"-?\d+\.?\d*(e[-+]?\d+)?")
 
 @functools.cache
 def _texts() -> tuple[str, ...]:
-    return tuple(library_path(name).read_text(encoding="utf-8") for name in mg.library())
+    return tuple((LIBRARY / f"{name}.toml").read_text(encoding="utf-8") for name in mg.library())
 
 
 def mutated(rng: random.Random) -> bytes:

@@ -1,16 +1,23 @@
 """The program `mechgraph` as tests call it: inside this process, or as a process of its own."""
 
+import json
 import os
 import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 from typer.testing import CliRunner, Result
 
 from mechgraph.cli import app
 
 ROOT = Path(__file__).resolve().parents[1]
+
+
+def schema(of: str) -> dict[str, Any]:
+    """The JSON schema of ``mechanism`` files or of the program's ``output``, as it is given to users."""
+    return json.loads((ROOT / "library" / f"{of}.schema.json").read_text(encoding="utf-8"))
 
 
 def invoke(*arguments: str | Path, **environment: str) -> Result:

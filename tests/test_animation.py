@@ -13,12 +13,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from PIL import Image
-from program import invoke
+from program import invoke, schema
 from test_show import four_bar
 
 import mechgraph as mg
 from mechgraph import show
-from mechgraph.cli.records import output_schema
 
 THETA = np.linspace(0, 2 * np.pi, 9)
 FAST = {"frames": 3, "dpi": 40.0}
@@ -127,7 +126,7 @@ def test_the_plot_command_draws_every_kind(tmp_path: Path) -> None:
     result = invoke("plot", "four-bar", "--out", tmp_path / "film.gif", "--frames", "2", "--json")
     assert result.exit_code == 0
     data = json.loads(result.stdout)
-    jsonschema.Draft202012Validator(output_schema()).validate(data)
+    jsonschema.Draft202012Validator(schema("output")).validate(data)
     assert (data["mechanism"], data["picture"], data["file"]) == ("four-bar", "skeleton", str(tmp_path / "film.gif"))
     with Image.open(tmp_path / "film.gif") as film:
         assert film.n_frames == 2

@@ -1,6 +1,6 @@
 """Kinematic chains: their numbers in the literature, brute force, names, inversions; system groups."""
 
-from itertools import combinations, pairwise, permutations
+from itertools import combinations, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -10,35 +10,6 @@ import pytest
 
 import mechgraph as mg
 from mechgraph import show
-from mechgraph.graph.chains import contracted_graphs, least_orders, symmetries
-
-
-def test_orders_are_those_of_all_symmetries() -> None:
-    cube = nx.to_numpy_array(nx.hypercube_graph(3)).astype(int).tolist()
-    _, orders = least_orders(cube)
-    assert len(orders) == 48
-    for p in symmetries(orders):
-        assert all(cube[p[u]][p[v]] == cube[u][v] for u in range(8) for v in range(8))
-
-
-def test_the_least_matrix_does_not_depend_on_the_order_of_nodes() -> None:
-    rng = np.random.default_rng(5)
-    for seed in range(20):
-        A = nx.to_numpy_array(nx.gnm_random_graph(8, 13, seed=seed)).astype(int)
-        code, orders = least_orders(A.tolist())
-        for _ in range(5):
-            p = rng.permutation(8)
-            assert least_orders(A[np.ix_(p, p)].tolist())[0] == code
-        brute = sum((A[np.ix_(p, p)] == A).all() for p in permutations(range(8))) if seed < 2 else len(orders)
-        assert brute == len(orders)
-
-
-@pytest.mark.parametrize(("loops", "count", "cubic"), [(2, 1, 1), (3, 4, 2), (4, 17, 5), (5, 118, 16)])
-def test_contracted_graphs(loops: int, count: int, cubic: int) -> None:
-    """Tsai, Mechanism Design, 2001, appendix C: 1, 4 (of them 2 cubic) and 17; Woo 1967."""
-    found = list(contracted_graphs(loops))
-    assert (len(found), sum(g.nodes == 2 * (loops - 1) for g in found)) == (count, cubic)
-    assert all(g.in_one_block for g in found)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ from mechanisms import linked_four_bar
 from test_assembly_groups import spatial
 
 import mechgraph as mg
-from mechgraph.modes.branches import GOLDEN
 
 
 def angle_at(a: float, d: float, reach: float) -> float:
@@ -134,7 +133,7 @@ def test_whether_the_driver_turns_right_round_does_not_depend_on_the_samples(sam
 def test_samples_that_lie_on_double_points_are_moved_and_ends_that_are_not_told_are_no_ends(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    m = linked_four_bar(1.0, 2.0, 1.0, 2.0, np.pi - 2 * np.pi / 12 * (2 + GOLDEN))
+    m = linked_four_bar(1.0, 2.0, 1.0, 2.0, np.pi - 2 * np.pi / 12 * (2 + (3 - 5**0.5) / 2))
     assert mg.branches(m, "O0", samples=12, points=60).full_turn == (True, True)
     monkeypatch.setattr("mechgraph.modes.branches.SPREADS", 1)
     b = mg.branches(m, "O0", samples=12, points=60)

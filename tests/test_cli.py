@@ -16,7 +16,6 @@ from mechanisms import unclosable_four_bar
 from program import bad, heard, invoke, process, run
 
 import mechgraph as mg
-from mechgraph.cli.options import parse_drive
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -393,29 +392,6 @@ def test_out_writes_the_table(tmp_path: Path) -> None:
 
 
 # --- drives ------------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("text", "positions", "velocity", "acceleration"),
-    [
-        ("O1=0:360:90deg", np.deg2rad([0, 90, 180, 270]), 0.0, 0.0),
-        ("O1=0:1:0.25", [0, 0.25, 0.5, 0.75], 0.0, 0.0),
-        ("O1=0deg:90deg:45deg@10", np.deg2rad([0, 45]), 10.0, 0.0),
-        ("O1=10:-20:-10deg@-2@0.5", np.deg2rad([10, 0, -10]), -2.0, 0.5),
-        ("O1.Rz=30deg@60deg/s@90deg/s^2", np.deg2rad(30), np.deg2rad(60), np.deg2rad(90)),
-        ("O1 = 0.1rad", 0.1, 0.0, 0.0),
-        ("O1=0:0.3:0.1", [0, 0.1, 0.2], 0.0, 0.0),
-        ("O1=1e-1:.25:5.e-2", [0.1, 0.15, 0.2], 0.0, 0.0),
-        ("O2.Tz=-9:-8:0.5@2", [-9.0, -8.5], 2.0, 0.0),
-    ],
-)
-def test_drive_syntax(text: str, positions: list[float], velocity: float, acceleration: float) -> None:
-    name, motion = parse_drive(mg.load("rcsr"), text)
-    assert name in text
-    assert np.allclose(motion.position, positions, atol=1e-15)
-    assert motion.shape == np.shape(positions)
-    assert np.allclose(motion.velocity, velocity)
-    assert np.allclose(motion.acceleration, acceleration)
 
 
 def test_several_drives_describe_the_same_positions(tmp_path: Path) -> None:

@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
-from mechgraph.compiled import compiled as module
-from mechgraph.kernel import build, compiler
 
 pytestmark = pytest.mark.usefixtures("compiled")
 
@@ -85,8 +83,7 @@ def test_a_refused_call_says_why_and_keeps_the_last_good_state():
     c = mg.compile(m)
     good = c(2.8)
     assert np.isnan(c(4.0)).all()  # beyond the end of its reach, 3.58
-    assert c.status in module.WORDS
-    assert c.status != "ok"
+    assert c.status == "out of reach"
     assert np.isnan(c.reaction("O1")).all()
     assert np.isnan(c.link("link1")).all()
     assert np.isnan(c.gradient("O1.effort", ["length[1]"])).all()
@@ -281,24 +278,6 @@ def test_what_is_not_carried_is_named():
         mg.compile(mg.load("four-bar").replace(drives=[]))
     with pytest.raises(mg.DeclarationError):
         mg.compile("four-bar")
-
-
-def test_without_a_compiler(monkeypatch, tmp_path):
-    monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.setenv("MECHGRAPH_CACHE", str(tmp_path))
-    monkeypatch.setattr(build, "PACKAGED", tmp_path)
-    monkeypatch.setattr(compiler.importlib.util, "find_spec", lambda name: None)
-    monkeypatch.delenv("CC", raising=False)
-    build.installed.cache_clear()
-    module._functions.cache_clear()
-    try:
-        with pytest.raises(
-            mg.MissingExtraError, match=r"^a C compiler is not installed\. Run: pip install 'mechgraph\[fast\]'$"
-        ):
-            mg.compile(mg.load("four-bar"))
-    finally:
-        build.installed.cache_clear()
-        module._functions.cache_clear()
 
 
 @pytest.mark.parametrize("name", ["crank.mass", "coupler.inertia.zz", "coupler.center.x"])

@@ -1,11 +1,19 @@
 """The renderings of a document: wording, width, escaping, and nothing lost."""
 
+from __future__ import annotations
+
 import html
 import re
+import shutil
+import subprocess
 from html.parser import HTMLParser
+from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
+from test_hostile_names import NAMES, named
 
+import mechgraph as mg
 from mechgraph.document import (
     Bullets,
     Code,
@@ -17,9 +25,11 @@ from mechgraph.document import (
     Table,
     to_html,
     to_latex,
+    to_latex_file,
     to_markdown,
     to_text,
 )
+from mechgraph.equations.terms import Symbol, mathml
 
 RENDERERS = [to_text, to_markdown, to_html, to_latex]
 
@@ -349,3 +359,149 @@ def test_a_legend_has_its_symbols_as_text_or_as_mathematics() -> None:
     assert "<li>rho_k: pitch of a_b</li>" in to_html(body(legend))
     assert to_latex(body(legend)).splitlines()[1:3] == [r"\item $\rho_{k}$: pitch of a\_b", r"\item $P_{k}$: point"]
     assert [render(body(Legend([]))) for render in RENDERERS] == ["\n"] * 4
+
+
+# --- MathML -------------------------------------------------------------------------------------------------------------
+
+
+ACCENTS = {"¯": "bar", "˙": "dot", "¨": "ddot", "^": "hat"}
+SIGNS = {
+    "ϵ": r"\epsilon", "⋅": r"\cdot", "×": r"\times", "exp": r"\exp", "−": "-", "′": "'",
+    "ρ": r"\rho", "θ": r"\theta", "ω": r"\omega", "α": r"\alpha",
+}  # fmt: skip
+
+
+def latex_of(node: ElementTree.Element) -> str:
+    """LaTeX of a MathML element, without blanks."""
+    inside = [latex_of(child) for child in node]
+    text = "".join((node.text or "").split())
+    match node.tag:
+        case "mover":
+            return rf"\{ACCENTS[node[1].text or '']}{{{inside[0]}}}"
+        case "msub":
+            return f"{inside[0]}_{{{inside[1]}}}"
+        case "msup":
+            return _raised(inside[0], inside[1], "")
+        case "msubsup":
+            return _raised(inside[0], inside[2], f"_{{{inside[1]}}}")
+        case "mtext":
+            return rf"\text{{{text}}}"
+        case "mi" | "mo" | "mn":
+            return SIGNS.get(text, text.replace("′", "'"))
+        case _:
+            return "".join(inside)
+
+
+def _raised(base: str, above: str, below: str) -> str:
+    """Primes in front stand at the base, what else is above in braces."""
+    primes = re.match("'*", above)[0]  # type: ignore[index]
+    rest = above[len(primes) :]
+    return f"{base}{primes}{f'^{{{rest}}}' if rest else ''}{below}"
+
+
+def same(latex: str) -> str:
+    r"""LaTeX without blanks, escapes of names and commands around names."""
+    return re.sub(r"\s|\\(?=[_#%&$])", "", latex)
+
+
+@pytest.mark.parametrize("name", mg.library())
+@pytest.mark.parametrize("unknowns", ["kinetostatics", "response"])
+def test_every_equation_of_the_library_reads_the_same(name: str, unknowns: str) -> None:
+    f = mg.formulate(mg.load(name), unknowns=unknowns)  # type: ignore[arg-type]
+    found = [b for b in f.document().blocks if isinstance(b, Equation)]
+    assert len(found) > 20
+    for equation in found:
+        read = latex_of(ElementTree.fromstring(f"<math>{equation.mathml}</math>"))
+        number = re.match(r"\\text\{\((\w+)\)\}", read)
+        if number:
+            read = f"{read[number.end() :]}\\tag{{{number[1]}}}"
+        assert read == same(equation.latex)
+
+
+def test_names_are_text() -> None:
+    name = "<script>alert(1)</script>&\x1b"
+    made = mathml([Symbol("R", "12", "dual", name=name), "=", "0"])
+    root = ElementTree.fromstring(f"<math>{made}</math>")
+    assert {node.tag for node in root.iter()} == {"math", "msub", "mover", "mi", "mo", "mn", "mrow", "mtext"}
+    assert [node.text for node in root.iter("mtext")] == ["<script>alert(1)</script>&\\x1b"]
+
+
+def test_a_page_shows_mathml_and_keeps_latex() -> None:
+    html = to_html(mg.formulate(mg.load("four-bar")).document())
+    assert html.count('<div class="equation" data-latex=') == html.count('<math display="block">') > 20
+    assert "<li><math>" in html
+
+
+# --- LaTeX files --------------------------------------------------------------------------------------------------------
+
+
+BEYOND_ASCII = "ü é ñ Å ç ß ø ł ° ² ³ · × − → ≤ π Ω λ Σ – “x” … 中 ☃ \u0416"
+
+
+def compiled(text: str, folder: Path) -> str:
+    """What pdflatex says about a file that it takes."""
+    if shutil.which("pdflatex") is None:
+        pytest.skip("no pdflatex here (Debian: texlive-latex-base)")
+    (folder / "x.tex").write_text(text, encoding="utf-8")
+    command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "-no-shell-escape", "x.tex"]
+    ran = subprocess.run(command, cwd=folder, capture_output=True, check=False)
+    log = ran.stdout.decode("utf-8", "replace")
+    assert ran.returncode == 0, log[-3000:]
+    assert (folder / "x.pdf").stat().st_size > 10_000
+    return log
+
+
+def too_wide(log: str) -> list[float]:
+    """By how many points lines stand out of the page."""
+    return [float(points) for points in re.findall(r"Overfull \\hbox \(([\d.]+)pt too wide", log)]
+
+
+@pytest.mark.daily(12)
+@pytest.mark.parametrize("name", mg.library())
+def test_the_equations_of_the_library_fit_the_page(name: str, tmp_path: Path) -> None:
+    f = mg.formulate(mg.load(name), unknowns="response" if name == "rcsr" else "kinetostatics")
+    f.write(tmp_path / "f.tex")
+    assert not too_wide(compiled((tmp_path / "f.tex").read_text(encoding="utf-8"), tmp_path))
+
+
+def test_names_that_would_be_commands(tmp_path: Path) -> None:
+    blocks = [block for name in NAMES for block in mg.formulate(named(name)).document().blocks]
+    log = compiled(to_latex_file(Document("names", blocks)), tmp_path)
+    assert "secret" not in re.sub(r"\s", "", "".join(re.findall(r"\(\S+", log)))
+
+
+def test_signs_beyond_ascii(tmp_path: Path) -> None:
+    text = to_latex_file(
+        Document(BEYOND_ASCII, (Paragraph(BEYOND_ASCII), Table(("α",), ((BEYOND_ASCII,),)), Heading(BEYOND_ASCII)))
+    )
+    assert r"\DeclareUnicodeCharacter{03C0}{\ensuremath{\pi}}" in text
+    assert r"\DeclareUnicodeCharacter{4E2D}{[U+4E2D]}" in text
+    assert "00FC" not in text  # TeX knows the letters of Latin with their accents
+    log = compiled(text, tmp_path)
+    assert "Missing character" not in log
+
+
+def test_long_equations_are_broken_before_signs_and_in_long_products(tmp_path: Path) -> None:
+    total = " + ".join(rf"\hat{{F}}_{{{i}}} (a_{{{i}}} + b)" for i in range(30)) + r" = 0 \tag{7}"
+    product = " ".join(rf"\exp(\theta_{{{i}}} \hat{{A}})" for i in range(30)) + " = 1"
+    short = r"a_{1} + b = 0 \tag{8}"
+    text = to_latex_file(Document("", tuple(Equation("x", latex) for latex in (total, product, short))))
+    first, second = re.findall(r"\\begin\{multline\*\}\n(.*?)\n\\end\{multline\*\}", text, re.DOTALL)
+    lines = first.split(" \\\\\n")
+    assert len(lines) > 3
+    assert all(line.startswith("+ ") for line in lines[1:])
+    assert " ".join(lines) == total
+    assert " ".join(second.split(" \\\\\n")) == product
+    assert f"\\[\n{short}\n\\]" in text
+    assert not too_wide(compiled(text, tmp_path))
+
+
+def test_other_files_of_a_formulation(tmp_path: Path) -> None:
+    f = mg.formulate(mg.load("rcsr"))
+    for suffix, text in ((".txt", f.text()), (".csv", f.coefficients().csv())):
+        f.write(tmp_path / f"f{suffix}")
+        assert (tmp_path / f"f{suffix}").read_text(encoding="utf-8") == text
+    f.write(tmp_path / "f.md", components=False)
+    assert (tmp_path / "f.md").read_text(encoding="utf-8").startswith("# Equations of rcsr")
+    with pytest.raises(mg.FileError, match=r"known: .tex \(LaTeX\)"):
+        f.write(tmp_path / "f.pdf")

@@ -10,7 +10,6 @@ import scipy
 import strategies
 
 import mechgraph as mg
-from mechgraph.response.charts import ChartStage
 
 T = np.linspace(0.0, 0.2, 9)
 
@@ -269,7 +268,7 @@ def test_derivatives_for_implicit_steppers_come_in_one_batch(seed):
     r = mg.respond(m, (0.0, 0.05), method="Radau", rtol=1e-4)
     segment = r._course.integration.segments[-1]
     stage = segment.stage
-    assert isinstance(stage, ChartStage)
+    assert type(stage).__name__ == "ChartStage"
     t, y = segment.end, segment.dense(segment.end)
     J, h = stage.jacobian(t, y), 1e-5
     for i, nudge in enumerate(h * np.eye(len(y))):

@@ -6,12 +6,12 @@ import re
 import warnings
 
 import pytest
+from program import invoke
 from test_asmt import four_bar, swing
 from test_mjcf import MACHINES
 from test_urdf import ARM
 
 import mechgraph as mg
-from mechgraph.exchange.comparison import compare
 
 JUNK = [
     "nan",
@@ -70,4 +70,4 @@ def test_damage_is_named(tmp_path, kind, seed):
         assert isinstance(made, mg.Mechanism)
         mg.check(made)
         if kind == "stored":
-            compare(file)
+            invoke("check", file, "--compare")

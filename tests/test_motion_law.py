@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
-from mechgraph.model.motion import LAWS
 
+PAGE = Path(__file__).parents[1] / "docs" / "how-to" / "drive-by-a-law.md"
+LAWS = re.findall(r'^\| `"(\w+)"` \| `(?:rise|speed|samples)', PAGE.read_text(encoding="utf-8"), re.MULTILINE)
+"""What the manual lists."""
 RISES = ["cycloidal", "harmonic", "poly345", "poly4567"]
 H, T, START = 1.7, 0.4, -0.3
 
@@ -369,11 +371,7 @@ def test_unknown_law_lists_the_known():
     said = faults("cycloid", 1.0, 1.0, 0.0)
     assert "'cycloid'" in said
     assert all(name in said for name in LAWS)
-
-
-def test_the_manual_lists_every_law():
-    page = (Path(__file__).parents[1] / "docs" / "how-to" / "drive-by-a-law.md").read_text(encoding="utf-8")
-    assert re.findall(r'^\| `"(\w+)"` \| `(?:rise|speed|samples)', page, re.MULTILINE) == [*LAWS]
+    assert len(re.findall(r"\w+", said.partition("use ")[2].partition(" or ")[0])) == len(LAWS)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ import pint
 import pytest
 
 import mechgraph as mg
-from mechgraph.quantities import real_array, shown
 
 U = pint.UnitRegistry()
 SI = {"length": "m", "mass": "kg", "time": "s"}
@@ -162,7 +161,7 @@ NO_NUMBERS = ["0.0305", b"1", True, np.bool_(True), 1j, np.complex128(1), np.ma.
               NotImplemented]  # fmt: skip
 
 
-@pytest.mark.parametrize("value", NO_NUMBERS, ids=shown)
+@pytest.mark.parametrize("value", NO_NUMBERS, ids=lambda value: type(value).__name__)
 def test_what_is_no_number_is_refused_by_name(value):
     for give in (
         lambda: arm(mass=value),
@@ -186,8 +185,6 @@ def test_numbers_of_all_kinds_are_taken():
         assert arm(mass=value).link("arm").mass == 2.0
     for value in ((1, 2, 3), [1, 2.0, np.int64(3)], np.arange(1, 4), range(1, 4)):
         assert arm(center=value).link("arm").center == (1.0, 2.0, 3.0)
-    assert real_array([np.ones(2), (1, 2)]).shape == (2, 2)
-    assert real_array([[1, 2], [3]]) is None
 
 
 # --- forces and points -----------------------------------------------------------------------------------------------------
@@ -258,11 +255,19 @@ def test_lengths_in_a_pair_type_are_converted_in_all_its_parts():
         assert np.isclose(list(found.values())[-1], s["A"].effort[0], rtol=1e-11)
 
 
+def refused(value):
+    """The fault of a radius."""
+    with pytest.raises(mg.DeclarationError) as caught:
+        mg.inertia.sphere(1.0, value)
+    (fault,) = caught.value.faults
+    return fault
+
+
 def test_values_in_messages_are_short():
-    assert len(shown(10**5000)) < 60
-    assert len(shown([list(range(10**5))] * 100)) < 2000
+    assert len(refused(10**5000)) < 100
+    assert len(refused([list(range(10**5))] * 100)) < 2000
     deep = []
     for _ in range(10**5):
         deep = [deep]
-    assert len(shown(deep)) < 60
-    assert shown(2 * U.lb) == "2 pound"
+    assert len(refused(deep)) < 100
+    assert "2 pound" in refused(2 * U.lb)

@@ -8,11 +8,9 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from program import invoke
+from program import invoke, schema
 
 import mechgraph as mg
-from mechgraph.cli.options import duration
-from mechgraph.model.file_format import json_schema
 
 Z = (0, 0, 1)
 FILE = """
@@ -115,9 +113,9 @@ def test_it_is_written_and_read_without_loss(file: Path, tmp_path: Path) -> None
         mg.save(m.replace(response=None), tmp_path / "x.toml") or (tmp_path / "x.toml").read_text()
     )
     data = __import__("tomllib").loads((tmp_path / "again.toml").read_text())
-    jsonschema.Draft202012Validator(json_schema()).validate(data)
+    jsonschema.Draft202012Validator(schema("mechanism")).validate(data)
     data["response"]["what"] = 1
-    assert not jsonschema.Draft202012Validator(json_schema()).is_valid(data)
+    assert not jsonschema.Draft202012Validator(schema("mechanism")).is_valid(data)
 
 
 @pytest.mark.slow
@@ -251,8 +249,3 @@ def test_the_command_line_asks_how_long() -> None:
     result = invoke("respond", "rssr")
     assert result.exit_code == 2
     assert "Give --for TIME" in result.stderr
-
-
-def test_a_time_span_is_converted_to_the_declared_unit() -> None:
-    assert [duration(text, "--for", "ms") for text in ("2s", "2ms", "2")] == [2000.0, 2.0, 2.0]
-    assert duration("5ms", "--for") == 0.005

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
-from mechgraph.determinacy.pair_changes import wider_types
 
 Z = np.array([0.0, 0.0, 1.0])
 I_AXIAL = 0.02
@@ -121,12 +120,6 @@ def test_the_line_of_two_ball_joints() -> None:
 def test_a_drive_of_a_rotation_is_told_what_to_add() -> None:
     with pytest.raises(mg.DeclarationError, match=r"'A\.Rz' is part of a rotation.*a pair 'Fr' beside it"):
         shaft(motor=False, drives=("A.Rz",))
-
-
-def test_rows_that_hold_nothing_are_no_advice() -> None:
-    table = mg.pair_types()
-    wider = {other.symbol for row in table.values() for other in wider_types(row)}
-    assert wider == {symbol for symbol, row in table.items() if row.f} - {"H", "Tc", "Fr"}
 
 
 # --- Cardan shafts ---------------------------------------------------------------------------------------------------------

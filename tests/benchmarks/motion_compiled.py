@@ -5,14 +5,13 @@ from functools import partial
 import motion_mechgraph
 from motion_mechgraph import VERSION, Setting, ladder, variants
 
-from mechgraph.errors import MissingExtraError
-from mechgraph.kernel import build
+import mechgraph as mg
 
 __all__ = ["VERSION", "Setting", "ladder", "solve", "variants"]
 
 try:
-    build.built()
-except MissingExtraError as error:
+    mg.compile(mg.load("four-bar"))
+except mg.MissingExtraError as error:
     raise ImportError(str(error)) from None
 
 solve = partial(motion_mechgraph.solve, engine="auto")

@@ -5,14 +5,13 @@ from functools import partial
 import peer_mechgraph
 from peer_mechgraph import FORCE, VERSION, verdict
 
-from mechgraph.errors import MissingExtraError
-from mechgraph.kernel import build
+import mechgraph as mg
 
 __all__ = ["FORCE", "JOB", "VERSION", "solve", "verdict"]
 
 try:
-    build.built()
-except MissingExtraError as error:
+    mg.compile(mg.load("four-bar"))
+except mg.MissingExtraError as error:
     raise ImportError(str(error)) from None
 
 JOB = peer_mechgraph

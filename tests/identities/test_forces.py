@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from screws import moved_wrench
 from strategies import (
     PLANE_ON_PLANE,
     chebyshev_rate,
@@ -19,7 +20,6 @@ from strategies import (
 )
 
 import mechgraph as mg
-from mechgraph.maths import se3
 
 pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 """Random loads move passive freedoms; ``test_passive_loads`` looks at what is said of it."""
@@ -61,11 +61,6 @@ def assert_same_forces(a, b, m, tolerance=1e-9):
             x, y = getattr(a[p.name], what), getattr(b[p.name], what)
             np.testing.assert_array_equal(np.isnan(x), np.isnan(y), err_msg=f"{p.name} {what}")
             np.testing.assert_allclose(x, y, rtol=0, atol=tolerance * big, err_msg=f"{p.name} {what}")
-
-
-def batched(wrenches):
-    """(..., 6) -> (6, ...)."""
-    return np.moveaxis(np.asarray(wrenches), -1, 0)
 
 
 def inertia_wrench(m, s, link):
@@ -256,9 +251,7 @@ def test_a_moved_mechanism_has_the_moved_forces(seed):
     big = largest(s, m)
     for p in m.pairs:
         x, y = s[p.name], moved[p.name]
-        expected = np.moveaxis(
-            se3.move_wrench(X[:3, :, None] * np.ones(NODES), batched(np.nan_to_num(x.reaction))), 0, -1
-        )
+        expected = moved_wrench(X, np.nan_to_num(x.reaction))
         loose = np.isnan(x.reaction).any()
         if not loose:
             np.testing.assert_allclose(y.reaction, expected, atol=1e-8 * big)
@@ -266,11 +259,7 @@ def test_a_moved_mechanism_has_the_moved_forces(seed):
         np.testing.assert_allclose(y.applied_effort, x.applied_effort, atol=1e-8 * big)
         for name, value in x.components.items():
             np.testing.assert_allclose(y.components[name], value, atol=1e-7 * big)
-    np.testing.assert_allclose(
-        moved.shaking,
-        np.moveaxis(se3.move_wrench(X[:3, :, None] * np.ones(NODES), batched(s.shaking)), 0, -1),
-        atol=1e-8 * big,
-    )
+    np.testing.assert_allclose(moved.shaking, moved_wrench(X, s.shaking), atol=1e-8 * big)
 
 
 @pytest.mark.parametrize("seed", range(8))
