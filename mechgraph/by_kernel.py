@@ -52,7 +52,7 @@ def at_hand() -> Any:
     return build.installed()
 
 
-class Compiled(Outcome):
+class KernelOutcome(Outcome):
     """Positions that the kernel has solved; their forces from the records, or by numpy at its states where it does not give them.
 
     Those of variants that are not ``whole (V,)`` count as ``contradicting``: numpy is to solve them.
@@ -90,7 +90,7 @@ class Compiled(Outcome):
         return BlockMotion(places, Rates(Velocities(here, dq), ddq, np.zeros(here.T))), f
 
 
-def compiled(line: Started, batch: tuple[int, ...], starts: Starts | None = None) -> Compiled | None:
+def compiled(line: Started, batch: tuple[int, ...], starts: Starts | None = None) -> KernelOutcome | None:
     """All positions of a call, or of all its variants, by the kernel; None where it does not serve: no library, or no certificate.
 
     Raises
@@ -111,7 +111,7 @@ def compiled(line: Started, batch: tuple[int, ...], starts: Starts | None = None
     q, v, a = (np.ascontiguousarray(line.values(kind, batch).T) for kind in ("position", "velocity", "acceleration"))
     begin = kernel.P[:, START + line.system.single_rows[line.columns]].T
     records, whole = kernel.follow(begin, q, v, a, batch, forces)
-    return Compiled(line, starts, batch, records, whole, forces) if whole.mean() > SERVES else None
+    return KernelOutcome(line, starts, batch, records, whole, forces) if whole.mean() > SERVES else None
 
 
 def _library(line: Started) -> Any:

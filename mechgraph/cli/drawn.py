@@ -45,7 +45,7 @@ from mechgraph.show.skeleton import PICTURES
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _PictureOptions:
     """What was asked for beside the kind of picture."""
 
     of: tuple[str, ...]
@@ -65,7 +65,7 @@ class _Asked:
 class _Picture:
     """A kind of picture: whether it needs a motion, with forces, and how it is drawn."""
 
-    draw: Callable[[Any, _Asked], Any]
+    draw: Callable[[Any, _PictureOptions], Any]
     moves: bool = True
     forces: bool = False
 
@@ -151,7 +151,7 @@ def plot(
     )
     refuse_own_file(target, mechanism)
     format_of(target, FILMS if film else PICTURES)
-    asked = _Asked(tuple(of or ()), over, position, forces, moment)
+    asked = _PictureOptions(tuple(of or ()), over, position, forces, moment)
     still = what == "skeleton" and not (film or drive or any(d.motion is not None for d in m.drives))
     moves = kind.moves and not still
     motions = (motions_of if moves else drives_of)(m, drive or ())

@@ -73,7 +73,7 @@ def _functions() -> ctypes.CDLL:
     return library
 
 
-class Parameters(MutableMapping[str, float]):
+class CompiledParameters(MutableMapping[str, float]):
     """Declared numbers by the names that studies use (``crank.mass``, ``length[2]``), to be set in place; those that were set are listed.
 
     What is set counts from the next call on; what is deleted is as declared again. What no declaration could have, beside what was set
@@ -115,7 +115,7 @@ class Parameters(MutableMapping[str, float]):
         return len(self.wanted)
 
     def __repr__(self) -> str:
-        return f"Parameters({self.wanted})"
+        return f"CompiledParameters({self.wanted})"
 
 
 class _Room:
@@ -177,14 +177,14 @@ class Compiled:
         size = _functions().mgk_state_size(self.I.ctypes.data) // 8 + 1
         self.P, self.home, self.state = tables.P.copy(), np.zeros(size), np.zeros(size)
         self._values: dict[str, float] = {}
-        self._parameters = Parameters(tables)
+        self._parameters = CompiledParameters(tables)
         self._one, self._single = _Room(self, 1, self.state), True
         self._last = self._one
         if kept is None:
             _functions().mgk_start(*(part.ctypes.data for part in (self.I, self.P, self.home)))
             self.start()
             return
-        self._values, self._parameters = dict(kept["set"]), Parameters(tables, kept["wanted"])
+        self._values, self._parameters = dict(kept["set"]), CompiledParameters(tables, kept["wanted"])
         self._single = kept["single"]
         if not self._single:
             self._last = _Room(self, len(kept["results"][-1]), self.state)
@@ -214,7 +214,7 @@ class Compiled:
         }  # fmt: skip
 
     @property
-    def parameters(self) -> Parameters:
+    def parameters(self) -> CompiledParameters:
         """Declared numbers by name, to be set in place: ``c.parameters["crank.mass"] = 2.0``."""
         return self._parameters
 

@@ -40,7 +40,7 @@ from functools import cached_property
 import numpy as np
 import scipy
 
-from mechgraph.determinacy.families import Kind
+from mechgraph.determinacy.families import MotionKind
 from mechgraph.determinacy.mobility import Freedoms, Position
 from mechgraph.document import Block, Document, Paragraph, Shown, Table
 from mechgraph.graph.atlas import MultipleJoint
@@ -437,7 +437,7 @@ class Decomposition(Shown):
         return tuple(out)
 
 
-def decomposition(freedoms: Freedoms, driven: Index, kind: Kind) -> Decomposition:
+def decomposition(freedoms: Freedoms, driven: Index, kind: MotionKind) -> Decomposition:
     """Driver links and groups with the freedoms ``driven`` and those that hold passive motions at rest."""
     position = freedoms.position
     m = position.m

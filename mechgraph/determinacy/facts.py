@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mechgraph.determinacy import findings
 from mechgraph.determinacy.budget import Budget
 from mechgraph.determinacy.decomposition import Decomposition, decomposition
-from mechgraph.determinacy.families import Families, Kind, families, kind_of, kind_of_mechanism
+from mechgraph.determinacy.families import Families, MotionKind, families, kind_of, kind_of_mechanism
 from mechgraph.determinacy.findings import (
     LIMIT,
     Advice,
@@ -264,18 +264,18 @@ class Facts(GraphFacts):
         return {"structural": structural, "dimensions": nearby - structural, "here": self.redundancy - nearby}
 
     @cached_property
-    def _kind(self) -> Kind:
+    def _kind(self) -> MotionKind:
         """The kind about the internal origin."""
-        return kind_of_mechanism(self.geometry.freedoms, self.motion) if self.geometry else Kind()
+        return kind_of_mechanism(self.geometry.freedoms, self.motion) if self.geometry else MotionKind()
 
     @cached_property
-    def kind(self) -> Kind:
+    def kind(self) -> MotionKind:
         """Planar, spherical or neither: of all pairs, else of the motion; its normal or centre in the global frame."""
         g = self.geometry
-        return self._kind.in_global(g.system.par) if g else Kind()
+        return self._kind.in_global(g.system.par) if g else MotionKind()
 
     @cached_property
-    def loop_kinds(self) -> tuple[Kind, ...]:
+    def loop_kinds(self) -> tuple[MotionKind, ...]:
         """The kind of every loop by its pairs."""
         if not (g := self.geometry):
             return ()

@@ -44,7 +44,7 @@ from mechgraph.model.parameters import Parameters
 
 
 @dataclass(frozen=True)
-class Kind:
+class MotionKind:
     """A kind by ``name`` ("" for neither) with its ``place (3,)``: the unit normal (``is_direction``), or the centre.
 
     ``outside (3, 6)`` are functionals that vanish on its twists about the internal origin; ``by_pairs`` whether all pairs have such
@@ -62,7 +62,7 @@ class Kind:
         """Orthonormal twists ``(6, 3)`` of the kind; none for neither."""
         return np.zeros((6, 0)) if self.outside is None else np.linalg.svd(self.outside)[2][3:].T
 
-    def in_global(self, par: Parameters) -> Kind:
+    def in_global(self, par: Parameters) -> MotionKind:
         """The kind with its centre in the global frame."""
         centre = par.L * np.array(self.place) + par.origin if self.place and not self.is_direction else self.place
         return replace(self, place=tuple(map(float, centre)))
@@ -75,7 +75,7 @@ class Kind:
         return bool(np.abs(self.outside @ twists).max() <= RANKS.position * size * np.abs(self.outside).max())
 
 
-def planar(twists: Array) -> Kind:
+def planar(twists: Array) -> MotionKind:
     """The plane to which the turns ``(6, n)`` (without any: the slides) are parallel."""
     turning = np.linalg.norm(twists[:3], axis=0) > RANKS.position
     if turning.any():
@@ -83,12 +83,12 @@ def planar(twists: Array) -> Kind:
     else:
         U, s = _principal(twists[3:])
         if (s > RANKS.position).sum() != 2:
-            return Kind()
+            return MotionKind()
         normal = U[:, 2]
     normal = normal * np.sign(normal[np.argmax(np.abs(normal) > 1e-6)])
     normal = np.where(np.abs(normal) < RANKS.position, 0.0, normal)
     across = skew(normal)[np.argsort(-np.linalg.norm(skew(normal), axis=1))[:2]]
-    return Kind(
+    return MotionKind(
         "planar",
         tuple(normal.tolist()),
         np.block([[across, np.zeros((2, 3))], [np.zeros(3), normal]]),
@@ -103,26 +103,26 @@ def _principal(vectors: Array) -> tuple[Array, Array]:
     return U, s
 
 
-def spherical(twists: Array) -> Kind:
+def spherical(twists: Array) -> MotionKind:
     """The centre through which the turns ``(6, n)`` pass: of the least squares of ``v + w x O``."""
     rows = np.moveaxis(skew(twists[:3]), -1, 0).reshape(-1, 3)
     if np.linalg.matrix_rank(rows, tol=RANKS.position) < 3:
-        return Kind()
+        return MotionKind()
     centre: Array = np.asarray(np.linalg.lstsq(rows, -twists[3:].T.ravel(), rcond=None)[0])
-    return Kind("spherical", tuple(centre.tolist()), np.concatenate([-skew(centre), np.eye(3)], axis=1))
+    return MotionKind("spherical", tuple(centre.tolist()), np.concatenate([-skew(centre), np.eye(3)], axis=1))
 
 
-KINDS: tuple[Callable[[Array], Kind], ...] = (planar, spherical)
+KINDS: tuple[Callable[[Array], MotionKind], ...] = (planar, spherical)
 """What is looked for, in this order: turns about one line alone are both."""
 
 
-def kind_of(twists: Array) -> Kind:
+def kind_of(twists: Array) -> MotionKind:
     """The kind of twists ``(6, n)`` about the internal origin."""
     found = (make(twists) for make in KINDS if twists.size)
-    return next((kind for kind in found if kind.holds(twists)), Kind())
+    return next((kind for kind in found if kind.holds(twists)), MotionKind())
 
 
-def kind_of_mechanism(freedoms: Freedoms, motion: FiniteMotion | None) -> Kind:
+def kind_of_mechanism(freedoms: Freedoms, motion: FiniteMotion | None) -> MotionKind:
     """The kind of all pairs, else of the motions beside the passive ones at a position nearby."""
     rows = freedoms.position.rows
     kind = kind_of(rows.S)
@@ -140,7 +140,7 @@ def kind_of_mechanism(freedoms: Freedoms, motion: FiniteMotion | None) -> Kind:
     return next((replace(c, by_pairs=False) for c in candidates if _moves_so(c, freedoms, nearby)), kind)
 
 
-def _moves_so(kind: Kind, freedoms: Freedoms, nearby: ClosureRank) -> bool:
+def _moves_so(kind: MotionKind, freedoms: Freedoms, nearby: ClosureRank) -> bool:
     """Whether the motions nearby, but for as many as there are passive ones of other kinds, keep every pair to this kind."""
     if kind.outside is None:
         return False

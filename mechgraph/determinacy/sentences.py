@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.determinacy.facts import Facts
-from mechgraph.determinacy.families import Kind
+from mechgraph.determinacy.families import MotionKind
 from mechgraph.determinacy.findings import KINDS, NAMED, alternatives, component_words, joined, plural, vector
 from mechgraph.determinacy.uniqueness import Uniqueness
 from mechgraph.document import Block, Bullets, Document, Paragraph, to_text
@@ -355,7 +355,7 @@ def kind_line(r: Facts) -> str:
     return f"Loops of different kinds: {'; '.join(parts)}." if len(parts) > 1 or len(kinds) > 1 else f"All {parts[0]}."
 
 
-def place(kind: Kind) -> str:
+def place(kind: MotionKind) -> str:
     """The plane or the centre of a kind."""
     return f"{'normal of the plane' if kind.is_direction else 'centre'} {vector(kind.place)}" if kind.name else ""
 

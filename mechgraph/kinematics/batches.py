@@ -242,7 +242,7 @@ MARKER_A, MARKER_B = range(2)
 
 
 @dataclass(frozen=True)
-class Group:
+class PairsOfType:
     """The pairs of one type: their indices, the columns of their freedoms ``(f, n)`` and rows of their state ``(nx, n)``."""
 
     row: PairType
@@ -312,9 +312,9 @@ class ScrewTable:
         return ScrewTable(*(getattr(self, part.name)[..., order] for part in fields(self)))
 
 
-def factor_batches(groups: Sequence[Group], walk: Walk, n_factors: Index) -> list[FactorBatch]:
+def factor_batches(groups: Sequence[PairsOfType], walk: Walk, n_factors: Index) -> list[FactorBatch]:
     """The factors of all pairs by kind, each kind in the order of the walk; pairs without a factor are a kind of their own."""
-    kinds: dict[Hashable, list[tuple[Factor, Group, int]]] = {}
+    kinds: dict[Hashable, list[tuple[Factor, PairsOfType, int]]] = {}
     for g in groups:
         for rank, factor in enumerate(g.row.steps):
             kinds.setdefault(factor.kind, []).append((factor, g, rank))
@@ -328,7 +328,7 @@ def factor_batches(groups: Sequence[Group], walk: Walk, n_factors: Index) -> lis
     return batches
 
 
-def _batch(members: Sequence[tuple[Factor, Group, int]], walk: Walk) -> FactorBatch:
+def _batch(members: Sequence[tuple[Factor, PairsOfType, int]], walk: Walk) -> FactorBatch:
     parts = []
     for number, (_, g, rank) in enumerate(members):
         at_columns, at_rows = evaluation.places(g.row)[rank]

@@ -20,7 +20,7 @@ from mechgraph.kinematics.batches import (
     MARKER_A,
     MARKER_B,
     FactorBatch,
-    Group,
+    PairsOfType,
     Ranks,
     ScrewTable,
     Tree,
@@ -167,14 +167,14 @@ class Places:
         return Walk(self.tree, (self.a, self.b), self.chords, np.maximum(self.n_factors, 1))
 
     @unit_cached
-    def groups(self) -> list[Group]:
+    def groups(self) -> list[PairsOfType]:
         """The pairs by type."""
         out = []
         for number, row in enumerate(self._types[0]):
             index = np.flatnonzero(self._types[1] == number)
             columns = self.first_column[index] + np.arange(row.f, dtype=np.intp)[:, None]
             state = self.first_row[index] + np.arange(row.nx, dtype=np.intp)[:, None]
-            out.append(Group(row.scaled(self.par.L), index, columns, state))
+            out.append(PairsOfType(row.scaled(self.par.L), index, columns, state))
         return out
 
     @unit_cached
@@ -291,7 +291,7 @@ class Places:
         """Nodes of the frames before the factors of a batch."""
         return self.walk.node_before(batch.pairs, batch.ranks)
 
-    def frame_place(self, g: Group, k: int) -> tuple[Index, Index]:
+    def frame_place(self, g: PairsOfType, k: int) -> tuple[Index, Index]:
         """Node of frame ``k`` of the pairs of a group, and the constant pose behind it (a place in ``Numbers.constants``)."""
         n = len(self.m.pairs)
         if k == 0:
@@ -317,7 +317,7 @@ class Places:
         """Constant reaction components, group by group, component by component."""
         return self._screw_table([(g, c) for g in self.groups for c in g.row.reactions or ()])
 
-    def _screw_table(self, parts: Sequence[tuple[Group, Component]]) -> ScrewTable:
+    def _screw_table(self, parts: Sequence[tuple[PairsOfType, Component]]) -> ScrewTable:
         """The components of groups, one after the other, each for all pairs of its group."""
         counts = [len(g.pairs) for g, _ in parts]
         places: dict[tuple[int, int], tuple[Index, Index]] = {}

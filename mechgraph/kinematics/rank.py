@@ -33,7 +33,7 @@ SHARE = 1e-9
 SHARES_SEED = 23
 
 
-class Solution(Protocol):
+class RankSolution(Protocol):
     """What an engine determines about ``K``: self-stresses and motions in the kept rows and scaled free columns."""
 
     name: Literal["dense", "sparse"]
@@ -114,7 +114,7 @@ class ClosureRank:
     self-stresses that connect loops; ``engine`` which one ran.
     """
 
-    def __init__(self, reduced: ReducedRows, solution: Solution, tolerance: float) -> None:
+    def __init__(self, reduced: ReducedRows, solution: RankSolution, tolerance: float) -> None:
         self.reduced, self._solution, self._tolerance = reduced, solution, tolerance
         self.engine, self.rank, self.count = solution.name, solution.rank, reduced.rows.count
         self.shared = reduced.height - solution.rank

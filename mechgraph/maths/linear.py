@@ -209,7 +209,7 @@ FEW_MATRICES = 4
 """Number of matrices up to which they are factored one by one by LAPACK, without the calls that a batch takes (measured)."""
 
 
-class Factor(Protocol):
+class Factorization(Protocol):
     """A batch of square matrices ``A (n, n, T)``, factored."""
 
     @property
@@ -226,7 +226,7 @@ class Factor(Protocol):
         """``A^-1 B`` for square ``B (n, n, T)``, without refinement."""
 
 
-def factor_of(A: Array) -> Factor:
+def factor_of(A: Array) -> Factorization:
     """The factors of matrices ``(n, n, T)``."""
     return LuFactors(A) if A.size > 0 and A.shape[2] <= FEW_MATRICES else Inverses(A)
 
@@ -245,7 +245,7 @@ class Lu:
 
     @property
     def condition(self) -> float:
-        """See ``Factor``."""
+        """See ``Factorization``."""
         if self._singular:
             return np.inf
         norm, inverse = self._lapack.dlange, self._lapack.dgetri(self._lu, self._pivots)[0]
@@ -267,18 +267,18 @@ class LuFactors:
 
     @cached_property
     def condition(self) -> Array:
-        """See ``Factor``."""
+        """See ``Factorization``."""
         return np.array([lu.condition for lu in self._each])
 
     def solve(self, b: Array, transposed: bool = False) -> Array:
-        """See ``Factor``."""
+        """See ``Factorization``."""
         out = np.empty(b.shape)
         for t, lu in enumerate(self._each):
             out[:, :, t] = lu.solve(b[:, :, t], transposed)
         return out
 
     def applied(self, B: Array) -> Array:
-        """See ``Factor``."""
+        """See ``Factorization``."""
         return self.solve(B)
 
 
@@ -295,7 +295,7 @@ class Inverses:
 
     @cached_property
     def condition(self) -> Array:
-        """See ``Factor``."""
+        """See ``Factorization``."""
         with np.errstate(invalid="ignore", over="ignore"):
             norms = [
                 np.maximum.reduce(np.add.reduce(np.abs(M), axis=1), axis=0, initial=0.0)
@@ -305,11 +305,11 @@ class Inverses:
             return np.asarray(np.fmin(np.maximum(norms[0], 1.0) * norms[1], np.inf))
 
     def applied(self, B: Array) -> Array:
-        """See ``Factor``."""
+        """See ``Factorization``."""
         return (self._inverse.transpose(2, 0, 1) @ B.transpose(2, 0, 1)).transpose(1, 2, 0)
 
     def solve(self, b: Array, transposed: bool = False) -> Array:
-        """See ``Factor``."""
+        """See ``Factorization``."""
         A, inverse = self._A, self._inverse
         if transposed:
             A, inverse = np.swapaxes(A, 0, 1), np.swapaxes(inverse, 0, 1)
@@ -341,7 +341,7 @@ class ChosenSystem:
         self.A = A
         self.choices = choices
         self.which = which
-        self._parts: list[tuple[Choice, Place, Factor]] = []
+        self._parts: list[tuple[Choice, Place, Factorization]] = []
         used = sorted(set(which.tolist()))
         for i in used:
             choice, at = choices[i], EVERY if len(used) == 1 else np.flatnonzero(which == i)

@@ -267,7 +267,7 @@ class _Sums:
 
 
 @dataclass(frozen=True)
-class _Step:
+class _BlockStep:
     """Blocks of one ``size`` at one level: unknowns ``first`` to ``end``, blocks ``at`` among those of that size, what they need before.
 
     ``needs`` of the rows for the system itself, ``transposed`` of the columns for the transposed one.
@@ -329,7 +329,7 @@ class BlockTriangular:
             mine, theirs = by_row[_between(row, begin, end)], by_col[_between(col, begin, end)]
             n, at = int(width[begin]), int(number[begin])
             before, behind = _Sums.of(mine, rows[mine], cols[mine]), _Sums.of(theirs, cols[theirs], rows[theirs])
-            self._steps.append(_Step(n, begin, end, slice(at, at + (end - begin) // n), before, behind))
+            self._steps.append(_BlockStep(n, begin, end, slice(at, at + (end - begin) // n), before, behind))
         every = np.arange(len(rows))
         self._products = {False: _Sums.of(every, rows, cols), True: _Sums.of(every, cols, rows)}
 
