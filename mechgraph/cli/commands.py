@@ -11,54 +11,8 @@ import numpy as np
 import typer
 
 import mechgraph as mg
-from mechgraph.cli.options import (
-    NO_ANSWER,
-    Actuate,
-    AsJson,
-    At,
-    Bookkeeping,
-    Compare,
-    Drivers,
-    Drives,
-    Engine,
-    EquationsAt,
-    Include,
-    Method,
-    MotionEngine,
-    Named,
-    OnReach,
-    Out,
-    Outputs,
-    OverTime,
-    Redundant,
-    Tolerance,
-    check_out,
-    drives_of,
-    duration,
-    fail,
-    loaded,
-    longest,
-    motions_of,
-    parse_at,
-    progress,
-    refuse,
-    refuse_own_file,
-    show,
-    show_compared,
-    working,
-    write,
-)
-from mechgraph.cli.records import (
-    FileData,
-    LibraryItem,
-    ListData,
-    Written,
-    check_data,
-    equations_data,
-    loads_data,
-    structure_data,
-    write_json,
-)
+from mechgraph.cli import options as opt
+from mechgraph.cli import records
 from mechgraph.compiled.tabled import tabled
 from mechgraph.compiled.write import WRITTEN, InputsName, write_tables
 from mechgraph.document import Document, Table
@@ -69,7 +23,7 @@ from mechgraph.result.free_body import FORMATS as LOAD_FILES
 from mechgraph.result.solution import FORMATS
 
 
-def list_library(json: AsJson = False) -> None:
+def list_library(json: opt.AsJson = False) -> None:
     """List the library mechanisms.
 
     Example: mechgraph list --json
@@ -77,30 +31,25 @@ def list_library(json: AsJson = False) -> None:
     found = {name: mg.load(name) for name in mg.library()}
     if json:
         items = [
-            LibraryItem(name, m.description, m.link_names(), {p.name: p.type.symbol for p in m.pairs})
+            records.LibraryItem(name, m.description, m.link_names(), {p.name: p.type.symbol for p in m.pairs})
             for name, m in found.items()
         ]
-        write_json("list", ListData(tuple(items)))
+        records.write_json("list", records.ListData(tuple(items)))
         return
     rows = [(name, " ".join(p.type.symbol for p in m.pairs), m.description) for name, m in found.items()]
-    show(Document("", (Table(("name", "pairs", "description"), tuple(rows)),)))
+    opt.show(Document("", (Table(("name", "pairs", "description"), tuple(rows)),)))
 
 
 def save(
-    mechanism: Named,
+    mechanism: opt.Named,
     out: Annotated[
         Path,
-        typer.Option(
-            "--out",
-            metavar="FILE",
-            help=f"The file; the extension selects the format: .toml, {formats_text(WRITERS)}; others are TOML.",
-        ),
+        opt.option("--out", f"The file; {opt.SELECTS} .toml, {formats_text(WRITERS)}; others are TOML.", "FILE"),
     ],
     advice: Annotated[
-        int | None,
-        typer.Option("--advice", metavar="NUMBER", help="Apply recommendation NUMBER (from 0) of 'check --json'."),
+        int | None, opt.option("--advice", "Apply recommendation NUMBER (from 0) of 'check --json'.", "NUMBER")
     ] = None,
-    json: AsJson = False,
+    json: opt.AsJson = False,
 ) -> None:
     """Write a mechanism as another file: TOML, which holds all of it, or what other programs read.
 
@@ -108,36 +57,34 @@ def save(
 
     Exit status: 0 done; 1 it cannot be assembled, where the file holds it at its start; 2 wrong usage or bad input.
     """
-    refuse_own_file(out, mechanism)
-    m = loaded(mechanism)
+    opt.refuse_own_file(out, mechanism)
+    m = opt.loaded(mechanism)
     if advice is not None:
         known = mg.check(m).advice
         if not 0 <= advice < len(known):
-            refuse(f"--advice {advice}", f"there are {len(known)}, counted from 0: mechgraph check {mechanism} --json")
+            opt.refuse(
+                f"--advice {advice}", f"there are {len(known)}, counted from 0: mechgraph check {mechanism} --json"
+            )
         m = known[advice].apply()
     mg.save(m, out)
-    if json:
-        write_json("save", FileData(m.name, str(out)))
-    else:
-        write(f"Wrote {out}.\n")
+    records.tell_file("save", records.FileData(m.name, str(out)), json)
 
 
 def check(
-    mechanism: Named,
-    json: AsJson = False,
+    mechanism: opt.Named,
+    json: opt.AsJson = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="The report as Markdown.")] = False,
     full: Annotated[
         bool, typer.Option("--full", help="The whole report: every pair, self-stress, loop and count.")
     ] = False,
-    at: At = None,
-    engine: Engine = "auto",
-    compared: Compare = False,
-    tol: Tolerance = None,
+    at: opt.At = None,
+    engine: opt.Engine = "auto",
+    compared: opt.Compare = False,
+    tol: opt.Tolerance = None,
     limit: Annotated[
         str | None,
-        typer.Option(
-            metavar="TIME",
-            help="Time for each search of the report, default 20s; the report lists unfinished searches.",
+        opt.option(
+            "--limit", "Time for each search of the report, default 20s; the report lists unfinished searches.", "TIME"
         ),
     ] = None,
 ) -> None:
@@ -150,14 +97,14 @@ def check(
     unique has exit status 0, and so has a topology without geometry. 2 wrong usage or bad input.
     """
     if json + markdown + compared > 1:
-        refuse("check", "--json, --markdown and --compare exclude each other")
-    m = loaded(mechanism)
-    values = dict(parse_at(m, text) for text in at or ())
-    bounded: dict[str, Any] = {} if limit is None else {"limit": longest(limit, "--limit")}
-    with working(f"checking {m.name}: what can move"):
-        report = mg.check(m, at=values or None, engine=engine, tol=tol, **bounded)
-    with working(f"checking {m.name}: what is unique, what to do"):
-        data = check_data(m, report) if json else {}
+        opt.refuse("check", "--json, --markdown and --compare exclude each other")
+    m = opt.loaded(mechanism)
+    values = opt.values_of(m, at)
+    bounded: dict[str, Any] = {} if limit is None else {"limit": opt.longest(limit, "--limit")}
+    with opt.working(f"checking {m.name}: what can move"):
+        report = mg.check(m, at=values, engine=engine, tol=tol, **bounded)
+    with opt.working(f"checking {m.name}: what is unique, what to do"):
+        data = records.check_data(m, report) if json else {}
         text = report.to_markdown(full) if markdown else ""
         document = report.document(full)
     not_closed = m.has_geometry and report.mobility is None
@@ -165,24 +112,24 @@ def check(
     unsolvable = not_closed or report.undriven or report.contradicting_drives
     doubtful = report.near or bearing or not report.determinate
     if json:
-        write_json("check", data)
+        records.write_json("check", data)
     elif text:
-        write(text)
+        opt.write(text)
     else:
-        show(document, "red" if unsolvable else "yellow" if doubtful else "green")
+        opt.show(document, "red" if unsolvable else "yellow" if doubtful else "green")
     if compared:
-        show_compared(mechanism)
+        opt.show_compared(mechanism)
     if unsolvable:
-        raise typer.Exit(NO_ANSWER)
+        raise typer.Exit(opt.NO_ANSWER)
 
 
 def structure(
-    mechanism: Named,
-    driver: Drivers = None,
-    at: At = None,
-    engine: Engine = "auto",
-    tol: Tolerance = None,
-    json: AsJson = False,
+    mechanism: opt.Named,
+    driver: opt.Drivers = None,
+    at: opt.At = None,
+    engine: opt.Engine = "auto",
+    tol: opt.Tolerance = None,
+    json: opt.AsJson = False,
 ) -> None:
     """Print the structure as the textbooks tell it: kinematic chain, mobility table and families, structural groups.
 
@@ -190,33 +137,33 @@ def structure(
 
     Exit status: 0 done; 1 where the drivers leave links undetermined, or the loops cannot be closed; 2 wrong usage or bad input.
     """
-    m = loaded(mechanism)
-    values = dict(parse_at(m, text) for text in at or ())
-    with working(f"structure of {m.name}"):
-        found = mg.structure(m, driver or None, at=values or None, engine=engine, tol=tol)
-        data = structure_data(found) if json else None
+    m = opt.loaded(mechanism)
+    values = opt.values_of(m, at)
+    with opt.working(f"structure of {m.name}"):
+        found = mg.structure(m, driver or None, at=values, engine=engine, tol=tol)
+        data = records.structure_data(found) if json else None
         document = found.document()
     if data:
-        write_json("structure", data)
+        records.write_json("structure", data)
     else:
-        show(document)
+        opt.show(document)
     if found.groups.free:
-        raise typer.Exit(NO_ANSWER)
+        raise typer.Exit(opt.NO_ANSWER)
 
 
 def solved_at(m: mg.Mechanism, at: list[str]) -> mg.Solution:
     """The one position that is named, with its rates."""
-    motions = drives_of(m, at, "--at")
+    motions = opt.drives_of(m, at, "--at")
     if any(np.ndim(motion.position) for motion in motions.values()):
-        refuse("--at", "expected one position, e.g. A=30deg@10")
-    with working("solving"):
+        opt.refuse("--at", "expected one position, e.g. A=30deg@10")
+    with opt.working("solving"):
         return mg.solve(m, motions)
 
 
 def equations(
-    mechanism: Named,
+    mechanism: opt.Named,
     latex: Annotated[bool, typer.Option("--latex", help="As LaTeX.")] = False,
-    bookkeeping: Bookkeeping = "lee",
+    bookkeeping: opt.Bookkeeping = "lee",
     blocks: Annotated[bool, typer.Option("--blocks", help="Vector equations only, without their components.")] = False,
     coefficients: Annotated[bool, typer.Option("--coefficients", help="The table of nonzero coefficients.")] = False,
     csv: Annotated[bool, typer.Option("--csv", help="The table of nonzero coefficients as CSV.")] = False,
@@ -224,16 +171,12 @@ def equations(
         Literal["kinetostatics", "response"],
         typer.Option(help="Unknowns: forces for a given motion, or accelerations and reactions."),
     ] = "kinetostatics",
-    at: EquationsAt = None,
+    at: opt.EquationsAt = None,
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out",
-            metavar="FILE",
-            help=f"Write them; the extension selects the format: {formats_text(WRITINGS)}, the first compiles.",
-        ),
+        opt.option("--out", f"Write them; {opt.SELECTS} {formats_text(WRITINGS)}, the first compiles.", "FILE"),
     ] = None,
-    json: AsJson = False,
+    json: opt.AsJson = False,
 ) -> None:
     """Print the closure equations, the d'Alembert equations of every link and the conditions of the pairs; needs no geometry.
 
@@ -244,30 +187,32 @@ def equations(
     Exit status: 0 done; 1 the mechanism has no such position; 2 wrong usage or bad input.
     """
     if (latex or blocks) and (coefficients or csv):
-        refuse("equations", "--coefficients and --csv print a table, --latex and --blocks equations; take one of them")
+        opt.refuse(
+            "equations", "--coefficients and --csv print a table, --latex and --blocks equations; take one of them"
+        )
     if at and (latex or blocks):
-        refuse("equations", "--at prints a table of numbers, --latex and --blocks equations; take one of them")
+        opt.refuse("equations", "--at prints a table of numbers, --latex and --blocks equations; take one of them")
     if json and (latex or blocks or coefficients or csv or out):
-        refuse("equations", "--json prints all; leave out --latex, --blocks, --coefficients, --csv and --out")
+        opt.refuse("equations", "--json prints all; leave out --latex, --blocks, --coefficients, --csv and --out")
     if out and (latex or coefficients or csv or at):
-        refuse("equations", "--out writes what its suffix says; leave out --latex, --coefficients, --csv and --at")
-    check_out(out, mechanism, WRITINGS)
-    m = loaded(mechanism)
+        opt.refuse("equations", "--out writes what its suffix says; leave out --latex, --coefficients, --csv and --at")
+    opt.check_out(out, mechanism, WRITINGS)
+    m = opt.loaded(mechanism)
     s = solved_at(m, at) if at else None
     f = mg.formulate(s.mechanism if s else m, bookkeeping, unknowns=unknowns)
     if json:
-        write_json("equations", equations_data(f, s))
+        records.write_json("equations", records.equations_data(f, s))
     elif out is not None:
         f.write(out, components=not blocks)
-        write(f"Wrote {out}: {len(f.unknowns)} unknowns, {len(f.equations)} equations.\n")
+        opt.write(f"Wrote {out}: {len(f.unknowns)} unknowns, {len(f.equations)} equations.\n")
     elif csv or coefficients or at:
         table = f.coefficients(s.state() if s else None)
         names = "" if csv or not at else "".join(f"u({i}): {u.name}\n" for i, u in enumerate(f.unknowns, 1))
-        write(names + (table.csv() if csv else table.text()))
+        opt.write(names + (table.csv() if csv else table.text()))
     elif latex:
-        write(f.latex(components=not blocks))
+        opt.write(f.latex(components=not blocks))
     else:
-        show(f.document(components=not blocks))
+        opt.show(f.document(components=not blocks))
 
 
 Told = list[Document] | dict[str, Any]
@@ -275,20 +220,20 @@ Told = list[Document] | dict[str, Any]
 
 
 def solve(
-    mechanism: Named,
-    drive: Drives = None,
-    actuate: Actuate = None,
-    out: Out = None,
-    include: Include = None,
-    method: Method = "loop_wrench",
-    redundant: Redundant = "nan",
-    on_reach: OnReach = "raise",
-    engine: MotionEngine = "auto",
-    transmission: Outputs = None,
-    compared: Compare = False,
-    tol: Tolerance = None,
-    over_time: OverTime = False,
-    json: AsJson = False,
+    mechanism: opt.Named,
+    drive: opt.Drives = None,
+    actuate: opt.Actuate = None,
+    out: opt.Out = None,
+    include: opt.Include = None,
+    method: opt.Method = "loop_wrench",
+    redundant: opt.Redundant = "nan",
+    on_reach: opt.OnReach = "raise",
+    engine: opt.MotionEngine = "auto",
+    transmission: opt.Outputs = None,
+    compared: opt.Compare = False,
+    tol: opt.Tolerance = None,
+    over_time: opt.OverTime = False,
+    json: opt.AsJson = False,
 ) -> None:
     """Solve motion, driver torques and reactions; print a summary and write a table.
 
@@ -299,15 +244,15 @@ def solve(
     written whole or not at all.
     """
     if json and compared:
-        refuse("solve", "--json and --compare exclude each other")
-    check_out(out, mechanism, FORMATS)
-    m = loaded(mechanism)
-    motions = motions_of(m, drive or ())
-    with progress(f"solving {m.name}") as moved, warnings.catch_warnings():
+        opt.refuse("solve", "--json and --compare exclude each other")
+    opt.check_out(out, mechanism, FORMATS)
+    m = opt.loaded(mechanism)
+    motions = opt.motions_of(m, drive or ())
+    with opt.progress(f"solving {m.name}") as moved, warnings.catch_warnings():
         warnings.simplefilter("ignore", mg.MechgraphWarning)  # the summary has them
         how: dict[str, Any] = {"method": method, "redundant": redundant, "on_reach": on_reach, "engine": engine}
         s = mg.solve(m, motions or None, actuate=actuate, tol=tol, progress=moved, **how)
-    with working(f"summary of {m.name}"):
+    with opt.working(f"summary of {m.name}"):
         told, written = _told(s, out, tuple(include or ()), json, over_time)
         angles = [mg.transmission(s, name) for name in transmission or ()]
         if isinstance(told, dict):
@@ -316,14 +261,14 @@ def solve(
             told += [found.document() for found in angles]
     _tell("solve", told, written)
     if compared:
-        show_compared(mechanism)
+        opt.show_compared(mechanism)
     if not (np.asarray(s.status) == "ok").any():
-        raise typer.Exit(NO_ANSWER)
+        raise typer.Exit(opt.NO_ANSWER)
 
 
 def _told(
     s: mg.Solution, out: Path | None, include: tuple[Any, ...], json: bool, over_time: bool
-) -> tuple[Told, Written | None]:
+) -> tuple[Told, records.Written | None]:
     """What is told of a solution, and the file that was written."""
     figures = mg.over_time(s) if over_time else None
     told: Told = [s.document(asked=True), *([figures.document()] if figures else [])]
@@ -332,60 +277,54 @@ def _told(
     if out is None:
         return told, None
     s.write(out, include)
-    return told, Written(str(out), s.status.size, len(s.part(slice(1)).columns(include)))
+    return told, records.Written(str(out), s.status.size, len(s.part(slice(1)).columns(include)))
 
 
-def _tell(command: str, told: Told, written: Written | None) -> None:
+def _tell(command: str, told: Told, written: records.Written | None) -> None:
     if isinstance(told, dict):
-        write_json(command, told, written=written)
+        records.write_json(command, told, written=written)
         return
     for place, document in enumerate(told):
-        write("\n" * bool(place))
-        show(document)
+        opt.write("\n" * bool(place))
+        opt.show(document)
     if written is not None:
-        write(f"\nWrote {written.file}: {written.rows} rows, {written.columns} columns.\n")
+        opt.write(f"\nWrote {written.file}: {written.rows} rows, {written.columns} columns.\n")
 
 
 def respond(
-    mechanism: Named,
+    mechanism: opt.Named,
     span: Annotated[
-        str | None,
-        typer.Option("--for", metavar="TIME", help="Duration, e.g. 10s. Default: [response] of the file."),
+        str | None, opt.option("--for", "Duration, e.g. 10s. Default: [response] of the file.", "TIME")
     ] = None,
-    start: Annotated[
-        list[str] | None, typer.Option("--start", metavar="FREEDOM=VALUE", help="Coordinate at the beginning (repeat).")
-    ] = None,
+    start: Annotated[opt.Texts, opt.option("--start", "Coordinate at the beginning (repeat).", "FREEDOM=VALUE")] = None,
     rate: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--rate", metavar="FREEDOM=VALUE", help="Rate at the beginning: A=2, A=90deg a unit of time (repeat)."
-        ),
+        opt.Texts,
+        opt.option("--rate", "Rate at the beginning: A=2, A=90deg a unit of time (repeat).", "FREEDOM=VALUE"),
     ] = None,
     points: Annotated[
         int | None,
         typer.Option("--points", min=2, help="Number of evenly spread output times. Default: the steps taken."),
     ] = None,
-    out: Out = None,
-    include: Include = None,
+    out: opt.Out = None,
+    include: opt.Include = None,
     method: Annotated[
         Literal["auto", "RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"] | None,
         typer.Option(help="Stepper of scipy; Radau for stiff loads."),
     ] = None,
-    rtol: Annotated[float | None, typer.Option(help="Relative tolerance of a step. Default: 1e-8.")] = None,
+    rtol: Annotated[float | None, opt.option("--rtol", "Relative tolerance of a step. Default: 1e-8.")] = None,
     atol: Annotated[
         float | None,
-        typer.Option(help="Absolute tolerance (radians, lengths / L, and their rates). Default: 1e-10."),
+        opt.option("--atol", "Absolute tolerance (radians, lengths / L, and their rates). Default: 1e-10."),
     ] = None,
     max_step: Annotated[
-        str | None,
-        typer.Option("--max-step", metavar="TIME", help="Longest step, e.g. 5ms. Default: as the tolerances allow."),
+        str | None, opt.option("--max-step", "Longest step, e.g. 5ms. Default: as the tolerances allow.", "TIME")
     ] = None,
     passive: Annotated[
         Literal["free", "held"] | None, typer.Option(help="Whether passive freedoms move freely, or are held at rest.")
     ] = None,
-    engine: MotionEngine = "auto",
-    over_time: OverTime = False,
-    json: AsJson = False,
+    engine: opt.MotionEngine = "auto",
+    over_time: opt.OverTime = False,
+    json: opt.AsJson = False,
 ) -> None:
     """Follow the motion that the loads produce, print a summary with the energy balance and write a table.
 
@@ -396,70 +335,63 @@ def respond(
     Exit status: 0 done; 1 the loops cannot be closed, or the motion cannot be followed to its end (what there is is written); 2 wrong
     usage or bad input. Ctrl-C keeps what was computed. A file is written whole or not at all.
     """
-    check_out(out, mechanism, FORMATS)
-    m = loaded(mechanism)
-    begin = dict(parse_at(m, text, "--start") for text in start or ())
-    rates = dict(parse_at(m, text, "--rate") for text in rate or ())
+    opt.check_out(out, mechanism, FORMATS)
+    m = opt.loaded(mechanism)
+    begin = opt.values_of(m, start, "--start")
+    rates = opt.values_of(m, rate, "--rate")
     declared = m.units.get("time", "s")
     if span is not None:
-        times = np.array([0.0, duration(span, "--for", declared)])
+        times = np.array([0.0, opt.duration(span, "--for", declared)])
     elif m.response is not None:
         times = m.response.times
     else:
-        refuse("respond", "how long? Give --for TIME; the mechanism has no [response] that says it")
+        opt.refuse("respond", "how long? Give --for TIME; the mechanism has no [response] that says it")
     given = {m.full_name(d.freedom) for d in (m.response.motions if m.response else ())}
     still = [d.freedom for d in m.drives if isinstance(d.motion, mg.Motion) and d.motion.t is None]
     if still := [name for name in still if m.full_name(name) not in given]:
-        refuse(
+        opt.refuse(
             "respond",
             f"the stored motion of {', '.join(still)} has no times; add t = [...], a time for each position, to its [drive.motion] in "
             "the file, or leave that out: the freedom then moves as the loads drive it",
         )
-    longest_step = None if max_step is None else longest(max_step, "--max-step", declared)
+    longest_step = None if max_step is None else opt.longest(max_step, "--max-step", declared)
     t = np.linspace(times[0], times[-1], points) if points else times
-    with progress(f"moving {m.name}", float(times[-1])) as moved, warnings.catch_warnings():
+    with opt.progress(f"moving {m.name}", float(times[-1])) as moved, warnings.catch_warnings():
         warnings.simplefilter("ignore", mg.MechgraphWarning)  # the summary has them
         r = mg.respond(
-            m, t, start=begin or None, rates=rates or None, rtol=rtol, atol=atol, method=method, passive=passive, engine=engine,
+            m, t, start=begin, rates=rates, rtol=rtol, atol=atol, method=method, passive=passive, engine=engine,
             max_step=longest_step, on_stop="return", progress=moved,
         )  # fmt: skip
-    with working(f"summary of {m.name}"):
+    with opt.working(f"summary of {m.name}"):
         told = _told(r, out, tuple(include or ()), json, over_time)
     _tell("respond", *told)
     if r.stopped:
-        fail(r.stopped, NO_ANSWER)
+        opt.fail(r.stopped, opt.NO_ANSWER)
 
 
 def loads(
-    mechanism: Named,
+    mechanism: opt.Named,
     link: Annotated[str, typer.Argument(metavar="LINK", help="The link.")],
-    drive: Drives = None,
-    actuate: Actuate = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out",
-            metavar="FILE",
-            help=f"Write the loads; the extension selects the format: {formats_text(LOAD_FILES)}.",
-        ),
-    ] = None,
+    drive: opt.Drives = None,
+    actuate: opt.Actuate = None,
+    out: Annotated[Path | None, opt.file_option("Write the loads; ", LOAD_FILES)] = None,
     at: Annotated[
-        str, typer.Option("--at", metavar="POSITIONS", help="'worst', 'all', or the number of a position, from 0.")
+        str, opt.option("--at", "'worst', 'all', or the number of a position, from 0.", "POSITIONS")
     ] = "worst",
-    model: Annotated[str, typer.Option(help="Deck: file with mesh and couplings, to be included.")] = "",
+    model: Annotated[str, opt.option("--model", "Deck: file with mesh and couplings, to be included.")] = "",
     held: Annotated[
-        str, typer.Option(help="Deck: what acts where your model is held, e.g. a pair; a reaction there.")
+        str, opt.option("--held", "Deck: what acts where your model is held, e.g. a pair; a reaction there.")
     ] = "",
-    couples: Annotated[float | None, typer.Option(help="Deck: moments as two forces at this distance.")] = None,
+    couples: Annotated[float | None, opt.option("--couples", "Deck: moments as two forces at this distance.")] = None,
     inertia: Annotated[
         Literal["wrench", "acceleration"] | None,
-        typer.Option(help="Deck: inertia as a force and couple on a node (wrench), or as loads of the elements."),
+        opt.option("--inertia", "Deck: inertia as a force and couple on a node (wrench), or as loads of the elements."),
     ] = None,
-    redundant: Redundant = "nan",
-    on_reach: OnReach = "raise",
-    engine: Engine = "auto",
-    tol: Tolerance = None,
-    json: AsJson = False,
+    redundant: opt.Redundant = "nan",
+    on_reach: opt.OnReach = "raise",
+    engine: opt.Engine = "auto",
+    tol: opt.Tolerance = None,
+    json: opt.AsJson = False,
 ) -> None:
     """Print the loads on a link in its own frame; write a table or an FE input deck.
 
@@ -467,46 +399,39 @@ def loads(
 
     Exit status: 0 done; 1 as for solve; 2 wrong usage or bad input, or something that is not unique would have to be written as known.
     """
-    check_out(out, mechanism, LOAD_FILES)
-    m = loaded(mechanism)
+    opt.check_out(out, mechanism, LOAD_FILES)
+    m = opt.loaded(mechanism)
     if at not in ("worst", "all") and not re.fullmatch(r"-?\d+", at):
-        refuse(f"--at {at!r}", "expected worst, all, or the number of a position, from 0")
+        opt.refuse(f"--at {at!r}", "expected worst, all, or the number of a position, from 0")
     places: Any = at if at in ("worst", "all") else int(at)
     options = {"model": model, "held": held, "couples": couples, "inertia": inertia}
     m.place_of_link(link)
-    motions = motions_of(m, drive or ()) or None
-    with working(f"solving {m.name}"):
+    motions = opt.motions_of(m, drive or ()) or None
+    with opt.working(f"solving {m.name}"):
         s = mg.solve(m, motions, actuate=actuate, redundant=redundant, on_reach=on_reach, engine=engine, tol=tol)
         body = mg.free_body(s, link)
         document = body.document(places)
         if out is not None:
             body.write(out, places, **{name: value for name, value in options.items() if value})
     if json:
-        write_json("loads", loads_data(body, places, None if out is None else str(out)))
+        records.write_json("loads", records.loads_data(body, places, None if out is None else str(out)))
         return
-    show(document)
+    opt.show(document)
     if out is not None:
-        write(f"\nWrote {out}: {len(body.cases(places))} positions.\n")
+        opt.write(f"\nWrote {out}: {len(body.cases(places))} positions.\n")
 
 
 def compile_(
-    mechanism: Named,
-    out: Annotated[
-        Path,
-        typer.Option("--out", "-o", metavar="FILE", help=f"The extension selects the format: {formats_text(WRITTEN)}."),
-    ],
+    mechanism: opt.Named,
+    out: Annotated[Path, opt.option("--out -o", f"{opt.SELECTS.capitalize()} {formats_text(WRITTEN)}.", "FILE")],
     name: Annotated[
-        str | None,
-        typer.Option("--name", metavar="NAME", help="Prefix of the symbols. Default: the name of the file."),
+        str | None, opt.option("--name", "Prefix of the symbols. Default: the name of the file.", "NAME")
     ] = None,
     inputs: Annotated[
         InputsName,
-        typer.Option(
-            "--inputs",
-            help="Inputs: motion of the drives, or their efforts (then the motion is integrated).",
-        ),
+        opt.option("--inputs", "Inputs: motion of the drives, or their efforts (then the motion is integrated)."),
     ] = "motion",
-    json: AsJson = False,
+    json: opt.AsJson = False,
 ) -> None:
     """Write a mechanism as C99 that runs by itself, for a controller, or as a unit for co-simulation (FMI 2.0).
 
@@ -517,11 +442,8 @@ def compile_(
 
     Example: mechgraph compile four-bar --out press.c
     """
-    check_out(out, mechanism, WRITTEN)
-    m = loaded(mechanism)
-    with working(f"compiling {m.name}"):
+    opt.check_out(out, mechanism, WRITTEN)
+    m = opt.loaded(mechanism)
+    with opt.working(f"compiling {m.name}"):
         write_tables(tabled(m), out, name, inputs)
-    if json:
-        write_json("compile", FileData(m.name, str(out)))
-    else:
-        write(f"Wrote {out}.\n")
+    records.tell_file("compile", records.FileData(m.name, str(out)), json)

@@ -13,32 +13,8 @@ import typer
 
 import mechgraph as mg
 from mechgraph import show as pictures
-from mechgraph.cli.options import (
-    NO_ANSWER,
-    NO_ANSWERS,
-    Actuate,
-    AsJson,
-    At,
-    Drives,
-    Engine,
-    Method,
-    Named,
-    OnReach,
-    Redundant,
-    Tolerance,
-    drives_of,
-    freedoms,
-    loaded,
-    motions_of,
-    parse_at,
-    progress,
-    refuse,
-    refuse_own_file,
-    show,
-    working,
-    write,
-)
-from mechgraph.cli.records import FileData, PlotData, write_json
+from mechgraph.cli import options as opt
+from mechgraph.cli import records
 from mechgraph.files import format_of, formats_text
 from mechgraph.show.skeleton import FORMATS as FILMS
 from mechgraph.show.skeleton import PICTURES
@@ -57,7 +33,7 @@ class _PictureOptions:
     def one(self, what: str) -> str:
         """The one name that a picture needs."""
         if len(self.of) != 1:
-            refuse(what, "needs the name of one pair: --of A")
+            opt.refuse(what, "needs the name of one pair: --of A")
         return self.of[0]
 
 
@@ -92,48 +68,39 @@ def _kinds(incomplete: str) -> list[str]:
     return [kind for kind in KINDS if kind.startswith(incomplete)]
 
 
+PICTURE = (
+    f"The file; {opt.SELECTS} {formats_text(PICTURES)}, of a skeleton also {formats_text(FILMS[:2])}. "
+    "Left out, NAME.png here."
+)
+
+
 def plot(
-    mechanism: Named,
+    mechanism: opt.Named,
     what: Annotated[
         str, typer.Argument(metavar="WHAT", autocompletion=_kinds, help=f"What is drawn: {', '.join(KINDS)}.")
     ] = "skeleton",
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out",
-            metavar="FILE",
-            help=f"The file; the extension selects the format: {formats_text(PICTURES)}, of a skeleton also {formats_text(FILMS[:2])}. "
-            "Left out, NAME.png here.",
-        ),
-    ] = None,
+    out: Annotated[Path | None, opt.option("--out", PICTURE, "FILE")] = None,
     of: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--of",
-            metavar="NAME",
-            help="The pair, freedom or point that is shown (repeat); of a skeleton pairs to highlight.",
+        opt.Texts,
+        opt.option(
+            "--of", "The pair, freedom or point that is shown (repeat); of a skeleton pairs to highlight.", "NAME"
         ),
     ] = None,
     over: Annotated[
-        str | None,
-        typer.Option(
-            "--over",
-            metavar="FREEDOM",
-            help="Abscissa: a freedom, t, or position. Default: the first driver.",
-        ),
+        str | None, opt.option("--over", "Abscissa: a freedom, t, or position. Default: the first driver.", "FREEDOM")
     ] = None,
-    position: Annotated[int, typer.Option("--position", help="Number of the position that a skeleton shows.")] = 0,
+    position: Annotated[int, opt.option("--position", "Number of the position that a skeleton shows.")] = 0,
     frames: Annotated[
         int | None,
         typer.Option("--frames", min=1, help="Frames of an animation. Default: one per position, at most 72."),
     ] = None,
     forces: Annotated[bool, typer.Option("--forces", help="Reaction forces as arrows in a skeleton.")] = False,
     moment: Annotated[bool, typer.Option("--moment", help="Moments rather than forces of reactions.")] = False,
-    drive: Drives = None,
-    actuate: Actuate = None,
-    on_reach: OnReach = "raise",
-    tol: Tolerance = None,
-    json: AsJson = False,
+    drive: opt.Drives = None,
+    actuate: opt.Actuate = None,
+    on_reach: opt.OnReach = "raise",
+    tol: opt.Tolerance = None,
+    json: opt.AsJson = False,
 ) -> None:
     """Draw a figure or an animation.
 
@@ -143,19 +110,19 @@ def plot(
     at all.
     """
     if what not in KINDS:
-        refuse(f"WHAT {what!r}", f"expected one of {', '.join(KINDS)}")
-    kind, m = KINDS[what], loaded(mechanism)
+        opt.refuse(f"WHAT {what!r}", f"expected one of {', '.join(KINDS)}")
+    kind, m = KINDS[what], opt.loaded(mechanism)
     target = Path(f"{Path(mechanism).stem}.png") if out is None else out
     film = what == "skeleton" and (
         frames is not None or target.suffix.lower() in (s for one in FILMS[:2] for s in one.suffixes)
     )
-    refuse_own_file(target, mechanism)
+    opt.refuse_own_file(target, mechanism)
     format_of(target, FILMS if film else PICTURES)
     asked = _PictureOptions(tuple(of or ()), over, position, forces, moment)
     still = what == "skeleton" and not (film or drive or any(d.motion is not None for d in m.drives))
     moves = kind.moves and not still
-    motions = (motions_of if moves else drives_of)(m, drive or ())
-    with working(f"drawing {m.name}"):
+    motions = (opt.motions_of if moves else opt.drives_of)(m, drive or ())
+    with opt.working(f"drawing {m.name}"):
         drawn: Any = m
         if moves:
             how: dict[str, Any] = {"on_reach": on_reach, "tol": tol}
@@ -169,26 +136,23 @@ def plot(
             pictures.save_picture(kind.draw(drawn, asked), target)
     if film:
         count = frames or min(int((np.asarray(drawn.status) == "ok").sum()), 72)
-        with progress(f"drawing {m.name}", count) as reached:
+        with opt.progress(f"drawing {m.name}", count) as reached:
             each = None if reached is None else lambda done, of_all: reached(done)
             pictures.animate(drawn, target, frames=frames, forces=forces, progress=each)
-    if json:
-        write_json("plot", PlotData(m.name, what, str(target)))
-    else:
-        write(f"Wrote {target}.\n")
+    records.tell_file("plot", records.PlotData(m.name, what, str(target)), json)
 
 
 def report(
-    mechanism: Named,
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.html", help="The page: one file, without network.")],
-    drive: Drives = None,
-    actuate: Actuate = None,
-    method: Method = "loop_wrench",
-    redundant: Redundant = "nan",
-    on_reach: OnReach = "flag",
-    engine: Engine = "auto",
-    tol: Tolerance = None,
-    json: AsJson = False,
+    mechanism: opt.Named,
+    out: Annotated[Path, opt.option("--out -o", "The page: one file, without network.", "FILE.html")],
+    drive: opt.Drives = None,
+    actuate: opt.Actuate = None,
+    method: opt.Method = "loop_wrench",
+    redundant: opt.Redundant = "nan",
+    on_reach: opt.OnReach = "flag",
+    engine: opt.Engine = "auto",
+    tol: opt.Tolerance = None,
+    json: opt.AsJson = False,
 ) -> None:
     """Write a self-contained HTML report: verdict, determinacy report, the mechanism in space, curves, tables, equations.
 
@@ -200,39 +164,32 @@ def report(
 
     Example: mechgraph report four-bar -o four-bar.html
     """
-    refuse_own_file(out, mechanism)
-    m = loaded(mechanism)
-    motions = drives_of(m, drive or ())
+    opt.refuse_own_file(out, mechanism)
+    m = opt.loaded(mechanism)
+    motions = opt.drives_of(m, drive or ())
     stored = bool(m.drives) and all(d.motion is not None for d in m.drives)
     s, failure = None, None
-    with working(f"writing the page of {m.name}"), warnings.catch_warnings():
+    with opt.working(f"writing the page of {m.name}"), warnings.catch_warnings():
         warnings.simplefilter("ignore", mg.MechgraphWarning)  # the page has them
         if motions or actuate or stored:
             how: dict[str, Any] = {"method": method, "redundant": redundant, "on_reach": on_reach, "engine": engine}
             try:
                 s = mg.solve(m, motions or None, actuate=actuate, tol=tol, **how)
-            except NO_ANSWERS as error:
+            except opt.NO_ANSWERS as error:
                 failure, s = error, getattr(error, "solution", None)
         mg.write_report(m, s, path=out)
-    if json:
-        write_json("report", FileData(m.name, str(out)))
-    else:
-        write(f"Wrote {out}: {out.stat().st_size / 1e6:.2f} MB.\n")
+    size = f": {out.stat().st_size / 1e6:.2f} MB"
+    records.tell_file("report", records.FileData(m.name, str(out)), json, size)
     if failure is not None:
         raise failure
     if s is not None and not (np.asarray(s.status) == "ok").any():
-        raise typer.Exit(NO_ANSWER)
+        raise typer.Exit(opt.NO_ANSWER)
 
 
-Picture = Annotated[
-    Path | None,
-    typer.Option(
-        "--out", metavar="FILE", help=f"Also plot them; the extension selects the format: {formats_text(PICTURES)}."
-    ),
-]
+Picture = Annotated[Path | None, opt.file_option("Also plot them; ", PICTURES)]
 
 
-def assemblies(mechanism: Named, at: At = None, out: Picture = None, json: AsJson = False) -> None:
+def assemblies(mechanism: opt.Named, at: opt.At = None, out: Picture = None, json: opt.AsJson = False) -> None:
     """Find all real assemblies with drivers at given values, and report whether the list is complete.
 
     Declared drives stay at their start, those that --at does not name as well.
@@ -242,35 +199,28 @@ def assemblies(mechanism: Named, at: At = None, out: Picture = None, json: AsJso
     Exit status: 0 done; 1 where there is no real assembly; 2 wrong usage or bad input.
     """
     _check_picture(out, mechanism)
-    m = loaded(mechanism)
+    m = opt.loaded(mechanism)
     at_start = {m.full_name(d.freedom): m.start.get(m.full_name(d.freedom), 0.0) for d in m.drives}
-    values = {m.full_name(name): value for name, value in (parse_at(m, text) for text in at or ())}
+    values = {m.full_name(name): value for name, value in (opt.values_of(m, at) or {}).items()}
     if values.keys() <= at_start.keys():
         values = at_start | values
-    with working(f"assemblies of {m.name}"):
+    with opt.working(f"assemblies of {m.name}"):
         found = mg.assemblies(m, values)
         figure = found.plot() if out is not None and len(found) else None
     _tell("assemblies", found, figure, out, json)
     if not len(found):
-        raise typer.Exit(NO_ANSWER)
+        raise typer.Exit(opt.NO_ANSWER)
 
 
 def branches(
-    mechanism: Named,
+    mechanism: opt.Named,
     driver: Annotated[
         str | None,
-        typer.Option(
-            "--driver",
-            metavar="FREEDOM",
-            autocompletion=freedoms,
-            help="The driver. Default: the first declared drive.",
-        ),
+        opt.option("--driver", "The driver. Default: the first declared drive.", "FREEDOM", opt.freedoms),
     ] = None,
-    output: Annotated[
-        str | None, typer.Option("--output", metavar="FREEDOM", help="What a picture shows over the driver.")
-    ] = None,
+    output: Annotated[str | None, opt.option("--output", "What a picture shows over the driver.", "FREEDOM")] = None,
     out: Picture = None,
-    json: AsJson = False,
+    json: opt.AsJson = False,
 ) -> None:
     """Follow every assembly over the range of a driver: branches, folds, circuits, full turns.
 
@@ -279,20 +229,20 @@ def branches(
     Exit status: 0 done; 1 where there is no branch; 2 wrong usage or bad input.
     """
     _check_picture(out, mechanism)
-    m = loaded(mechanism)
+    m = opt.loaded(mechanism)
     name = driver if driver is not None else next((d.freedom for d in m.drives), "")
-    with working(f"branches of {m.name}"):
+    with opt.working(f"branches of {m.name}"):
         found = mg.branches(m, name)
         figure = found.plot(output).figure if out is not None and len(found) else None
     _tell("branches", found, figure, out, json)
     if not len(found):
-        raise typer.Exit(NO_ANSWER)
+        raise typer.Exit(opt.NO_ANSWER)
 
 
 def _check_picture(out: Path | None, mechanism: str) -> None:
     """Refuse a picture that could not be written, before anything is computed."""
     if out is not None:
-        refuse_own_file(out, mechanism)
+        opt.refuse_own_file(out, mechanism)
         format_of(out, PICTURES)
 
 
@@ -302,8 +252,8 @@ def _tell(command: str, found: Any, figure: Any, out: Path | None, json: bool) -
     if drawn is not None:
         pictures.save_picture(figure, drawn)
     if json:
-        write_json(command, found.data, file=None if drawn is None else str(drawn))
+        records.write_json(command, found.data, file=None if drawn is None else str(drawn))
         return
-    show(found.document())
+    opt.show(found.document())
     if drawn is not None:
-        write(f"\nWrote {drawn}.\n")
+        opt.write(f"\nWrote {drawn}.\n")

@@ -194,6 +194,11 @@ def parse_at(m: Mechanism, text: str, option: str = "--at") -> tuple[str, float]
     return name, out[0]
 
 
+def values_of(m: Mechanism, texts: Sequence[str] | None, option: str = "--at") -> dict[str, float] | None:
+    """The values of several freedoms, where there are any."""
+    return dict(parse_at(m, text, option) for text in texts or ()) or None
+
+
 def is_terminal(stream: Any) -> bool:
     """Whether a stream, which may have been closed, is shown to somebody."""
     return stream is not None and stream.isatty()
@@ -352,6 +357,19 @@ def freedoms(ctx: typer.Context, incomplete: str) -> list[str]:
     return [f"{name}=" for name in freedom_names(ctx, incomplete)]
 
 
+def option(flag: str, help: str, metavar: str | None = None, complete: Callable[..., Any] | None = None) -> Any:
+    """An option that takes a value, for ``Annotated``."""
+    return typer.Option(*flag.split(), help=help, metavar=metavar, autocompletion=complete)
+
+
+SELECTS = "the extension selects the format:"
+
+
+def file_option(what: str, formats: Sequence[Format], flag: str = "--out") -> Any:
+    """The option that names the file to write, whose extension selects one of ``formats``."""
+    return option(flag, f"{what}{SELECTS} {formats_text(formats)}.", "FILE")
+
+
 Named = Annotated[
     str,
     typer.Argument(
@@ -360,6 +378,7 @@ Named = Annotated[
         help=f"A mechanism of the library (see 'list'), a TOML file, or one of another program ({', '.join(READERS)}).",
     ),
 ]
+Texts = list[str] | None
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON (schema: library/output.schema.json).")]
 Engine = Annotated[
     Literal["auto", "dense", "sparse"],
@@ -371,99 +390,38 @@ MotionEngine = Annotated[
         help="Dense or sparse matrices, the compiled kernel, or the fastest for the size; the results are the same."
     ),
 ]
-Tolerance = Annotated[
-    float | None,
-    typer.Option(
-        "--tol",
-        metavar="TOL",
-        help="Accuracy of directions [rad] and distances (relative to L), e.g. 1e-4.",
-    ),
-]
+TOLERANCE = "Accuracy of directions [rad] and distances (relative to L), e.g. 1e-4."
+Tolerance = Annotated[float | None, option("--tol", TOLERANCE, "TOL")]
 Bookkeeping = Annotated[Literal["lee", "minimal"], typer.Option(help="Choice of unknowns.")]
 Method = Annotated[Literal["loop_wrench", "newton_euler", "printed"], typer.Option(help="How the forces are solved.")]
-Redundant = Annotated[
-    Literal["nan", "minimum_norm"],
-    typer.Option(help="Indeterminate reactions: NaN or the minimum-norm solution."),
-]
+REDUNDANT = "Indeterminate reactions: NaN or the minimum-norm solution."
+Redundant = Annotated[Literal["nan", "minimum_norm"], typer.Option(help=REDUNDANT)]
 OnReach = Annotated[
-    Literal["raise", "flag"],
-    typer.Option("--on-reach", help="Unreachable positions: stop, or flag and continue."),
+    Literal["raise", "flag"], option("--on-reach", "Unreachable positions: stop, or flag and continue.")
 ]
-At = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--at",
-        metavar="FREEDOM=VALUE",
-        autocompletion=freedoms,
-        help="Assemble there first: A=30deg, B.Tz=0.02 (repeat).",
-    ),
-]
-Drivers = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--driver", metavar="FREEDOM", autocompletion=freedoms, help="Driver in place of the declared ones (repeat)."
-    ),
-]
+At = Annotated[Texts, option("--at", "Assemble there first: A=30deg, B.Tz=0.02 (repeat).", "FREEDOM=VALUE", freedoms)]
+Drivers = Annotated[Texts, option("--driver", "Driver in place of the declared ones (repeat).", "FREEDOM", freedoms)]
 EquationsAt = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--at",
-        metavar="FREEDOM=VALUE[@RATE[@ACCELERATION]]",
-        autocompletion=freedoms,
-        help="Numbers at this position: A=30deg@10 (repeat).",
-    ),
+    Texts,
+    option("--at", "Numbers at this position: A=30deg@10 (repeat).", "FREEDOM=VALUE[@RATE[@ACCELERATION]]", freedoms),
 ]
-Drives = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--drive",
-        autocompletion=freedoms,
-        metavar="FREEDOM=START:STOP:STEP[@RATE[@ACCELERATION]]",
-        help="Motion of a driver, the end excluded: A=0:360:1deg@10, B.Tz=0:0.1:0.01, or one value A=30deg. Angles in rad, "
-        "or in deg where the suffix says so; lengths, rates and accelerations in the declared units (rates of turns in "
-        "rad/s, or @600deg). "
-        "Repeat for several drivers: they describe the same positions. Also coordinates of a named point (bucket.tip.Tz, or "
-        "bucket.tip.T(1,0,1) along a direction) and of a link (platform.Rz). Without it the stored motion.",
-    ),
-]
-Actuate = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--actuate",
-        metavar="FREEDOM",
-        autocompletion=freedom_names,
-        help="Freedom that carries an actuator, if not the prescribed one (repeat: one per prescribed motion).",
-    ),
-]
-Out = Annotated[
-    Path | None,
-    typer.Option(
-        "--out",
-        metavar="FILE",
-        help=f"Write a table, one row per position; the extension selects the format: {formats_text(FORMATS)}.",
-    ),
-]
-Include = Annotated[
-    list[str] | None,
-    typer.Option("--include", metavar="WHAT", help=f"More columns for --out (repeat): {', '.join(MORE)}."),
-]
-Outputs = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--transmission",
-        metavar="FREEDOM",
-        autocompletion=freedom_names,
-        help="Also print transmission and deviation angle of this output (repeat).",
-    ),
-]
-
+DRIVES = (
+    "Motion of a driver, the end excluded: A=0:360:1deg@10, B.Tz=0:0.1:0.01, or one value A=30deg. Angles in rad, "
+    "or in deg where the suffix says so; lengths, rates and accelerations in the declared units (rates of turns in "
+    "rad/s, or @600deg). "
+    "Repeat for several drivers: they describe the same positions. Also coordinates of a named point (bucket.tip.Tz, or "
+    "bucket.tip.T(1,0,1) along a direction) and of a link (platform.Rz). Without it the stored motion."
+)
+Drives = Annotated[Texts, option("--drive", DRIVES, "FREEDOM=START:STOP:STEP[@RATE[@ACCELERATION]]", freedoms)]
+ACTUATE = "Freedom that carries an actuator, if not the prescribed one (repeat: one per prescribed motion)."
+Actuate = Annotated[Texts, option("--actuate", ACTUATE, "FREEDOM", freedom_names)]
+Out = Annotated[Path | None, file_option("Write a table, one row per position; ", FORMATS)]
+Include = Annotated[Texts, option("--include", f"More columns for --out (repeat): {', '.join(MORE)}.", "WHAT")]
+TRANSMISSION = "Also print transmission and deviation angle of this output (repeat)."
+Outputs = Annotated[Texts, option("--transmission", TRANSMISSION, "FREEDOM", freedom_names)]
 Compare = Annotated[bool, typer.Option("--compare", help="Compare with results stored in a FreeCAD assembly (.asmt).")]
-OverTime = Annotated[
-    bool,
-    typer.Option(
-        "--over-time", help="Also peak, mean, RMS and work of drivers, and shaking, over time or a whole cycle."
-    ),
-]
+OVER_TIME = "Also peak, mean, RMS and work of drivers, and shaking, over time or a whole cycle."
+OverTime = Annotated[bool, typer.Option("--over-time", help=OVER_TIME)]
 
 
 def loaded(name: str) -> mg.Mechanism:

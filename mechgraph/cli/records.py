@@ -289,6 +289,14 @@ def write_json(command: str, data: Any, **more: Any) -> None:
     write(json_text({"schema": VERSION, "command": command, **plain(data), **more}))
 
 
+def tell_file(command: str, data: FileData | PlotData, json: bool, more: str = "") -> None:
+    """That a file was written."""
+    if json:
+        write_json(command, data)
+    else:
+        write(f"Wrote {data.file}{more}.\n")
+
+
 def _record(kind: type, **more: Any) -> Callable[[Json], Json]:
     """The schema of a record, with more fields."""
 

@@ -13,20 +13,6 @@ from mechgraph.document.render import Shown, latex_words, to_html, to_latex, to_
 from mechgraph.document.tree import Block, Bullets, Code, Document, Equation, Heading, Legend, Paragraph, Table
 
 __all__ = [
-    "Block",
-    "Bullets",
-    "Code",
-    "Document",
-    "Equation",
-    "Heading",
-    "Legend",
-    "Paragraph",
-    "Shown",
-    "Table",
-    "latex_words",
-    "to_html",
-    "to_latex",
-    "to_latex_file",
-    "to_markdown",
-    "to_text",
-]
+    "Block", "Bullets", "Code", "Document", "Equation", "Heading", "Legend", "Paragraph", "Shown", "Table",
+    "latex_words", "to_html", "to_latex", "to_latex_file", "to_markdown", "to_text",
+]  # fmt: skip
