@@ -34,7 +34,6 @@ static const magnitude UNIQUE = 1e-7;       /* part of a self-stress in a compon
 static const magnitude NEARBY = 1e-5;       /* part of a passive motion above which it moves other links */
 static const magnitude UNTURNED = 1e-13;    /* angle that is rounding */
 static const magnitude MISSING = 1e-9;      /* angle, or length / L, that may be missing to rest */
-static const magnitude CLOSEST = 1.0 / 16;   /* distance of a third node, over a step, from which on it tells of higher orders than rounding */
 static const magnitude OFF_TABLE = 1e-9;     /* part of a table's length up to which a place beyond its end is on it by rounding */
 static const magnitude STRAIGHT_ON = 1e-12; /* change of direction up to which a polygon goes straight on */
 enum { ITERATIONS = 8, MOST_STEPS = 20000, MOST_TURNS = 8, POINTS = 8, TOLD = 8 };
@@ -51,9 +50,10 @@ typedef struct {
       *inertia, *base, *border, *coefficient, *constant, *load_number;
 } Model;
 
-/* A place on the path: state, rates along the way, the closure matrix, its rate along the way and the inverse of its independent rows. */
+/* A place on the path: state, rates and accelerations along the way, the closure matrix, its rate along the way and the inverse of its
+ * independent rows. */
 typedef struct {
-  double *x, *rate, *matrix, *matrix_rate, *inverse, *at, *passive, *twist, *pose, condition;
+  double *x, *rate, *bend, *matrix, *matrix_rate, *inverse, *at, *passive, *twist, *pose, condition;
   int *row;
 } Node;
 
@@ -68,7 +68,7 @@ typedef struct {
   int *row;
   /* rates and forces */
   double *dq, *ddq, *V, *A, *bias, *G, *chord_V, *pair_twist, *E, *applied, *inertial, *total, *reaction, *carried, *given, *tau, *coupled, *multiplier;
-  double *null, *stress, *stress_effort, *row_value, *column_value, *trial, *increment, *bend, *change, *bound, *record, *direction, *line_begin, *asked, *kept;
+  double *null, *stress, *stress_effort, *row_value, *column_value, *trial, *increment, *there, *change, *bound, *record, *direction, *line_begin, *asked, *kept;
   /* passive motions: unit rates, twists with their rates, velocity parts, links at rest in them; along a step, what is missing to rest */
   double *passive, *twist, *twist_rate, *own_bias, *moving_bias, *moving, *raw, *apart, *trial_rate, *trial_acceleration, *still, *series;
   magnitude single, told;
@@ -123,12 +123,12 @@ static size_t lay_out(const Model *m, double *memory, Work *w) {
   TAKE(dq, c), TAKE(ddq, c), TAKE(V, 6 * n), TAKE(A, 6 * n), TAKE(bias, 6 * p), TAKE(G, 6 * c), TAKE(chord_V, 6 * m->loops), TAKE(pair_twist, 6 * p), TAKE(E, 6 * c);
   TAKE(applied, 6 * n), TAKE(inertial, 6 * n), TAKE(total, 6 * p), TAKE(reaction, 6 * p), TAKE(carried, 6 * n), TAKE(given, c);
   TAKE(tau, c), TAKE(coupled, c), TAKE(multiplier, m->couplings), TAKE(null, s * r), TAKE(stress, 6 * p * s), TAKE(stress_effort, c * s);
-  TAKE(row_value, r), TAKE(column_value, c), TAKE(trial, m->states), TAKE(increment, c), TAKE(bend, 2 * c), TAKE(change, u * u), TAKE(bound, 4 * u);
+  TAKE(row_value, r), TAKE(column_value, c), TAKE(trial, m->states), TAKE(increment, c), TAKE(there, 2 * c), TAKE(change, u * u), TAKE(bound, 4 * u);
   TAKE(passive, q * c), TAKE(twist, 6 * q), TAKE(twist_rate, 6 * q), TAKE(own_bias, 6 * p * q), TAKE(moving_bias, q ? 6 * p : 0), TAKE(moving, 6 * q);
   TAKE(raw, 6 * q * q + q), TAKE(apart, 2 * q * q), TAKE(trial_rate, q ? c : 0), TAKE(trial_acceleration, q ? c : 0), TAKE(still, m->drives), TAKE(series, POINTS * q);
   Node *nodes[3] = {&w->a, &w->b, &w->before};
   FOR(i, 3) {
-    nodes[i]->x = taken(&memory, &size, m->states), nodes[i]->rate = taken(&memory, &size, c);
+    nodes[i]->x = taken(&memory, &size, m->states), nodes[i]->rate = taken(&memory, &size, c), nodes[i]->bend = taken(&memory, &size, c);
     nodes[i]->matrix = taken(&memory, &size, r * u), nodes[i]->matrix_rate = taken(&memory, &size, r * u);
     nodes[i]->inverse = taken(&memory, &size, u * u), nodes[i]->row = (int *)taken(&memory, &size, u);
     nodes[i]->at = taken(&memory, &size, 1);
@@ -343,48 +343,42 @@ static void difference(const Model *m, const double *x1, const double *x0, doubl
   }
 }
 
-/* Rates of increments dq (below a turn) at the state that they lead to: dexp^-1(v) w for rotations. */
-static void tangent(const Model *m, const double *dq, const double *rate, double *out) {
+/* Rates of increments dq (below a turn) at the state that they lead to: v' = dexp^-1(v) w for rotations; unless `bend` is NULL, which holds
+ * accelerations (w' for rotations), those of the increments in place of them. */
+static void tangent(const Model *m, const double *dq, const double *rate, double *out, double *bend) {
   memcpy(out, rate, m->columns * sizeof(double));
   FOR(f, m->factors) {
     if (m->kind[f] != MGK_ROTATION) continue;
-    const double *v = dq + m->column[f], square = dot(v, v, 3);
+    const double *v = dq + m->column[f], *w = rate + m->column[f], square = dot(v, v, 3), half = 0.5 * sqrt(square);
     double *r = out + m->column[f], once[3], twice[3];
-    const double half = 0.5 * sqrt(square);
     const double part = half < 0.05 ? 1.0 / 12 + square * (1.0 / 720 + square * (1.0 / 30240 + square / 1209600)) : (1.0 - half / tan(half)) / square;
-    cross(v, r, once);
+    cross(v, w, once);
     cross(v, once, twice);
     FOR(i, 3) r[i] += part * twice[i] - 0.5 * once[i];
+    if (!bend) continue;
+    double *b = bend + m->column[f], turn[3], other[3], third[3];
+    const double slope = 2.0 * dot(v, r, 3) * (1.0 / 720 + square * (1.0 / 15120 + square / 403200)); /* of `part`, in time */
+    cross(r, w, turn);
+    cross(v, b, other);
+    FOR(i, 3) b[i] += slope * twice[i] - 0.5 * (turn[i] + other[i]), turn[i] += other[i];
+    cross(r, once, other);
+    cross(v, turn, third);
+    FOR(i, 3) b[i] += part * (other[i] + third[i]);
   }
 }
 
-/* The state at place `at` of Hermite's polynomial through two nodes, increments from the first: a cubic, or with what a node a length g
- * before both adds to it, see `bent`. */
-static void between(const Model *m, Work *w, const Node *a, const Node *b, double at, const double *bend, double g, double *x) {
+/* The state at place `at` of Hermite's polynomial of degree five through two nodes, in increments from the first. */
+static void between(const Model *m, Work *w, const Node *a, const Node *b, double at, double *x) {
   const double h = *b->at - *a->at, s = (at - *a->at) / h;
-  double *y = w->increment, *there = w->column_value;
+  double *y = w->increment, *there = w->there, *bend = w->there + m->columns;
   difference(m, b->x, a->x, y);
-  tangent(m, y, b->rate, there);
-  FOR(i, m->columns) y[i] = s * (h * a->rate[i] + s * ((3 * y[i] - h * (2 * a->rate[i] + there[i])) + s * (h * (a->rate[i] + there[i]) - 2 * y[i])));
-  const double t = s * h, square = t * t * (t - h) * (t - h);
-  if (bend) FOR(i, m->columns) y[i] += square * (bend[i] + (t + g) * bend[m->columns + i]);
-  advance(m, a->x, y, x);
-}
-
-/* What the node before a adds to Hermite's cubic through a and b, t behind a: t^2 (t - h)^2 (bend_0 + (t + g) bend_1), of degree five. */
-static void bent(const Model *m, Work *w) {
-  const Node *a = &w->a, *b = &w->b, *before = &w->before;
-  const double h = *b->at - *a->at, g = *a->at - *before->at, square = g * g * (g + h) * (g + h), slope = -2.0 * g * (g + h) * (2.0 * g + h);
-  double *y = w->increment, *there = w->column_value, *bend = w->bend, *rate = w->bend + m->columns;
-  difference(m, b->x, a->x, y);
-  tangent(m, y, b->rate, there);
-  difference(m, before->x, a->x, bend);
-  tangent(m, bend, before->rate, rate);
+  memcpy(bend, b->bend, m->columns * sizeof(double));
+  tangent(m, y, b->rate, there, bend);
   FOR(i, m->columns) {
-    const double p = a->rate[i], q = (3 * y[i] / h - 2 * p - there[i]) / h, r = (p + there[i] - 2 * y[i] / h) / (h * h);
-    bend[i] = (bend[i] + g * (p - g * (q - g * r))) / square;
-    rate[i] = (rate[i] - p + g * (2 * q - 3 * g * r) - bend[i] * slope) / square;
+    const double p = h * a->rate[i], q = h * there[i], u = 0.5 * h * h * a->bend[i], v = 0.5 * h * h * bend[i], d = y[i];
+    y[i] = s * (p + s * (u + s * (10 * d - 6 * p - 4 * q - 3 * u + v + s * (8 * p - 15 * d + 7 * q + 3 * u - 2 * v + s * (6 * d - 3 * p - 3 * q - u + v)))));
   }
+  advance(m, a->x, y, x);
 }
 #endif
 
@@ -1212,7 +1206,7 @@ static void continued(const Model *m, Work *w, double at) {
   if (!turns || !(at > from)) return;
   const int n = (int)ceil(TOLD * (at - from) / h);
   for (int i = 1; i < n; i++) {
-    between(m, w, &w->a, &w->b, from + (at - from) * i / n, NULL, 0.0, w->trial);
+    between(m, w, &w->a, &w->b, from + (at - from) * i / n, w->trial);
     coordinates(m, w, w->trial, w->dq);
   }
 }
@@ -1246,10 +1240,10 @@ static double made_inverse(const Model *m, Work *w, const double *matrix) {
 
 /* What a node is beside its closed state, at which it has just been factored: rates along the path, those of the matrix, the condition. */
 static int made_node(const Model *m, Work *w, Node *node) {
-  double gap;
-  const int status = velocities(m, w, w->direction, node->rate, &gap);
+  memset(w->still, 0, m->drives * sizeof(double));
+  const int status = rates(m, w, w->direction, w->still);
   if (status) return status;
-  if (gap > INDEPENDENT) return MGK_CONTRADICTION;
+  memcpy(node->rate, w->dq, m->columns * sizeof(double)), memcpy(node->bend, w->ddq, m->columns * sizeof(double));
   memcpy(node->passive, w->passive, (size_t)m->passives * m->columns * sizeof(double));
   memcpy(node->twist, w->twist, (size_t)6 * m->passives * sizeof(double));
   FOR(i, m->passives) memcpy(node->pose + 12 * i, w->pose + 12 * first_of(m, i), 12 * sizeof(double));
@@ -1281,22 +1275,22 @@ static double radius(const double *M, int n, double *v) {
 }
 
 /* How far the closure matrix departs from that of a node on its half of a step of length h to another one (h < 0: behind the other): a bound
- * of the spectral radius of |C^-1 (C - C_i)| for the Bezier points C_i of this half. */
+ * of the spectral radius of |C^-1 (C - C_i)| for the Bezier points C_i of this half, with what the matrix in the middle is off them. */
 static double departed(const Model *m, Work *w, const Node *here, const Node *there, double h) {
   const int n = m->unknowns;
   const double third = h / 3.0;
-  double *whole = w->bound, *first = whole + n, *last = first + n;
+  double *whole = w->bound, *first = whole + n, *last = first + n, *off = last + n;
   FOR(i, n) {
-    memset(whole, 0, 3 * (size_t)n * sizeof(double));
+    memset(whole, 0, 4 * (size_t)n * sizeof(double));
     FOR(r, n) {
       const int row = here->row[r] * n;
       const double g = here->inverse[i * n + r], *A = here->matrix + row, *B = there->matrix + row;
       const double *from_a = here->matrix_rate + row, *from_b = there->matrix_rate + row;
-      FOR(j, n) whole[j] += g * (B[j] - A[j]), first[j] += g * from_a[j], last[j] += g * from_b[j];
+      FOR(j, n) whole[j] += g * (B[j] - A[j]), first[j] += g * from_a[j], last[j] += g * from_b[j], off[j] += g * w->lu[row + j];
     }
     FOR(j, n) {
       const double near = third * first[j], far = whole[j] - third * last[j];
-      w->change[i * n + j] = raised(raised(0.5 * fabs(near), 0.25 * fabs(2.0 * near + far)), 0.125 * fabs(3.0 * (near + far) + whole[j]));
+      w->change[i * n + j] = raised(raised(0.5 * fabs(near), 0.25 * fabs(2.0 * near + far)), 0.125 * fabs(3.0 * (near + far) + whole[j])) + fabs(off[j]);
     }
   }
   return radius(w->change, n, w->bound);
@@ -1304,21 +1298,25 @@ static double departed(const Model *m, Work *w, const Node *here, const Node *th
 
 /* Whether the step from node a to b leads along one regular branch, b being factored; grown: by how much the next one may be longer.
  *
- * The closure matrix along the step is, to third order, the Hermite cubic through both ends; either half of it lies in the hull of its Bezier
- * points C_i: no matrix of it is singular where |C^-1 (C - C_i)| < 1 for all of them, C being that at its end (Banach's lemma). That b is
- * on the branch of a and not on another one: the states' own cubic is closed in the middle, where it is furthest from the track, by a
- * correction that is small against the distance of any two solutions, 2 / (|J^-1| |J'|) at least (see maths/tracker.py, where the same
- * limit holds). */
+ * The closure matrix along the step is, to fourth order, the Hermite cubic through both ends and what it is off that in the middle; either
+ * half of the cubic lies in the hull of its Bezier points C_i: no matrix is singular where |C^-1 (C - C_i)| < 1 for all of them, C being
+ * that at its end (Banach's lemma). That b is on the branch of a and not on another one: the states' own polynomial is closed in the
+ * middle, where it is furthest from the track, by a correction that is small against the distance of any two solutions, 2 / (|J^-1| |J'|)
+ * at least (see maths/tracker.py, where the same limit holds). */
 static int certified(const Model *m, Work *w, double *grown) {
   const int n = m->unknowns;
   const Node *a = &w->a, *b = &w->b;
-  const double h = *b->at - *a->at, departure = fmax(departed(m, w, b, a, -h), departed(m, w, a, b, h));
-  between(m, w, a, b, 0.5 * (*a->at + *b->at), NULL, 0.0, w->trial);
+  const double h = *b->at - *a->at;
+  between(m, w, a, b, 0.5 * (*a->at + *b->at), w->trial);
   if (!isfinite(evaluate(m, w, w->trial))) return 0;
   solve(m, w, w->residual, w->column_value);
+  fill(m, w->S, w->middle, NULL, NULL, w->lu);
+  add_border(m, w, w->lu);
+  FOR(i, m->rows * n) w->lu[i] -= 0.5 * (a->matrix[i] + b->matrix[i]) + 0.125 * h * (a->matrix_rate[i] - b->matrix_rate[i]);
+  const double departure = fmax(departed(m, w, b, a, -h), departed(m, w, a, b, h));
   double size = fmax(1.0, fmax(size_of(a->rate, m->columns), size_of(b->rate, m->columns)));
   const double correction = 4.0 * size_of(w->column_value, n), allowed = ALONE / (size * fmax(1.0, fmax(a->condition, b->condition)));
-  *grown = fmax(0.4, 0.8 * fmin(DEPARTURE / fmax(departure, 1e-9), sqrt(sqrt(allowed / fmax(correction, 1e-300)))));
+  *grown = fmax(0.4, 0.8 * fmin(DEPARTURE / fmax(departure, 1e-9), pow(allowed / fmax(correction, 1e-300), 1.0 / 6)));
   return departure <= DEPARTURE && correction <= allowed;
 }
 
@@ -1420,7 +1418,7 @@ static int rest_along(const Model *m, Work *w) {
   FOR(g, POINTS) {
     const double t = g % 2 ? point[g / 2] : -point[g / 2];
     double P[POINTS + 1], gap;
-    between(m, w, &w->a, &w->b, *w->a.at + 0.5 * (1.0 + t) * h, NULL, 0.0, w->trial);
+    between(m, w, &w->a, &w->b, *w->a.at + 0.5 * (1.0 + t) * h, w->trial);
     int status = closed(m, w, w->trial, NULL);
     if (!status) status = velocities(m, w, w->direction, w->dq, &gap);
     if (status) return status;
@@ -1481,11 +1479,11 @@ typedef struct {
 
 static int at_place(const Asked *asked, int i) { return asked->order ? asked->order[i] : i; }
 
-/* One position of a certified step, read off its nodes, that `before` them too where it helps. */
-static int read_off(const Model *m, Work *w, Asked *asked, double at, int before) {
+/* One position of a certified step, read off its nodes. */
+static int read_off(const Model *m, Work *w, Asked *asked, double at) {
   const int i = at_place(asked, asked->done), d = m->drives;
   if (at >= *w->b.at) memcpy(w->x, w->b.x, m->states * sizeof(double));
-  else between(m, w, &w->a, &w->b, at, before ? w->bend : NULL, *w->a.at - *w->before.at, w->x);
+  else between(m, w, &w->a, &w->b, at, w->x);
   set_drives(m, w->x, asked->q + i * d);
   continued(m, w, fmin(at, *w->b.at));
   const int status = closed_at_rest(m, w, w->x, at, NULL);
@@ -1506,10 +1504,10 @@ static int follow(const Model *m, Work *w, Asked *asked, const double *begin, co
     if (++w->steps > MOST_STEPS) return MGK_TOO_FAR;
     const double left = length - *w->a.at, step = h >= left ? left : h > 0.5 * left ? 0.5 * left : h;
     *w->b.at = step == left ? length : *w->a.at + step;
-    if (known && step < 16.0 * (*w->a.at - *w->before.at)) {
-      between(m, w, &w->before, &w->a, *w->b.at, NULL, 0.0, w->b.x);
+    if (known) {
+      between(m, w, &w->before, &w->a, *w->b.at, w->b.x);
     } else {
-      FOR(c, m->columns) w->increment[c] = step * w->a.rate[c];
+      FOR(c, m->columns) w->increment[c] = step * (w->a.rate[c] + 0.5 * step * w->a.bend[c]);
       advance(m, w->a.x, w->increment, w->b.x);
     }
     FOR(i, m->drives) drive[i] = step == left ? end[i] : begin[i] + *w->b.at * w->direction[i];
@@ -1526,14 +1524,12 @@ static int follow(const Model *m, Work *w, Asked *asked, const double *begin, co
       if (h < SHORTEST) return status;
       continue;
     }
-    const int before = known && asked->done < until && *w->a.at - *w->before.at > CLOSEST * step;
-    if (before) bent(m, w);
     for (; asked->done < until; asked->done++) {
       const double *q = asked->q + at_place(asked, asked->done) * m->drives;
       double at = 0.0;
       FOR(i, m->drives) at += w->direction[i] * (q[i] - begin[i]);
       if (at > *w->b.at && step != left) break;
-      if ((status = read_off(m, w, asked, at, before))) return status;
+      if ((status = read_off(m, w, asked, at))) return status;
     }
     if (asked->node) {
       if (asked->nodes == asked->most_nodes) return MGK_TOO_FAR;
@@ -1585,7 +1581,7 @@ static int along(const Model *m, Work *w, Asked *asked) {
       if ((status = first_node(m, w, w->x))) return status;
       *w->b.at = 0.0, w->b.condition = w->a.condition;
       memcpy(w->b.x, w->a.x, m->states * sizeof(double));
-      if ((status = read_off(m, w, asked, 0.0, 0))) return status;
+      if ((status = read_off(m, w, asked, 0.0))) return status;
       asked->done++;
       continue;
     }

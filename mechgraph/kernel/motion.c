@@ -101,10 +101,10 @@ static int closed_at(const Model *m, Work *w, Motion *at, int n, const double *x
     FOR(j, m->unknowns) dq[m->unknown[j]] = found[j];
     if (turns) {
       sensitivity(m, w, at);
-      tangent(m, y, dq, moved);
+      tangent(m, y, dq, moved, NULL);
       FOR(k, n) at->a[k] = u[k] - y[m->drive[k]] - moved[m->drive[k]];
       FOR(k, n) {
-        tangent(m, y, at->Z + k * m->columns, moved);
+        tangent(m, y, at->Z + k * m->columns, moved, NULL);
         FOR(r, n) at->mass[r * n + k] = moved[m->drive[r]];
       }
       if (!solved_small(n, at->mass, at->a)) return MGK_SINGULAR;
@@ -204,7 +204,7 @@ static int accelerations(const Model *m, Work *w, Motion *at, int n, const doubl
 static void rates_of_increments(const Model *m, Work *w, Motion *at, int n, const double *x0, const double *x, double *out) {
   double *y = at->off, *moved = at->off + m->columns;
   difference(m, x, x0, y);
-  tangent(m, y, w->dq, moved);
+  tangent(m, y, w->dq, moved, NULL);
   FOR(k, n) out[k] = moved[m->drive[k]];
 }
 
