@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.kinematics.one_state import OneState
 from mechgraph.kinematics.solver import ClosureSolver, FactoredClosure
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
@@ -92,13 +91,9 @@ class DriverPath:
         """See ``maths.newton.Problem``."""
         x = x.copy()
         x[self.rows] = drive
-        if x.shape[1] != 1:
-            return Configuration(self.system_on(tracks), x)
-        if self._start is not None and x.tobytes() == self._start_bytes:
+        if x.shape[1] == 1 and self._start is not None and x.tobytes() == self._start_bytes:
             return self._start
-        system = self.system_on(tracks)
-        matrices = system.one_state
-        return Configuration(system, x, None if matrices is None else OneState(matrices, x))
+        return Configuration(self.system_on(tracks), x)
 
     def system_on(self, tracks: Index) -> System:
         """The system with the numbers of the variants that tracks follow."""

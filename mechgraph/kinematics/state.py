@@ -27,7 +27,6 @@ from typing import Any
 import numpy as np
 
 from mechgraph.kinematics.batches import ScrewTable, run_sums
-from mechgraph.kinematics.one_state import OneState
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Array, Index, compose, cross, cross_twist, finite_twist, move_twist, multiplied
 from mechgraph.model.couplings import Axes, Contact, Lines
@@ -40,12 +39,11 @@ ROUNDINGS = 20
 class Configuration:
     """Poses, twists of freedoms and closure of a batch of states; parts are computed when first asked for."""
 
-    def __init__(self, system: System, x: Array, one: OneState | None = None) -> None:
-        """States ``x (nx, T)``; ``one``: the same, evaluated as one state alone."""
+    def __init__(self, system: System, x: Array) -> None:
+        """States ``x (nx, T)``."""
         self.system = system
         self.x = x
         self.T = x.shape[1]
-        self._one = one
 
     @cached_property
     def solvers(self) -> dict[Any, Any]:
@@ -119,8 +117,6 @@ class Configuration:
     @cached_property
     def _nodes(self) -> Array:
         """Poses of the frames behind all factors ``(3, 4, nodes, T)``, see ``Walk``."""
-        if self._one is not None:
-            return self._one.nodes
         return self.system.walk.poses(self._steps, self.system.par.frame)
 
     @cached_property
@@ -259,8 +255,6 @@ class Configuration:
     def loop_errors(self) -> Array:
         """Closure errors of the loops about their middles, stacked ``(6 loops, T)``."""
         s = self.system
-        if self._one is not None:
-            return self._one.loop_errors
         errors = self.chord_errors
         if s.many_loops:
             per_pair = np.zeros((6, len(s.m.pairs), self.T), dtype=errors.dtype)
@@ -275,8 +269,7 @@ class Configuration:
         if s.many_loops:
             flat = self.pair_points.transpose(1, 0, 2).reshape(len(s.m.pairs), 3 * self.T)
             return np.asarray(s.graph.loop_averages @ flat).reshape(-1, 3, self.T).transpose(1, 0, 2)
-        if s.numbers.ends.shape[-1] == 1:
-            return np.asarray(s.middle_numbers @ self._nodes.reshape(3, s.middle_numbers.shape[1], self.T))
+
         return np.asarray(s.loop_averages @ self.pair_points)
 
     def _about_middles(self, twists: Array) -> Array:
@@ -312,15 +305,12 @@ class Configuration:
     def loop_jacobian(self) -> Array:
         """Twists of the freedoms about the middles of the loops, with their signs in the rows of every loop, ``(6 loops, F, T)``."""
         s, e = self.system, self.system.entries
-        if self._one is not None:
-            rows = self._one.entries
-        else:
-            twists, origins = self._twists
-            parts, arms = twists.take(e.column, axis=2), origins.take(e.column, axis=1)
-            parts *= e.signs
-            arms -= self.middles[:, e.loops]
-            parts[1] += cross(arms, parts[0])
-            rows = parts.reshape(6, *parts.shape[2:])
+        twists, origins = self._twists
+        parts, arms = twists.take(e.column, axis=2), origins.take(e.column, axis=1)
+        parts *= e.signs
+        arms -= self.middles[:, e.loops]
+        parts[1] += cross(arms, parts[0])
+        rows = parts.reshape(6, *parts.shape[2:])
         if s.entry_places is None:
             return rows
         n = 6 * s.graph.n_loops

@@ -25,8 +25,7 @@ from numpy.typing import NDArray
 from mechgraph.graph.linkgraph import LinkGraph, link_graph
 from mechgraph.kinematics.batches import FACTORS_AT_ONCE, Numbers
 from mechgraph.kinematics.layout import Places
-from mechgraph.kinematics.one_state import FEW_NODES, OneStateMatrices
-from mechgraph.maths.linear import Place, add_at, compact
+from mechgraph.maths.linear import Place, compact
 from mechgraph.maths.se3 import Array, Index, turn_between, turn_tangent, turned
 from mechgraph.memo import graph_cached
 from mechgraph.model.mechanism import Mechanism
@@ -380,29 +379,9 @@ class System(States):
         return Numbers(self.par, self.walk, self.batches, self.n_factors, self.n_freedoms)
 
     @cached_property
-    def one_state(self) -> OneStateMatrices | None:
-        """What evaluates one state, kept with the numbers; None for a large mechanism, one without loops, and for variants."""
-        known = vars(self.numbers)
-        if "one_state" not in known:
-            one = self.numbers.constants.shape[3] == self.par.pitch.shape[1] == 1
-            small = one and self.graph.n_loops > 0 and len(self.walk.parents) < FEW_NODES
-            known["one_state"] = OneStateMatrices(self, self.numbers, self.middle_numbers) if small else None
-        found: OneStateMatrices | None = known["one_state"]
-        return found
-
-    @cached_property
     def effort_numbers(self) -> Array:
         """The efforts of all freedoms in their nodes, moment and force ``(3, 2, F, B)``."""
         return self.numbers.components(self.effort_table)
-
-    @cached_property
-    def middle_numbers(self) -> Array:
-        """Middles of the loops ``(loops, 4 nodes)`` from the poses of the nodes, of one mechanism: means of its pair points."""
-        ends = np.concatenate([self.numbers.ends[:, 0, :, 0], np.ones((1, len(self.m.pairs)))])
-        terms = np.moveaxis(self.loop_averages[:, None] * ends, 1, 2)
-        out = np.zeros((len(terms), len(self.walk.parents) + 1, 4), dtype=terms.dtype)
-        add_at(out, self.walk.end_node, terms)
-        return np.moveaxis(out, 2, 1).reshape(len(out), 4 * out.shape[1])
 
     @cached_property
     def reaction_numbers(self) -> Array:

@@ -15,7 +15,6 @@ from numpy.testing import assert_allclose
 import mechgraph as mg
 from mechgraph.kinematics import batches
 from mechgraph.kinematics.assembly import close, scaled_system
-from mechgraph.kinematics.one_state import FEW_NODES, OneState
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System, indexed
 from mechgraph.maths import se3
@@ -333,28 +332,3 @@ def test_a_batch_is_the_evaluation_of_each(seed, monkeypatch):
         for a, b, c in zip(whole, alone, doubled, strict=True):
             assert_allclose(a[..., t], b[..., 0], atol=1e-12)
             assert_allclose(a[..., t], c[..., t], atol=1e-12)
-
-
-@pytest.mark.parametrize("imaginary", [0.0, 0.01j])
-def test_one_state_is_evaluated_as_many_are(imaginary):
-    """Along a path one state is evaluated by products of whole matrices, many states pose by pose: to the same, in the same type."""
-    drawn = [strategies.closed_mechanism(seed) for seed in range(12)]
-    curved = [strategies.with_curves(m, seed) for seed, m in enumerate(drawn[:5])]
-    coupled = mechanisms.bennett().replace(couplings=[mg.Coupling({"O1": 2.0, "O2": -3.0})])
-    worst, seen = 0.0, 0
-    for m in (*map(mg.load, library_names()), *drawn, *curved, coupled):
-        system, rng = indexed(m), np.random.default_rng(len(m.pairs))
-        matrices = system.one_state
-        if matrices is None:
-            assert len(system.walk.parents) >= FEW_NODES or not system.graph.n_loops
-            continue
-        start = system.state_of(system.start_coordinates(m.start)[:, None])
-        x = system.advance(start, (0.02 + imaginary) * rng.normal(size=(system.n_freedoms, 1)))
-        alone = Configuration(system, x, OneState(matrices, x))
-        many = Configuration(system, np.repeat(x, 2, axis=1))
-        for name in ("poses", "residual", "J", "S", "chord_errors"):
-            one, two = getattr(alone, name), getattr(many, name)
-            assert one.dtype == two.dtype
-            worst, seen = max(worst, np.abs(one[..., 0] - two[..., 1]).max(initial=0.0)), seen + 1
-    assert worst < 1e-13
-    assert seen > 200
