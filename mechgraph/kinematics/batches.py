@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from mechgraph.graph.linkgraph import LinkGraph
 from mechgraph.maths.linear import Place, add_at, compact, scattered_sum
-from mechgraph.maths.se3 import SMALL_BATCH, Array, Index, compose, cross, homogeneous, identity, inverse, multiplied
+from mechgraph.maths.se3 import Array, Index, compose, cross, homogeneous, identity, inverse, multiplied
 from mechgraph.model.parameters import Parameters
 from mechgraph.pairs import kinematics as evaluation
 from mechgraph.pairs.factors import Factor, FixedStack, Stack
@@ -163,7 +163,6 @@ class Walk:
         self.step_of[self.first[self.pair] + self.rank] = np.arange(len(order))
         self.levels = self._levels(level[order])
         self.n_first = int((level == 0).sum())
-        self.widest = int(np.bincount(level).max(initial=0))
 
     def _levels(self, level: Index) -> list[tuple[Place, slice, slice]]:
         """For every level the nodes from which its steps start, the steps, and the nodes to which they lead."""
@@ -198,11 +197,6 @@ class Walk:
             return X
         X[:, :, 0] = frame
         X[:, :, 1 : self.n_first + 1] = relative[:3, :, : self.n_first]
-        if self.widest * T <= SMALL_BATCH:
-            there, motion = X.transpose(2, 3, 0, 1), relative.transpose(2, 3, 0, 1)
-            for parents, steps, nodes in self.levels[1:]:
-                np.matmul(there[parents], motion[steps], out=there[nodes])
-            return X
         for parents, steps, nodes in self.levels[1:]:
             before = X[:, :, parents]
             multiplied(before[:, :3], relative[:3, :, steps], out=X[:, :, nodes])

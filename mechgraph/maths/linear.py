@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from mechgraph.maths.se3 import SMALL_BATCH, Array, Index
+from mechgraph.maths.se3 import Array, Index
 
 Place = slice | Index
 """Places along an axis; a slice takes no copy."""
@@ -288,10 +288,7 @@ class Inverses:
     def __init__(self, A: Array) -> None:
         self._A = A
         inverse = inverses(np.ascontiguousarray(A.transpose(2, 0, 1)))
-        few = A.shape[2] <= SMALL_BATCH
-        self._inverse = inverse.transpose(1, 2, 0)
-        if not few:
-            self._inverse = np.ascontiguousarray(self._inverse)
+        self._inverse = np.ascontiguousarray(inverse.transpose(1, 2, 0))
 
     @cached_property
     def condition(self) -> Array:
@@ -320,12 +317,7 @@ class Inverses:
 
 def _times(A: Array, b: Array) -> Array:
     """``A b`` for ``(m, n, T)`` and ``(n, k, T)``."""
-    if b.shape[2] <= SMALL_BATCH:
-        return np.asarray((A.transpose(2, 0, 1) @ b.transpose(2, 0, 1)).transpose(1, 2, 0))
-    out = np.empty((A.shape[0], *b.shape[1:]))
-    for j in range(b.shape[1]):
-        np.einsum("int,nt->it", A, b[:, j], out=out[:, j])
-    return out
+    return np.asarray(np.einsum("int,nkt->ikt", A, b))
 
 
 EVERY = slice(None)

@@ -4,20 +4,11 @@ A pose is the upper three rows of the homogeneous matrix, ``(3, 4, ...)``: rotat
 angular first, ``v`` the velocity of the body point at the origin; wrench ``(M, F)`` moment first, about the origin. Power is the plain
 product ``w . M + v . F``: no swap matrix.
 Source: Murray, Li and Sastry, A Mathematical Introduction to Robotic Manipulation, 1994, chapter 2.
-
-A call of numpy for a single vector takes as long as twenty operations of Python's own numbers: a path is followed from one position to
-the next, and what it costs is such calls. So a formula of vector components is written once, with the functions of a library that is
-handed to it, and evaluated with arrays, or with plain numbers where there are few of them.
 """
 
 from __future__ import annotations
 
-import cmath
 import math
-from collections.abc import Callable
-from itertools import chain
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,61 +16,10 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
-Library = Any
-"""Where a formula finds ``sqrt``, ``sin``, ``cos``, ``arctan``, ``where`` and ``all``: numpy, or the same of plain numbers."""
-
-
-REAL_NUMBERS, COMPLEX_NUMBERS = (
-    SimpleNamespace(
-        sqrt=module.sqrt,
-        sin=module.sin,
-        cos=module.cos,
-        arctan=module.atan,
-        where=lambda condition, value, other: value if condition else other,
-        all=bool,
-    )
-    for module in (math, cmath)
-)
-
-
-class by_components:
-    """A ``formula(library, *components)`` that gives components, as a function of vectors ``(m, ...)``."""
-
-    def __init__(self, formula: Callable[..., tuple[Any, ...]]) -> None:
-        self.formula, self.__doc__ = formula, formula.__doc__
-
-    def __call__(self, *vectors: Array) -> Array:
-        """Vectors ``(k, ...)``; the batch axes of arguments may be broadcast."""
-        batch = vectors[0].shape[1:]
-        count = math.prod(batch)
-        # vectors up to which plain numbers are faster (measured)
-        if 0 < count <= 12:
-            try:
-                joined = np.concatenate(vectors).reshape(-1, count)
-                library = COMPLEX_NUMBERS if joined.dtype.kind == "c" else REAL_NUMBERS
-                found = np.array([self.formula(library, *column) for column in joined.T.tolist()])
-                return found.T.reshape(-1, *batch)
-            except (ArithmeticError, ValueError):
-                pass  # where plain numbers have no value arrays have NaN or infinity
-        rows = self.formula(np, *chain(*vectors))
-        out = np.empty((len(rows), *np.broadcast_shapes(*map(np.shape, rows))), dtype=np.result_type(*rows))
-        for i, row in enumerate(rows):
-            out[i] = row
-        return out
-
-
-Components = tuple[Any, ...]
-
-SMALL_BATCH = 32
-"""Number of small matrices up to which ``matmul`` multiplies them faster than ``einsum`` (measured): the one has less to set up,
-the other runs along the batch."""
 
 
 def multiplied(A: Array, B: Array, out: Array | None = None) -> Array:
     """Products ``A B`` of matrices ``(i, j, n, T)`` and ``(j, k, n, T)``; axes of the batch may have length 1 in one of them."""
-    if (out if out is not None else A)[0, 0].size <= SMALL_BATCH:
-        into = None if out is None else out.transpose(2, 3, 0, 1)
-        return np.matmul(A.transpose(2, 3, 0, 1), B.transpose(2, 3, 0, 1), out=into).transpose(2, 3, 0, 1)
     return np.asarray(np.einsum("ijnt,jknt->iknt", A, B, out=out))
 
 
@@ -88,27 +28,15 @@ def batch_last(M: Array) -> Array:
     return np.ascontiguousarray(np.moveaxis(M, (-2, -1), (0, 1)))
 
 
-SMALL_CROSS = 2000
-"""Numbers up to which a vector product is faster with its factors written out turned (fewer calls) than row by row (less memory)."""
-LEFT_FACTORS, RIGHT_FACTORS = np.array([1, 2, 0, 2, 0, 1]), np.array([2, 0, 1, 1, 2, 0])
-"""Components of both factors in the six products of a vector product, those that are subtracted last."""
+NEXT, LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
+"""The components that follow each other, and those before."""
 
 
 def cross(a: Array, b: Array, out: Array | None = None) -> Array:
     """Vector product of ``(3, ...)`` arrays along the first axis, into ``out`` where given."""
-    if a.size <= SMALL_CROSS and b.size <= SMALL_CROSS:
-        products = a.take(LEFT_FACTORS, 0) * b.take(RIGHT_FACTORS, 0)
-        return np.subtract(products[:3], products[3:], out=products[:3] if out is None else out)
-    if out is None:
-        shape = a.shape if a.shape == b.shape else np.broadcast_shapes(a.shape, b.shape)
-        out = np.empty(shape, dtype=a.dtype if a.dtype == b.dtype else np.result_type(a, b))
-    part = np.empty(out.shape[1:], dtype=out.dtype)
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        row = out[i, ...]
-        np.multiply(a[j], b[k], out=row)
-        np.multiply(a[k], b[j], out=part)
-        row -= part
-    return out
+    out = np.multiply(a.take(NEXT, 0), b.take(LAST, 0), out=out)
+    out -= a.take(LAST, 0) * b.take(NEXT, 0)
+    return np.asarray(out)
 
 
 def skew(a: Array) -> Array:
@@ -163,72 +91,59 @@ def to_matrix(X: Array) -> Array:
     return np.moveaxis(homogeneous(X), (0, 1), (-2, -1)).copy()
 
 
-@by_components
-def quaternion_product(
-    lib: Library, a0: Any, a1: Any, a2: Any, a3: Any, b0: Any, b1: Any, b2: Any, b3: Any
-) -> Components:
+def quaternion_product(a: Array, b: Array) -> Array:
     """Product of quaternions ``(4, ...)``, scalar part first."""
-    return (
-        a0 * b0 - a1 * b1 - a2 * b2 - a3 * b3,
-        a0 * b1 + a1 * b0 + a2 * b3 - a3 * b2,
-        a0 * b2 + a2 * b0 + a3 * b1 - a1 * b3,
-        a0 * b3 + a3 * b0 + a1 * b2 - a2 * b1,
+    (a0, a1, a2, a3), (b0, b1, b2, b3) = a, b
+    return np.array(
+        [
+            a0 * b0 - a1 * b1 - a2 * b2 - a3 * b3,
+            a0 * b1 + a1 * b0 + a2 * b3 - a3 * b2,
+            a0 * b2 + a2 * b0 + a3 * b1 - a1 * b3,
+            a0 * b3 + a3 * b0 + a1 * b2 - a2 * b1,
+        ]
     )
 
 
-@by_components
-def quaternion_exp(lib: Library, x: Any, y: Any, z: Any) -> Components:
+def quaternion_exp(v: Array) -> Array:
     """Unit quaternion of a rotation vector ``v (3, ...)``: ``(cos |v|/2, sin(|v|/2) v/|v|)``."""
-    half = 0.5 * lib.sqrt(x * x + y * y + z * z)
+    half = 0.5 * np.sqrt((v * v).sum(axis=0))
     zero = half == 0.0
-    part = 0.5 * (lib.sin(half) + zero) / (half + zero)
-    return lib.cos(half), part * x, part * y, part * z
+    return np.concatenate([np.cos(half)[None], 0.5 * (np.sin(half) + zero) / (half + zero) * v])
 
 
-@by_components
-def quaternion_log(lib: Library, w: Any, x: Any, y: Any, z: Any) -> Components:
+def quaternion_log(q: Array) -> Array:
     """Rotation vector of a unit quaternion, of length at most pi (of its real part, where it is complex).
 
     ``2 atan(s / q_0) q_v / s`` with ``s = sqrt(q_v . q_v)``, near a half turn ``(pi - 2 atan(q_0 / s)) q_v / s``: both analytic.
     """
-    sign = lib.where(w.real < 0.0, -1.0, 1.0)
-    w = sign * w
-    sine = lib.sqrt(x * x + y * y + z * z)
+    sign = np.where(q[0].real < 0.0, -1.0, 1.0)
+    w, sine = sign * q[0], np.sqrt((q[1:] * q[1:]).sum(axis=0))
     small, beyond = abs(sine) < 1e-12, abs(sine) > abs(w)
-    safe = lib.where(small, 1.0, sine)
-    half = lib.arctan(lib.where(beyond, w, safe) / lib.where(beyond, safe, w))
-    part = sign * lib.where(small, 2.0, lib.where(beyond, math.pi - 2.0 * half, 2.0 * half) / safe)
-    return part * x, part * y, part * z
+    safe = np.where(small, 1.0, sine)
+    half = np.arctan(np.where(beyond, w, safe) / np.where(beyond, safe, w))
+    return np.asarray(sign * np.where(small, 2.0, np.where(beyond, math.pi - 2.0 * half, 2.0 * half) / safe) * q[1:])
 
 
-@by_components
-def turned(lib: Library, w: Any, x: Any, y: Any, z: Any, a: Any, b: Any, c: Any) -> Components:
+def turned(q: Array, v: Array) -> Array:
     """Unit quaternions ``q (4, ...)`` after rotation vectors ``v (3, ...)``: ``exp(v) q``, made unit again."""
-    w, x, y, z = quaternion_product.formula(lib, *quaternion_exp.formula(lib, a, b, c), w, x, y, z)
-    size = lib.sqrt(w * w + x * x + y * y + z * z)
-    return w / size, x / size, y / size, z / size
+    p = quaternion_product(quaternion_exp(v), q)
+    return np.asarray(p / np.sqrt((p * p).sum(axis=0)))
 
 
-@by_components
-def turn_between(lib: Library, w1: Any, x1: Any, y1: Any, z1: Any, w0: Any, x0: Any, y0: Any, z0: Any) -> Components:
-    """Rotation vector from ``q0`` to ``q1`` (the first argument) by the short way."""
-    return quaternion_log.formula(lib, *quaternion_product.formula(lib, w1, x1, y1, z1, w0, -x0, -y0, -z0))
+def turn_between(q1: Array, q0: Array) -> Array:
+    """Rotation vector from ``q0`` to ``q1`` by the short way."""
+    return quaternion_log(quaternion_product(q1, np.concatenate([q0[:1], -q0[1:]])))
 
 
-@by_components
-def turn_tangent(lib: Library, x: Any, y: Any, z: Any, a: Any, b: Any, c: Any) -> Components:
+def turn_tangent(v: Array, w: Array) -> Array:
     """``dexp^-1(v) w = w - v x w / 2 + (1 - (a / 2) cot(a / 2)) / a^2  v x (v x w)`` with ``a = |v|``, below two turns."""
-    p, q, r = y * c - z * b, z * a - x * c, x * b - y * a
-    square = x * x + y * y + z * z
+    square = (v * v).sum(axis=0)
     small = abs(square) < 1e-2
-    part = 1 / 12 + square * (1 / 720 + square * (1 / 30240 + square / 1209600))
-    if not lib.all(small):
-        half = 0.5 * lib.sqrt(lib.where(small, 1.0, square))
-        part = lib.where(small, part, (1.0 - half * lib.cos(half) / lib.sin(half)) / (4.0 * half * half))
-    return (
-        a - 0.5 * p + part * (y * r - z * q),
-        b - 0.5 * q + part * (z * p - x * r),
-        c - 0.5 * r + part * (x * q - y * p),
+    half = 0.5 * np.sqrt(np.where(small, 1.0, square))
+    series = 1 / 12 + square * (1 / 720 + square * (1 / 30240 + square / 1209600))
+    vw = cross(v, w)
+    return np.asarray(
+        w - 0.5 * vw + np.where(small, series, (1.0 - half / np.tan(half)) / (4.0 * half * half)) * cross(v, vw)
     )
 
 
@@ -266,48 +181,6 @@ def rotation_exp(v: Array) -> Array:
     return quaternion_matrix(quaternion_exp(v))
 
 
-HALF_TANGENT = np.zeros((4, 9))
-"""From the nine entries of a rotation matrix to ``2 sin(angle) axis`` and ``trace = 1 + 2 cos(angle)``."""
-HALF_TANGENT[(0, 1, 2, 3, 3, 3), (7, 2, 3, 0, 4, 8)] = 1.0
-HALF_TANGENT[(0, 1, 2), (5, 6, 1)] = -1.0
-NEAR = 1e-4
-"""``tan(angle/2)^2`` up to which the series of ``_arctan_parts`` are exact to rounding (0.02 radians)."""
-
-
-class WideTurn(ArithmeticError):
-    """A rotation so wide that ``tan(angle/2)`` does not serve."""
-
-
-def _arctan_parts(lib: Library, u: Any) -> Components:
-    """``g = atan(t) / t`` and ``h = (1 - g) / u`` for ``u = t^2``: analytic in ``u``, a series where ``u`` is small."""
-    h = 1 / 3 + u * (u * (1 / 7) - 1 / 5)
-    g = 1.0 - u * h
-    small = abs(u) <= NEAR
-    if lib.all(small):
-        return g, h
-    safe = lib.where(small, 1.0, u)
-    t = lib.sqrt(safe)
-    g = lib.where(small, g, lib.arctan(t) / t)
-    return g, lib.where(small, h, (1.0 - g) / safe)
-
-
-@by_components
-def _finite_twist(
-    lib: Library, a: Any, b: Any, c: Any, trace: Any, x1: Any, y1: Any, z1: Any, x0: Any, y0: Any, z0: Any
-) -> Components:
-    """``finite_twist`` from ``2 sin(angle) axis``, ``trace``, ``to`` and ``start``."""
-    # ``3 - trace = 2 - 2 cos(angle)`` at 120 degrees: beyond, a rotation vector is found through quaternions
-    if not lib.all(abs(trace - 3.0) < 3.0):
-        raise WideTurn
-    more = trace + 1.0
-    a, b, c = a / more, b / more, c / more
-    x, y, z = x1 + x0, y1 + y0, z1 + z0
-    x, y, z = x1 - x0 - (b * z - c * y), y1 - y0 - (c * x - a * z), z1 - z0 - (a * y - b * x)
-    g, h = _arctan_parts(lib, a * a + b * b + c * c)
-    along = h * (a * x + b * y + c * z)
-    return 2.0 * g * a, 2.0 * g * b, 2.0 * g * c, g * x + along * a, g * y + along * b, g * z + along * c
-
-
 def finite_twist(R: Array, to: Array, start: Array) -> Array:
     """Finite twist ``(w, v)`` of the motion that turns by ``R (3, 3, ...)`` and takes the point ``start`` to the point ``to (3, ...)``.
 
@@ -316,10 +189,23 @@ def finite_twist(R: Array, to: Array, start: Array) -> Array:
     ``w = 2 g tau``, ``v = g c + h (tau . c) tau``.
     Near a half turn, where ``tau`` has no bound, through quaternions. Comparisons choose a formula; each of them is analytic.
     """
-    try:
-        return _finite_twist(HALF_TANGENT.dot(R.reshape(9, -1)).reshape(4, *R.shape[2:]), to, start)
-    except WideTurn:
+    trace = R[0, 0] + R[1, 1] + R[2, 2]
+    # 3 - trace = 2 - 2 cos(angle), at 120 degrees
+    if not (abs(trace - 3.0) < 3.0).all():
         return _wide_finite_twist(R, to - rotate(R, start))
+    tau = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / (trace + 1.0)
+    c = to - start - cross(tau, to + start)
+    u = (tau * tau).sum(axis=0)
+    # up to 0.02 radians the series is exact to rounding
+    small = abs(u) <= 1e-4
+    h = 1 / 3 + u * (u * (1 / 7) - 1 / 5)
+    g = 1.0 - u * h
+    if not small.all():
+        safe = np.where(small, 1.0, u)
+        t = np.sqrt(safe)
+        g = np.where(small, g, np.arctan(t) / t)
+        h = np.where(small, h, (1.0 - g) / safe)
+    return np.concatenate([2.0 * g * tau, g * c + h * (tau * c).sum(axis=0) * tau])
 
 
 def rotation_log(R: Array) -> Array:

@@ -13,14 +13,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
 import scipy
 
 from mechgraph.fields import second_direction
-from mechgraph.maths.se3 import Array, Library, by_components, cross
+from mechgraph.maths.se3 import Array, cross
 from mechgraph.maths.tolerances import SHAPES
 from mechgraph.pairs.curves import ORDERS, Curve, Pieces, hermite
 from mechgraph.quantities import shown
@@ -70,8 +69,6 @@ class Travel:
         self.length = float(s[-1] - s[0])
         self.is_closed = curve.is_closed
         self.guide, self.is_plane = self._guide()
-        self._frame_in_plane = by_components(partial(_in_plane, self.guide.tolist()))
-        self._frame_guided = by_components(partial(_guided, self.guide.tolist()))
         self.minimizing = curve.frame == "minimizing"
         self.closing = 0.0
         self._turn: Pieces | None = None
@@ -127,9 +124,16 @@ class Travel:
 
     def guided(self, s: Array) -> tuple[Array, ...]:
         """``x, t, t', t'', y, k, r, r'`` of the frame guided by the direction."""
-        x = self.curve.at(self._parameter_at(s))
-        found = self._frame_guided(x[1], x[2], x[3])
-        return x[0], *found[:15].reshape(5, 3, *s.shape), found[15], found[16]
+        x, t, dt, ddt = self._rates(self._parameter_at(s))
+        d = self.guide.reshape(3, *(1,) * s.ndim)
+        c, dc = _dot(d, t), _dot(d, dt)
+        m = np.sqrt(1.0 - c * c)
+        k = (d - c * t) / m
+        y = cross(k, t)
+        bend = _dot(dt, y)
+        r = c * bend / m
+        dr = (dc * bend + c * (_dot(ddt, y) + r * _dot(dt, k))) / m + c * c * dc * bend / m**3
+        return x, t, dt, ddt, y, k, r, dr
 
     def at(self, s: Array) -> CurvePlace:
         """Position and frame at arc lengths ``(...)``, real or complex."""
@@ -138,8 +142,11 @@ class Travel:
             known: CurvePlace | None = self.curve.place_at(u)
             if known is not None:
                 return known
-            x = self.curve.at(u)
-            return CurvePlace(x[0], *self._frame_in_plane(x[1], x[2], x[3]).reshape(6, 3, *s.shape))
+            x, t, dt, ddt = self._rates(u)
+            k = np.broadcast_to(self.guide.reshape(3, *(1,) * s.ndim), t.shape)
+            y = cross(k, t)
+            # t' = c y with the curvature c towards y
+            return CurvePlace(x, t, dt, y, k, _dot(dt, y) * k, _dot(ddt, y) * k)
         x, t, dt, ddt, y, k, r, dr = self.guided(s)
         w, dw = cross(t, dt), cross(t, ddt)
         if not self.minimizing:
@@ -214,64 +221,6 @@ class Travel:
             s = s + (p - x.mean(axis=1)) @ chord / (chord @ chord) * self.length
         x = self._rates(self._parameter_at(s))[0]
         return float(s[np.argmin(np.linalg.norm(x - p[:, None], axis=0))])
-
-
-def _in_plane(k: list[float], lib: Library, *x: Any) -> tuple[Any, ...]:
-    """``t, t', y, k, w, w'`` from three derivatives of a curve in the plane at right angles to ``k``, by its parameter.
-
-    With the curvature ``c = (x'' . y) / |x'|^2`` towards ``y = k x t``: ``t' = c y``, ``w = c k`` and
-    ``c' = ((x''' . y) - 3 c (x' . x'')) / |x'|^3``.
-    """
-    x1, y1, z1, x2, y2, z2, x3, y3, z3 = x
-    a, b, c = k
-    per_length = 1.0 / lib.sqrt(x1 * x1 + y1 * y1 + z1 * z1)
-    t = x1 * per_length, y1 * per_length, z1 * per_length
-    p, q, r = b * t[2] - c * t[1], c * t[0] - a * t[2], a * t[1] - b * t[0]
-    square = per_length * per_length
-    bend = (x2 * p + y2 * q + z2 * r) * square
-    rate = (x3 * p + y3 * q + z3 * r - 3.0 * bend * (x1 * x2 + y1 * y2 + z1 * z2)) * (square * per_length)
-    return (
-        *t,
-        bend * p,
-        bend * q,
-        bend * r,
-        p,
-        q,
-        r,
-        a,
-        b,
-        c,
-        bend * a,
-        bend * b,
-        bend * c,
-        rate * a,
-        rate * b,
-        rate * c,
-    )
-
-
-def _guided(d: list[float], lib: Library, *x: Any) -> tuple[Any, ...]:
-    """``t, t', t'', y, k, r, r'`` of the frame guided by ``d`` from three derivatives of a curve by its parameter."""
-    x1, x2, x3 = x[:3], x[3:6], x[6:]
-
-    def dot(u: Any, v: Any) -> Any:
-        return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
-
-    u1 = 1.0 / lib.sqrt(dot(x1, x1))
-    square = u1 * u1
-    a, b = dot(x1, x2) * square, (dot(x2, x2) + dot(x1, x3)) * square
-    u2, u3 = -a * square, (4 * a * a - b) * square * u1
-    t = [p * u1 for p in x1]
-    dt = [p * square + q * u2 for p, q in zip(x2, x1, strict=True)]
-    ddt = [o * (square * u1) + 3 * p * (u1 * u2) + q * u3 for o, p, q in zip(x3, x2, x1, strict=True)]
-    c, dc = dot(d, t), dot(d, dt)
-    m = lib.sqrt(1.0 - c * c)
-    k = [(p - c * q) / m for p, q in zip(d, t, strict=True)]
-    y = k[1] * t[2] - k[2] * t[1], k[2] * t[0] - k[0] * t[2], k[0] * t[1] - k[1] * t[0]
-    bend = dot(dt, y)
-    r = c * bend / m
-    dr = (dc * bend + c * (dot(ddt, y) + r * dot(dt, k))) / m + c * c * dc * bend / m**3
-    return *t, *dt, *ddt, *y, *k, r, dr
 
 
 def _parameter_rates(x: Array) -> tuple[Array, Array, Array]:

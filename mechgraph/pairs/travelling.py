@@ -6,13 +6,13 @@ from abc import abstractmethod
 from collections.abc import Hashable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 
 from mechgraph.errors import ShapeError
-from mechgraph.maths.se3 import Array, Library, by_components, cross
+from mechgraph.maths.se3 import Array, cross
 from mechgraph.pairs.arc_length import COMPLEX_STEP, CurvePlace, Travel
 from mechgraph.pairs.curves import ORDERS, Curve, turned
 from mechgraph.pairs.factors import UNIT_TWISTS, Factor, Freedom, PoseStack, Stack, entries
@@ -292,8 +292,11 @@ class Beside(Curve):
         ahead = travel.at(step)
         here = travel.at(u) if np.iscomplexobj(u) else ahead.real
         (bend, rate), (_, more) = ([(p.k * turn).sum(axis=0) for turn in (p.w, p.dw)] for p in (here, ahead))
-        rates = self._offset(here.t, here.y, np.stack([bend, rate, more.imag / COMPLEX_STEP]))
-        return np.concatenate([here.x + self.distance * here.y, rates]).reshape(ORDERS, *here.x.shape)
+        d, t, y, k, dk, ddk = self.distance, here.t, here.y, bend, rate, more.imag / COMPLEX_STEP
+        g = 1.0 - d * k
+        second = g * k * y - d * dk * t
+        third = (g - 2.0 * d * k) * dk * y - (d * ddk + g * k * k) * t
+        return np.stack([here.x + d * y, g * t, second, third])
 
     def place_at(self, u: Array) -> CurvePlace | None:
         """With the frame of the curve, which turns over shorter or longer ways: ``c / g`` and ``c' / g^3``, ``g = 1 - d c``."""
@@ -302,10 +305,6 @@ class Beside(Curve):
         here: CurvePlace = self.base.once(Travel).at(u)
         g = 1.0 - self.distance * (here.k * here.w).sum(axis=0)
         return replace(here, x=here.x + self.distance * here.y, dt=here.dt / g, w=here.w / g, dw=here.dw / (g * g * g))
-
-    @cached_property
-    def _offset(self) -> by_components:
-        return by_components(partial(_beside, self.distance))
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -339,18 +338,6 @@ class Beside(Curve):
     def grid(self) -> Array:
         """As the curve."""
         return self.base.once(Travel).s if self._named is None else self._named.grid
-
-
-def _beside(d: float, lib: Library, *parts: Any) -> tuple[Any, ...]:
-    """Three derivatives of ``x + d y`` from tangent, normal, and curvature with two derivatives."""
-    t, y, (k, dk, ddk) = parts[:3], parts[3:6], parts[6:]
-    g = 1.0 - d * k
-    second, third = (g * k, d * dk), ((g - 2.0 * d * k) * dk, d * ddk + g * k * k)
-    return (
-        *(g * a for a in t),
-        *(second[0] * b - second[1] * a for a, b in zip(t, y, strict=True)),
-        *(third[0] * b - third[1] * a for a, b in zip(t, y, strict=True)),
-    )
 
 
 @dataclass(frozen=True)
