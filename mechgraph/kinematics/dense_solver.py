@@ -18,7 +18,6 @@ from mechgraph.maths.linear import (
     RANK_TOLERANCE,
     Choice,
     ChosenSystem,
-    Lu,
     choose,
     complement,
     parabola_is_regular,
@@ -224,35 +223,6 @@ class DenseFactored:
         return [(np.array(held, dtype=np.intp), np.sort(np.concatenate(at))) for held, at in same.items()]
 
 
-class OneFactored(DenseFactored):
-    """One position, without the calls that a batch takes: a path is followed from one position to the next."""
-
-    def __init__(self, forms: list[Form], fixed: Index, J: Array, which: Index) -> None:
-        super().__init__(forms, fixed, J, which)
-        self._form = form = forms[int(which[0])]
-        rows, cols = form.choice.places
-        self._lu = Lu(form.matrix(J)[rows][:, cols, 0])
-
-    @cached_property
-    def condition(self) -> Array:
-        """See the protocol in ``kinematics.solver``."""
-        return np.array([self._lu.condition])
-
-    def solve(self, b: Array) -> Array:
-        """See the protocol in ``kinematics.solver``."""
-        rows, cols = self._form.choice.places
-        out = np.zeros((self.freedoms, *b.shape[1:]))
-        out[cols, :, 0] = self._lu.solve(self._form.rows(b)[rows, :, 0])
-        return self._form.columns(out)
-
-    def solve_transposed(self, b: Array) -> Array:
-        """See the protocol in ``kinematics.solver``."""
-        rows, cols = self._form.choice.places
-        out = np.zeros((self.rows, *b.shape[1:]))
-        out[rows, :, 0] = self._lu.solve(self._form.columns(b)[cols, :, 0], transposed=True)
-        return self._form.back(out)
-
-
 def _independent_rows(matrices: list[Array], choice: Choice) -> list[Array]:
     """The chosen columns of matrices ``(m, F, T)`` in an orthonormal basis of those of the first, ``(n, n, T)`` each."""
     columns = [np.moveaxis(matrix[:, choice.cols], -1, 0) for matrix in matrices]
@@ -318,8 +288,7 @@ class DenseSolver:
         """See the protocol in ``kinematics.solver``; those of the last positions are kept for who asks next."""
         known = self._of(here)
         if known is None or np.count_nonzero(known.which != which):
-            one = here.T == 1 and self.forms[which[0]].choice.cols.size
-            known = (OneFactored if one else DenseFactored)(self.forms, self.fixed, here.J, which.copy())
+            known = DenseFactored(self.forms, self.fixed, here.J, which.copy())
             self._last = weakref.ref(here), known
         return known
 

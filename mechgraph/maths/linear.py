@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
 
 import numpy as np
 import scipy
@@ -34,8 +33,6 @@ def rank_of(sigma: Array, tolerance: float = RANK_TOLERANCE) -> int:
 
 WEAK = (1e-3, 1e-8)
 """Part of a row that must be independent of the rows chosen before: wanted, and at least."""
-FEW = 64
-"""Number of places up to which they are added to one by one."""
 VANISHING = 1e-8
 """Size of a row below which it is not chosen."""
 KEEP = 0.1
@@ -87,11 +84,7 @@ def compact(index: Index) -> Place:
 
 def add_at(out: Array, index: Index, values: Array) -> None:
     """Add ``values (6, n, T)`` to the places ``index (n,)`` of the second axis of ``out``; places may repeat."""
-    if len(index) > FEW:
-        np.add.at(np.moveaxis(out, 1, 0), index, np.moveaxis(values, 1, 0))
-        return
-    for i, place in enumerate(index):
-        out[:, place] += values[:, i]
+    np.add.at(np.moveaxis(out, 1, 0), index, np.moveaxis(values, 1, 0))
 
 
 def scattered_sum(values: Array, index: Index, count: int) -> Array:
@@ -205,119 +198,30 @@ def inverses(stacked: Array) -> Array:
         return inverse
 
 
-FEW_MATRICES = 4
-"""Number of matrices up to which they are factored one by one by LAPACK, without the calls that a batch takes (measured)."""
+class Factorization:
+    """A batch of square matrices ``A (n, n, T)``, inverted; solves with one step of refinement."""
 
+    def __init__(self, A: Array) -> None:
+        self._A = A
+        self._inverse = np.ascontiguousarray(inverses(np.ascontiguousarray(A.transpose(2, 0, 1))).transpose(1, 2, 0))
 
-class Factorization(Protocol):
-    """A batch of square matrices ``A (n, n, T)``, factored."""
-
-    @property
+    @cached_property
     def condition(self) -> Array:
         """Condition numbers ``(T,)``: the product of the infinity norms of matrix and inverse; infinite for singular matrices.
 
         That of the matrix counts as one at least: rows and columns are of unit size, and a single entry tells how near it is to zero.
         """
-
-    def solve(self, b: Array, transposed: bool = False) -> Array:
-        """Solution of ``A x = b`` (or ``A^T x = b``) for ``b (n, k, T)``; NaN for singular matrices."""
-
-    def applied(self, B: Array) -> Array:
-        """``A^-1 B`` for square ``B (n, n, T)``, without refinement."""
-
-
-def factor_of(A: Array) -> Factorization:
-    """The factors of matrices ``(n, n, T)``."""
-    return LuFactors(A) if A.size > 0 and A.shape[2] <= FEW_MATRICES else Inverses(A)
-
-
-class Lu:
-    """LU factors of one matrix ``(n, n)`` by LAPACK."""
-
-    def __init__(self, A: Array) -> None:
-        self._A = A
-        self._lu, self._pivots, self._singular = self._lapack.dgetrf(A)
-
-    @property
-    def _lapack(self) -> Any:
-        """LAPACK; not kept, as modules cannot be pickled."""
-        return scipy.linalg.lapack
-
-    @property
-    def condition(self) -> float:
-        """See ``Factorization``."""
-        if self._singular:
-            return np.inf
-        norm, inverse = self._lapack.dlange, self._lapack.dgetri(self._lu, self._pivots)[0]
-        found: float = max(norm("I", self._A), 1.0) * norm("I", inverse)
-        return found if found == found else np.inf
-
-    def solve(self, b: Array, transposed: bool = False) -> Array | float:
-        """Solution ``(n, k)`` for ``b (n, k)``; NaN for a singular matrix."""
-        if self._singular or not b.size:
-            return np.nan
-        return np.asarray(self._lapack.dgetrs(self._lu, self._pivots, b, trans=transposed)[0])
-
-
-class LuFactors:
-    """LU factors of a few matrices, one by one."""
-
-    def __init__(self, A: Array) -> None:
-        self._each = [Lu(A[:, :, t]) for t in range(A.shape[2])]
-
-    @cached_property
-    def condition(self) -> Array:
-        """See ``Factorization``."""
-        return np.array([lu.condition for lu in self._each])
-
-    def solve(self, b: Array, transposed: bool = False) -> Array:
-        """See ``Factorization``."""
-        out = np.empty(b.shape)
-        for t, lu in enumerate(self._each):
-            out[:, :, t] = lu.solve(b[:, :, t], transposed)
-        return out
-
-    def applied(self, B: Array) -> Array:
-        """See ``Factorization``."""
-        return self.solve(B)
-
-
-class Inverses:
-    """Inverses of many matrices; solves with one step of refinement."""
-
-    def __init__(self, A: Array) -> None:
-        self._A = A
-        inverse = inverses(np.ascontiguousarray(A.transpose(2, 0, 1)))
-        self._inverse = np.ascontiguousarray(inverse.transpose(1, 2, 0))
-
-    @cached_property
-    def condition(self) -> Array:
-        """See ``Factorization``."""
         with np.errstate(invalid="ignore", over="ignore"):
-            norms = [
-                np.maximum.reduce(np.add.reduce(np.abs(M), axis=1), axis=0, initial=0.0)
-                for M in (self._A, self._inverse)
-            ]
+            norms = [np.abs(M).sum(axis=1).max(axis=0, initial=0.0) for M in (self._A, self._inverse)]
             # of a singular matrix NaN, which fmin leaves out
             return np.asarray(np.fmin(np.maximum(norms[0], 1.0) * norms[1], np.inf))
 
-    def applied(self, B: Array) -> Array:
-        """See ``Factorization``."""
-        return (self._inverse.transpose(2, 0, 1) @ B.transpose(2, 0, 1)).transpose(1, 2, 0)
-
     def solve(self, b: Array, transposed: bool = False) -> Array:
-        """See ``Factorization``."""
-        A, inverse = self._A, self._inverse
-        if transposed:
-            A, inverse = np.swapaxes(A, 0, 1), np.swapaxes(inverse, 0, 1)
-        x = _times(inverse, b)
-        x += _times(inverse, b - _times(A, x))
-        return x
-
-
-def _times(A: Array, b: Array) -> Array:
-    """``A b`` for ``(m, n, T)`` and ``(n, k, T)``."""
-    return np.asarray(np.einsum("int,nkt->ikt", A, b))
+        """Solution of ``A x = b`` (or ``A^T x = b``) for ``b (n, k, T)``; NaN for singular matrices."""
+        rows = "nit,nkt->ikt" if transposed else "int,nkt->ikt"
+        x = np.einsum(rows, self._inverse, b)
+        x += np.einsum(rows, self._inverse, b - np.einsum(rows, self._A, x))
+        return np.asarray(x)
 
 
 EVERY = slice(None)
@@ -333,11 +237,11 @@ class ChosenSystem:
         self.A = A
         self.choices = choices
         self.which = which
-        self._parts: list[tuple[Choice, Place, Factorization]] = []
+        self._parts: list[tuple[Choice, Place, Factor]] = []
         used = sorted(set(which.tolist()))
         for i in used:
             choice, at = choices[i], EVERY if len(used) == 1 else np.flatnonzero(which == i)
-            self._parts.append((choice, at, factor_of(choice.square(A)[:, :, at])))
+            self._parts.append((choice, at, Factorization(choice.square(A)[:, :, at])))
 
     @cached_property
     def condition(self) -> Array:
@@ -392,7 +296,7 @@ class ChosenSystem:
     def change(self, other: Array) -> Array:
         """``1 - A^-1 A_other`` of the square parts ``(n, n, T)``, of one choice for all positions."""
         choice, _, factor = self._parts[0]
-        out = -factor.applied(choice.square(other))
+        out = -factor.solve(choice.square(other))
         out[np.arange(len(choice.cols)), np.arange(len(choice.cols))] += 1.0
         return out
 
