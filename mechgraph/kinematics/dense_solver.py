@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import scipy
@@ -256,11 +254,6 @@ class DenseSolver:
     def __init__(self, fixed: Index, keep: Index | None = None) -> None:
         self.fixed, self.keep = fixed, keep
         self.forms: list[Form] = []
-        self._last: tuple[weakref.ref[Configuration], DenseFactored] | None = None
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Without what is kept of the last positions: it refers to them weakly, and is computed again."""
-        return vars(self) | {"_last": None}
 
     def leaves_nothing_free(self, here: Configuration) -> bool:
         """See the protocol in ``kinematics.solver``."""
@@ -273,7 +266,6 @@ class DenseSolver:
         """See the protocol in ``kinematics.solver``."""
         out = DenseSolver(self.fixed, self.keep)
         out.forms = list(self.forms)
-        out._last = self._last and (weakref.ref(here), self._last[1])
         return out
 
     def corrigible(self, dq: Array, which: Index) -> Array:
@@ -285,22 +277,11 @@ class DenseSolver:
         return dq
 
     def factored(self, here: Configuration, which: Index) -> DenseFactored:
-        """See the protocol in ``kinematics.solver``; those of the last positions are kept for who asks next."""
-        known = self._of(here)
-        if known is None or np.count_nonzero(known.which != which):
-            known = DenseFactored(self.forms, self.fixed, here.J, which.copy())
-            self._last = weakref.ref(here), known
-        return known
-
-    def _of(self, here: Configuration) -> DenseFactored | None:
-        """The factors of the last positions, where these are they."""
-        return self._last[1] if self._last is not None and self._last[0]() is here else None
+        """See the protocol in ``kinematics.solver``."""
+        return DenseFactored(self.forms, self.fixed, here.J, which.copy())
 
     def chosen(self, here: Configuration, which: Index) -> Index:
         """See ``ClosureSolver``; a new form is taken where it is much better than the old one and of the same rank."""
-        known = self._of(here)
-        if known is not None and (which < 0).all():
-            return known.which.copy()
         which = which.copy()
         left = np.flatnonzero(which < 0)
         while left.size:
