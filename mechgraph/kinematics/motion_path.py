@@ -21,7 +21,6 @@ from mechgraph.kinematics.solver import ClosureSolver, FactoredClosure
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.newton import Work
-from mechgraph.maths.refinement import refined
 from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.singular_point import WINDOW, Crossing, followed, passed
 from mechgraph.maths.tolerances import PATH
@@ -361,11 +360,6 @@ class Legs:
         paths = Paths(self.points, self.stops)
         self._length = paths.length
         tracks = followed(follower, np.stack(self.starts, axis=1), paths)
-        nodes = refined(follower, tracks.nodes, self.total)
-        tracks = replace(tracks, nodes=nodes)
-        return self._read(follower, tracks)
-
-    def _read(self, follower: Follower, tracks: Tracks) -> _Found:
         reach = self._reach(tracks)
         out = self._unread(follower, tracks)
         self._beside_crossings(out)

@@ -171,10 +171,6 @@ class PathTolerances:
         "Product of the last step and the condition number up to which a node is closed: its rates err by about as much.",
     ] = 1e-6
     rounding: Annotated[float, "Part of the condition number below which a Newton step is rounding."] = 1e-14
-    exact: Annotated[
-        float,
-        "The same where many positions are interpolated between the nodes, so that their sensitivities must be exact as well.",
-    ] = 1e-12
     first: Annotated[float, "First step of a path, where there are no earlier nodes to predict from."] = 0.05
     longest: Annotated[
         float,
@@ -283,21 +279,12 @@ class PathTolerances:
         float,
         "Largest rate of a freedom for a unit rate of the freedom that holds a passive motion, before another one holds it.",
     ] = 3.0
-    interpolation: Annotated[float, "Error of interpolation that needs no correction."] = 3e-14
-    gain: Annotated[
-        float, "Part of that error that nodes twice as dense leave at most (the order is twelve, 2^-12)."
-    ] = 1e-3
     window: Annotated[int, "Most nodes through which one interpolation goes, each with value and rate."] = 6
-    worth: Annotated[
-        int, "Positions for every new node above which new nodes save time (fewer corrections of positions)."
-    ] = 20
     finest: Annotated[
         int,
         "Most halvings of a step for its certificate: what is left open then is beside a singular point, which the careful "
         "march takes.",
     ] = 6
-    halvings: Annotated[int, "Most halvings of a gap between nodes at a time."] = 4
-    refinements: Annotated[int, "Times that nodes are put between nodes at most."] = 5
 
 
 @dataclass(frozen=True)
