@@ -625,8 +625,8 @@ def _closing_rows(placed: PlacedPairs, change: Array, states: Array, rank: int) 
     system = placed.changed(change)
     here = Configuration(system, _closed(system, states, rank))
     stress = np.linalg.svd(here.J.transpose(2, 0, 1))[0][:, :, rank:]
-    C, n = np.zeros((here.T, system.n_rows, change.size)), len(system.loop_matrix)
-    twists = np.einsum("lp,ipct->ilpct", system.loop_matrix, placed.carried(change, here))
+    C, n = np.zeros((here.T, system.n_rows, change.size)), system.graph.n_loops
+    twists = np.einsum("lp,ipct->ilpct", system.graph.loop_matrix, placed.carried(change, here))
     twists[3:] += cross(twists[:3], np.broadcast_to(here.middles[:, :, None, None], twists[:3].shape))
     C[:, : 6 * n] = twists.transpose(4, 1, 0, 2, 3).reshape(here.T, 6 * n, change.size)
     r = np.einsum("tmk,mt->tk", stress, here.residual)

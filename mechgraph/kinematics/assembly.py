@@ -285,7 +285,8 @@ def _closed_start(m: Mechanism, preferred: Mapping[str, float], tol: float) -> C
         )
     here = scaled_start(m)
     system, x, error = here.system, here.x[:, 0], float(here.closure[0])
-    if error <= 10 * CLOSURE_GOAL or (error <= CLOSED and system.many_loops):
+    # of many loops dense least squares take longer than what they gain is worth
+    if error <= 10 * CLOSURE_GOAL or (error <= CLOSED and system.graph.n_loops > 16):
         return here
     if error <= CLOSED:
         return scaled(Configuration(system, close_all(system, here.x, np.arange(0))[0]))

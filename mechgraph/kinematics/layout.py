@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from mechgraph.graph.linkgraph import LinkGraph
@@ -36,9 +37,6 @@ from mechgraph.model.parameters import Parameters
 from mechgraph.pairs.factors import Component
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.pairs.travelling import Travelling
-
-MANY_LOOPS = 16
-"""Loops above which the loop matrix is applied as a sparse one (measured: from here on it is the faster one)."""
 
 
 @of_graph
@@ -345,21 +343,6 @@ class Places:
         return np.concatenate(columns), np.concatenate(signs)
 
     @graph_cached
-    def many_loops(self) -> bool:
-        """Whether sums along loops are taken with the sparse loop matrix."""
-        return self.graph.n_loops > MANY_LOOPS
-
-    @graph_cached
-    def loop_matrix(self) -> Array:
-        """The loop matrix, loops x pairs."""
-        return self.graph.loop_matrix
-
-    @graph_cached
-    def loop_averages(self) -> Array:
-        """Means over the pairs of every loop, loops x pairs."""
-        return np.asarray(self.graph.loop_averages.toarray())
-
-    @graph_cached
     def entries(self) -> Entries:
         """The freedoms along the loops."""
         return entries_of(self.graph, self.first_column)
@@ -370,7 +353,6 @@ class Places:
         return self.entries.places(self.n_freedoms)
 
     @graph_cached
-    def loops_of_chords(self) -> Array | None:
-        """Which chord closures make up a loop, ``(loops, chords)`` with signs; None where each loop has one of its own, in order."""
-        found = self.graph.loop_matrix[:, self.chords]
-        return None if np.array_equal(found, np.eye(len(found))) else found
+    def loops_of_chords(self) -> scipy.sparse.csr_array:
+        """Which chord closures make up a loop, ``(loops, chords)`` with signs."""
+        return self.graph.sparse_loop_matrix[:, self.chords]

@@ -20,11 +20,13 @@ linear relation, reactions are those of the contact.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy
 
 from mechgraph.kinematics.batches import ScrewTable, run_sums
 from mechgraph.kinematics.system import System
@@ -255,22 +257,12 @@ class Configuration:
     def loop_errors(self) -> Array:
         """Closure errors of the loops about their middles, stacked ``(6 loops, T)``."""
         s = self.system
-        errors = self.chord_errors
-        if s.many_loops:
-            per_pair = np.zeros((6, len(s.m.pairs), self.T), dtype=errors.dtype)
-            per_pair[:, s.chords] = errors
-            return self.loop_sums(per_pair)
-        return self._about_middles(errors.copy() if s.loops_of_chords is None else s.loops_of_chords @ errors)
+        return self._about_middles(_summed(s.loops_of_chords, self.chord_errors))
 
     @cached_property
     def middles(self) -> Array:
         """Middle of the pair points of every loop, ``(3, loops, T)``."""
-        s = self.system
-        if s.many_loops:
-            flat = self.pair_points.transpose(1, 0, 2).reshape(len(s.m.pairs), 3 * self.T)
-            return np.asarray(s.graph.loop_averages @ flat).reshape(-1, 3, self.T).transpose(1, 0, 2)
-
-        return np.asarray(s.loop_averages @ self.pair_points)
+        return _summed(self.system.graph.loop_averages, self.pair_points)
 
     def _about_middles(self, twists: Array) -> Array:
         """Twists ``(6, loops, T)`` about the internal origin taken about the middle of their loop, in place; stacked ``(6 loops, T)``.
@@ -376,12 +368,7 @@ class Configuration:
 
     def loop_sums(self, per_pair: Array) -> Array:
         """Signed sum of pair terms along every loop, about its middle, stacked ``(6 loops, T)``."""
-        s = self.system
-        if s.many_loops:
-            flat = per_pair.transpose(1, 0, 2).reshape(per_pair.shape[1], 6 * per_pair.shape[2])
-            sums = np.asarray(s.graph.sparse_loop_matrix @ flat).reshape(s.graph.n_loops, 6, per_pair.shape[2])
-            return self._about_middles(sums.swapaxes(0, 1))
-        return self._about_middles(s.loop_matrix @ per_pair)
+        return self._about_middles(_summed(self.system.graph.sparse_loop_matrix, per_pair))
 
     def pair_wrenches(self, x: Array) -> Array:
         """Pair wrenches ``(6, P, k, T)`` of the loop rows of ``x (n_rows, k, T)``: ``w = C^T x``, taken about the internal origin."""
@@ -390,10 +377,8 @@ class Configuration:
         loops = x[: 6 * n].reshape(n, 6, *x.shape[1:]).copy()
         parts = loops.swapaxes(0, 1)
         parts[:3] += cross(self.middles[:, :, None], parts[3:])
-        if s.many_loops:
-            flat = np.asarray(s.graph.sparse_loop_matrix.T @ loops.reshape(n, loops.size // n))
-            return np.moveaxis(flat.reshape(len(s.m.pairs), 6, *x.shape[1:]), 1, 0)
-        return np.asarray(np.einsum("lp,list->ipst", s.loop_matrix, loops))
+        flat = np.asarray(s.graph.sparse_loop_matrix.T @ loops.reshape(n, 6 * math.prod(x.shape[1:])))
+        return np.moveaxis(flat.reshape(len(s.m.pairs), 6, *x.shape[1:]), 1, 0)
 
     def tree_efforts(self, wrenches: Array) -> Array:
         """Efforts ``(F, T)`` of wrenches ``(6, N, T)`` on the links in the freedoms along the tree, those of the chords zero."""
@@ -406,6 +391,13 @@ class Configuration:
         relative = self.pair_sums(self.S * ddq)
         relative += bias
         return self.system.tree.sums(relative)
+
+
+def _summed(matrix: scipy.sparse.csr_array, values: Array) -> Array:
+    """``sum_p M_lp v_p``, ``(k, L, T)`` for values ``(k, P, T)``."""
+    k, _, T = values.shape
+    flat = values.swapaxes(0, 1).reshape(matrix.shape[1], k * T)
+    return np.asarray(matrix @ flat).reshape(matrix.shape[0], k, T).swapaxes(0, 1)
 
 
 def _stacked(parts: list[Array]) -> Array:
