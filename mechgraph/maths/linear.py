@@ -237,7 +237,7 @@ class ChosenSystem:
         self.A = A
         self.choices = choices
         self.which = which
-        self._parts: list[tuple[Choice, Place, Factor]] = []
+        self._parts: list[tuple[Choice, Place, Factorization]] = []
         used = sorted(set(which.tolist()))
         for i in used:
             choice, at = choices[i], EVERY if len(used) == 1 else np.flatnonzero(which == i)
