@@ -102,7 +102,7 @@ PICTURES: dict[str, tuple[Made, Callable[[Any, mg.Mechanism, mg.Solution], None]
 
 
 def fingerprint(name: str) -> str:
-    """A hash of what a picture is drawn from: the mechanism as a file, where it moves, how it is drawn, and in which colours."""
+    """A hash of what a picture is drawn from: the mechanism as a file, where it moves, how it is drawn, and in which colors."""
     made, draw = PICTURES[name]
     m, s = made()
     with tempfile.TemporaryDirectory() as folder:

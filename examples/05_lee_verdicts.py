@@ -198,7 +198,7 @@ def text_of_earlier() -> str:
         f"closes at {closed} of {len(theta2)} values of theta1, with theta2 = {theta2[0]:.1f} at {rows['theta1'][0]:.0f} and "
         f"{theta2[-1]:.1f} at {rows['theta1'][-1]:.0f} degrees | the branch: on that of the table (theta2 = {rows['theta2'][0]:.1f} "
         f"and {rows['theta2'][-1]:.1f}) it stays {rcsr_csr.gap_without_errors():.3f} in open, on the other one of loop 1 it closes |",
-        f"| RCSR, true M_IN at 202 degrees | -134.9 | {torques['about the mass centre'][1]:.2f} | {torques['without tensors'][1]:.2f} "
+        f"| RCSR, true M_IN at 202 degrees | -134.9 | {torques['about the mass center'][1]:.2f} | {torques['without tensors'][1]:.2f} "
         f"without the tensors, which the earlier value leaves out; {torques['about O_i'][1]:.2f} with the tensors about O_i; power balance "
         "holds for each |",
         f"| Table XXVII, FA4 in row 214 (printed .743) | .738 | {rcsr_csr.copied()['XXVII'][-1, 6]:.3f} | the forces at O3 of Table XXVIII "

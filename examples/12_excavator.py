@@ -1,6 +1,6 @@
 """An excavator from drawing numbers to bearing forces: what the soil does to the bucket, in every pin and cylinder.
 
-Metres, kilograms, newtons; x forward, z up, the foot of the boom at the origin. The bucket is drawn through the soil on a straight line
+Meters, kilograms, newtons; x forward, z up, the foot of the boom at the origin. The bucket is drawn through the soil on a straight line
 while its own cylinder is locked; boom and stick cylinder move the tip there. The numbers by hand are statics in the plane: a triangle for
 the position, then one body after the other, moments about its pin.
 

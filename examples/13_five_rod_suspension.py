@@ -1,6 +1,6 @@
 """A five-rod suspension from hard points to rod forces, toe and camber over the travel of the wheel, with the strut as the actuator.
 
-Metres, kilograms, newtons; x forward, y to the left wheel, z up. The road lifts the wheel: its centre is prescribed, the strut holds it.
+Meters, kilograms, newtons; x forward, y to the left wheel, z up. The road lifts the wheel: its center is prescribed, the strut holds it.
 By hand: rods keep their lengths, five rods and the strut balance the tyre's force in six equations, and the strut's work is the tyre's.
 """
 

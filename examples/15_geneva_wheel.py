@@ -1,6 +1,6 @@
 """A Geneva wheel over all phases of a turn of its crank: the pin in a slot indexes the wheel by a quarter, then an arc locks it.
 
-Marghitu's problem 2.12 asks for the freedoms of a Geneva mechanism that is drawn without numbers; here four slots at a centre distance of
+Marghitu's problem 2.12 asks for the freedoms of a Geneva mechanism that is drawn without numbers; here four slots at a center distance of
 100 mm, a wheel of 0.004 kg m2 that also overcomes 2 N m of friction, the crank at 10 rad/s. By hand, with lambda = sin(pi / 4):
 
     tan b = lambda sin a / (1 - lambda cos a),  w2 / w1 = lambda (cos a - lambda) / (1 - 2 lambda cos a + lambda^2).
@@ -14,7 +14,7 @@ SLOTS, DISTANCE, SPEED = 4, 0.1, 10.0
 INERTIA, FRICTION = 0.004, 2.0
 RATIO = np.sin(np.pi / SLOTS)  # of the crank to the distance: the pin enters along the slot, without a blow
 CRANK = RATIO * DISTANCE
-ENTRY = np.pi / 2 - np.pi / SLOTS  # crank angle before the line of centres
+ENTRY = np.pi / 2 - np.pi / SLOTS  # crank angle before the line of centers
 Z = (0.0, 0.0, 1.0)
 PIN = 0.006  # radius of the pin
 
@@ -32,7 +32,7 @@ def shafts() -> list[mg.Pair]:
 
 
 def engaged() -> mg.Mechanism:
-    """The pin in the slot on the line of centres; the wheel turns against friction while it turns."""
+    """The pin in the slot on the line of centers; the wheel turns against friction while it turns."""
     slot = mg.Curve.line(
         point=(DISTANCE, 0, 0), direction=(-1, 0, 0), ends_at=(0.02, 0.08)
     )  # from the axis of the wheel
@@ -51,7 +51,7 @@ def indexing() -> tuple[mg.Solution, np.ndarray]:
     m = engaged()
     assert mg.check(m).mobility == 1  # 2.12: 2 moving links, 2 pairs R, 1 pin in a slot: 6 - 4 - 1
     a = np.linspace(-ENTRY, ENTRY, 181)
-    to_entry = np.linspace(0.0, -ENTRY, 30)[:-1]  # from the line of centres, where it is declared
+    to_entry = np.linspace(0.0, -ENTRY, 30)[:-1]  # from the line of centers, where it is declared
     s = mg.solve(m, {"A": mg.Motion(np.concatenate([to_entry, a]), SPEED)})
     part = slice(len(to_entry), None)
     b = np.arctan2(RATIO * np.sin(a), 1 - RATIO * np.cos(a))
@@ -95,7 +95,7 @@ def dwelling() -> mg.Solution:
     s = mg.solve(m, {"A": mg.Motion(np.linspace(ENTRY, 2 * np.pi - ENTRY, 91), SPEED)})
     assert np.allclose(s["B"].position, 0.0, atol=1e-12)
     assert np.allclose(s["A"].effort, 0.0, atol=1e-12)  # the arc holds the wheel, not the crank's drive
-    # across the line of centres the force is unique, along it disc and shafts could be strained against each other
+    # across the line of centers the force is unique, along it disc and shafts could be strained against each other
     assert np.allclose(np.abs(s["D"].components["Fy"]), 5.0 / DISTANCE, rtol=1e-11)
     assert np.isnan(s["D"].components["Fx"]).all()
     print(

@@ -1,6 +1,6 @@
 """A cam that swings an arm through a roller against a spring: motion, contact force, pressure, and the speed at which the roller lifts off.
 
-The cam rises by 12 mm over 120 degrees and falls again (polynomial 3-4-5, dwells between); the arm is 110 mm long. By hand: the centre of
+The cam rises by 12 mm over 120 degrees and falls again (polynomial 3-4-5, dwells between); the arm is 110 mm long. By hand: the center of
 the roller stays on its path on the cam, the normal force balances inertia and spring about the pivot, and as it is a static part and one
 with the square of the speed, the greatest speed at which the cam never has to pull follows from both.
 """
@@ -19,7 +19,7 @@ Z = (0.0, 0.0, 1.0)
 
 
 def law(u: np.ndarray) -> np.ndarray:
-    """Lift of the centre of the roller, its slope and bend at angles of the cam ``(3, ...)``."""
+    """Lift of the center of the roller, its slope and bend at angles of the cam ``(3, ...)``."""
     rise, fall = np.deg2rad(120.0), np.deg2rad(180.0)
     u = np.mod(u, 2 * np.pi)
     back = u > fall
@@ -61,7 +61,7 @@ def by_hand(s: mg.Solution, speed: float) -> tuple[np.ndarray, np.ndarray]:
     centre = PIVOT[:2] + np.stack(
         [d[0] * np.cos(phi) - d[1] * np.sin(phi), d[0] * np.sin(phi) + d[1] * np.cos(phi)], axis=-1
     )
-    u = np.pi / 2 - (np.arctan2(centre[:, 1], centre[:, 0]) - theta)  # where on the cam the centre of the roller is
+    u = np.pi / 2 - (np.arctan2(centre[:, 1], centre[:, 0]) - theta)  # where on the cam the center of the roller is
     assert np.abs(np.linalg.norm(centre, axis=1) - FAR - law(u)[0]).max() < 1e-7
     rho, slope = FAR + law(u)[0], law(u)[1]
     out = centre / rho[:, None]

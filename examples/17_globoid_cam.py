@@ -14,7 +14,7 @@ Z = (0.0, 0.0, 1.0)
 
 
 def ball(psi: np.ndarray) -> np.ndarray:
-    """Centre of the ball for angles of the arm ``(T,)``, ``(T, 3)``: the arm turns about y in front of the drum."""
+    """Center of the ball for angles of the arm ``(T,)``, ``(T, 3)``: the arm turns about y in front of the drum."""
     return np.stack([DISTANCE - ARM * np.cos(psi), 0 * psi, ARM * np.sin(psi)], axis=-1)
 
 
@@ -61,7 +61,7 @@ def main() -> None:
     torque = INERTIA * second - FRICTION
     assert np.abs(s["A"].effort[:, 0] * SPEED - torque * rate).max() < 1e-4 * np.abs(torque * rate).max()
     c = s.contact("B")
-    way = np.stack([np.sin(psi), 0 * psi, np.cos(psi)], axis=-1)  # of the centre of the ball
+    way = np.stack([np.sin(psi), 0 * psi, np.cos(psi)], axis=-1)  # of the center of the ball
     along = (c.normal * way).sum(axis=-1)
     assert np.allclose(c.normal_force * along * ARM, torque, rtol=1e-6, atol=1e-6)
     assert np.abs(s["P"].position).max() < 1e-8

@@ -1,7 +1,7 @@
 """How well the drivers move an output against a load: transmission angle, deviation angle, and their form for any mechanism.
 
 The mechanism at rest and without mass, a unit effort in the freedom of the output: pairs (and gears) k transmit wrenches (F, M) to the
-output link, M about the point of the pair (of a contact where its elements touch, of a ball or roller its centre), where a unit rate of
+output link, M about the point of the pair (of a contact where its elements touch, of a ball or roller its center), where a unit rate of
 the freedom makes the velocity v and the angular velocity w:
 
     sin mu = cos delta = |sum_k F_k . v_k + M_k . w| / sum_k (|F_k| |v_k| + |M_k| |w|),

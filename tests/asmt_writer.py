@@ -70,7 +70,7 @@ class Writer:
         self.gravity, self.simulation, self.results = np.zeros(3), (0.0, 1.0, 0.1), []
 
     def part(self, name, X, mass=0.0, center=(0, 0, 0), axes=None, moments=(0, 0, 0)):
-        """A part at X; centre and principal axes in its own frame."""
+        """A part at X; center and principal axes in its own frame."""
         M = np.eye(4)
         M[:3, :3], M[:3, 3] = np.eye(3) if axes is None else axes, center
         self.parts[name] = ["PrincipalMassMarker", ["Name", ["MassMarker"], *placed(M), "Mass", np.array([mass]),

@@ -26,7 +26,7 @@ def invoke(*arguments: str | Path, **environment: str) -> Result:
 
 
 def run(*arguments: str | Path) -> Result:
-    """The same of a program that neither crashes nor colours what it prints."""
+    """The same of a program that neither crashes nor colors what it prints."""
     result = invoke(*arguments)
     assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
     assert "Traceback" not in result.output

@@ -125,7 +125,7 @@ def test_the_printed_equations_hold_with_the_efforts_where_they_stand() -> None:
 
 
 def test_where_the_actuators_rest_forces_have_no_value() -> None:
-    """At its dead centres no force on the piston holds a couple on the crank; the motion goes on."""
+    """At its dead centers no force on the piston holds a couple on the crank; the motion goes on."""
     theta = np.deg2rad(np.arange(0, 360, 30))
     for engine, method in WAYS:
         s = mg.solve(slider_crank(), {"A": mg.Motion(theta, velocity=5.0)}, actuate=["D"], engine=engine, method=method)

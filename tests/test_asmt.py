@@ -466,7 +466,7 @@ def swing(force=1.0, torque=1.0, shift=0.0):
     t = np.arange(5) * 0.25
     c, s = np.cos(3 * t), np.sin(3 * t)
     f = {"X": 2 * 9 * 0.5 * c, "Y": 2 * 9 * 0.5 * s - 2 * 9.81, "Z": 0 * t}  # of the arm on the ground: m (w^2 r + g)
-    m = {"X": -0.1 * f["Y"], "Y": 0.1 * f["X"], "Z": 0 * t}  # about the marker, the mass centre 0.1 above it
+    m = {"X": -0.1 * f["Y"], "Y": 0.1 * f["X"], "Z": 0 * t}  # about the marker, the mass center 0.1 above it
 
     def row(label, values):
         return "\t".join([label, "0", *(f"{v:.17g}" for v in values)]) + "\t"
@@ -670,7 +670,7 @@ def test_gears_of_a_file_turn_by_their_radii(tmp_path, internal, turned):
 
 
 def test_a_planet_of_a_file_obeys_willis(tmp_path):
-    """(w_two - w_arm) = -(2 / 3) (w_one - w_arm), as the solver's own condition on the lines of centres says position by position."""
+    """(w_two - w_arm) = -(2 / 3) (w_one - w_arm), as the solver's own condition on the lines of centers says position by position."""
     s = mg.solve(loaded(tmp_path, geared(planet=True).text())[0])
     one, two, arm = (s.link(name).angular_velocity[:, 2] for name in ("one", "two", "arm"))
     assert two - arm == pytest.approx(-2 / 3 * (one - arm))
@@ -962,7 +962,7 @@ def within(place):
 
 
 def test_an_assembly_within_an_assembly_brings_its_parts_joints_and_motions(tmp_path):
-    """The arm turns with 2 rad/s about a pivot that is pushed with 1 m/s^2: its mass centre and the moment about the pivot by hand."""
+    """The arm turns with 2 rad/s about a pivot that is pushed with 1 m/s^2: its mass center and the moment about the pivot by hand."""
     place = at(0.3, 0.4, 0.1, 0.7)
     made, notes = loaded(tmp_path, within(place).text(), silent=False)
     assert any("assembly 'Inner' on line" in note and "its own parts stand in its frame" in note for note in notes)

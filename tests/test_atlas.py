@@ -44,7 +44,7 @@ def test_chains_are_different_and_have_no_rigid_part() -> None:
 
 
 def brute(links: int, joints: int, mobility: int) -> set[nx.Graph]:
-    """Chains of double joints among labelled links, by a test of all parts; one of each class by networkx."""
+    """Chains of double joints among labeled links, by a test of all parts; one of each class by networkx."""
     kept: dict[str, list[nx.Graph]] = {}
     for edges in combinations(combinations(range(links), 2), joints):
         g = nx.Graph(edges)

@@ -109,7 +109,7 @@ def test_lift_off_of_every_row_of_a_batch() -> None:
 
 
 def test_a_ball_that_rolls_does_not_slide() -> None:
-    """Speed w r of the centre: no sliding, the contact travels at w r over plane and ball; a locked ball slides at full speed."""
+    """Speed w r of the center: no sliding, the contact travels at w r over plane and ball; a locked ball slides at full speed."""
     m = mg.Mechanism(
         "ball",
         pairs=[
@@ -130,7 +130,7 @@ def test_a_ball_that_rolls_does_not_slide() -> None:
 
 @pytest.mark.parametrize("name", [n for n in mg.library() if any(p.type.touching for p in mg.load(n).pairs)])
 def test_no_contact_does_work_and_force_times_velocity_is_the_power(name: str) -> None:
-    """The normal force is at right angles to sliding, and carries the power that both links exchange at the centre of the ball."""
+    """The normal force is at right angles to sliding, and carries the power that both links exchange at the center of the ball."""
     m = mg.load(name)
     pairs = [p.replace(radius=0.004) if p.type.touching else p for p in m.pairs]
     s = mg.solve(m.replace(pairs=pairs), redundant="minimum_norm")

@@ -75,7 +75,7 @@ def test_a_follower_leaves_a_fast_cam() -> None:
 
 @pytest.mark.parametrize("inward", [False, True])
 def test_the_side_of_a_roller_decides_which_way_it_is_pushed(inward: bool) -> None:
-    """A roller inside a ring is pushed towards its centre."""
+    """A roller inside a ring is pushed towards its center."""
     side = -1 if inward else 1
     at = (0.0, R + side * ROLL, 0.0)
     ring = mg.Curve.circle(radius=R)
@@ -236,7 +236,7 @@ def test_a_cam_does_not_fit_into_a_narrower_hollow(whole: bool) -> None:
         hollow(0.05, 0.04, whole)
     s = mg.solve(hollow(0.04, 0.05, whole), {"A": [0.0, 0.2]})
     assert s.warnings == ()
-    # the centre of the disc, which rose by E sin A, keeps the difference of the radii from that of the hollow, E cos A aside
+    # the center of the disc, which rose by E sin A, keeps the difference of the radii from that of the hollow, E cos A aside
     aside = E * (1 - np.cos([0.0, 0.2]))
     lift = E * np.sin([0.0, 0.2]) + 0.01 - np.sqrt(0.01**2 - aside**2)
     assert np.allclose(s["C"].position[:, 0], lift, atol=1e-12)
@@ -292,7 +292,7 @@ def followed(pair: mg.Pair, guide: mg.Pair) -> mg.Solution:
 
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_pressure_angle_of_a_swinging_roller_is_that_at_its_centre(mirrored: bool) -> None:
-    """tan alpha = |a cos p - l (1 + p')| / (a sin p), by the instant centre of cam and arm on the line of their axes (p' < 0: mirrored)."""
+    """tan alpha = |a cos p - l (1 + p')| / (a sin p), by the instant center of cam and arm on the line of their axes (p' < 0: mirrored)."""
     a, l, swing = 0.11, 0.09, 0.4
     sense = -1 if mirrored else 1
     curve = mg.Curve.arm_cam.of(
@@ -306,7 +306,7 @@ def test_pressure_angle_of_a_swinging_roller_is_that_at_its_centre(mirrored: boo
     c = s.contact("B")
     assert np.allclose(c.pressure_angle("arm"), expected, atol=1e-8)
     assert np.allclose(c.center[:, 0], a - l * np.cos(p), atol=1e-9)
-    # at the contact, r from the centre against the normal, the arm moves at right angles to another radius
+    # at the contact, r from the center against the normal, the arm moves at right angles to another radius
     way = np.cross(Z, c.center - 0.012 * c.normal - (a, 0, 0))
     there = np.arccos(np.abs((way * c.normal).sum(axis=1)) / np.linalg.norm(way, axis=1))
     assert np.allclose(c.pressure_angle("arm", at="contact"), there, atol=1e-9)
@@ -337,7 +337,7 @@ def test_pressure_angle_of_a_swinging_flat_follower() -> None:
     across = (R - f) / (q[0] - E)
     n = np.array(
         [across, np.sqrt(1 - across**2)]
-    )  # normal of the face at the start: (centre of the disc + R n - q) . n = f
+    )  # normal of the face at the start: (center of the disc + R n - q) . n = f
     at = (*(np.array([E, 0]) + R * n), 0.0)
     face = mg.Curve.line(point=at, direction=(n[1], -n[0], 0))
     pair = mg.Pair("B", "Kc", "cam", "arm", curve=mg.Curve.circle(**DISC), curve_b=face, point=at)

@@ -132,7 +132,7 @@ def test_pressure_in_a_raceway(outward):
 @pytest.mark.parametrize(
     ("surface", "more", "words"),
     [
-        (SAMPLE["patch"], {"roller": 0.1}, "the centre of a ball of radius 0.1 has no patch beside this one"),
+        (SAMPLE["patch"], {"roller": 0.1}, "the center of a ball of radius 0.1 has no patch beside this one"),
         (
             mg.Surface.torus(radius=2.0, tube=0.4),
             {"roller": 0.5, "point": (2.1, 0, 0.0)},

@@ -179,7 +179,7 @@ def test_a_straight_curve_is_a_straight_groove(symbol, n):
 
 
 def test_a_sphere_in_a_circular_groove_is_a_rod_with_a_hinge():
-    """The centre of a ball in a circular groove is that of an S at the end of a link that turns about the axis of the circle."""
+    """The center of a ball in a circular groove is that of an S at the end of a link that turns about the axis of the circle."""
     circle = mg.Curve.circle(radius=0.8, center=CENTER, axis=AXIS)
     at = Travel(circle).at(np.array(1.7)).x
     one = ring(lambda b: mg.Pair("X", "Sg", "frame", b, point=at, curve=circle), n=3)

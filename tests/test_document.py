@@ -160,7 +160,7 @@ def test_table_alignment_and_missing_header():
 
 
 def test_wide_tables_wrap_cells_and_lose_nothing():
-    long = "turns about the line through the centres of the two spheres, moves no other link " * 2
+    long = "turns about the line through the centers of the two spheres, moves no other link " * 2
     table = Table(["freedom", "what it does", "unique"], [["B.Rx", long, "yes"], ["C.Rx", "spins", "no"]])
     for width in (40, 80):
         lines = to_text(body(table), width).splitlines()

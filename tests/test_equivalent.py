@@ -156,7 +156,7 @@ def test_groups_of_the_transformed_mechanism() -> None:
 
 
 def test_what_cannot_be_transformed() -> None:
-    with pytest.raises(mg.DeclarationError, match=r"is no planar mechanism(.|\n)*two centres of curvature each"):
+    with pytest.raises(mg.DeclarationError, match=r"is no planar mechanism(.|\n)*two centers of curvature each"):
         mg.load("rcsr").equivalent()
     m = CASES["gears"].replace(couplings=[mg.Coupling({"A": 1.0, "B": 2.0}, name="mesh")])
     with pytest.raises(mg.DeclarationError, match="coupling mesh: has no line of contact"):

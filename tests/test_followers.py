@@ -44,7 +44,7 @@ ROLLER = 0.25
 
 @pytest.mark.parametrize("swings", [False, True])
 def test_an_eccentric_with_a_roller_is_a_slider_crank_or_a_four_bar(swings):
-    """The centre of the roller keeps its distance, radius plus radius, from that of the circle."""
+    """The center of the roller keeps its distance, radius plus radius, from that of the circle."""
     at = np.array([0.1, np.sqrt((1 + ROLLER) ** 2 - 0.2**2), 0])
     bearing = (
         mg.Pair("F", "R", "frame", "follower", point=(1.5, 1.0, 0), axis=Z)
@@ -198,7 +198,7 @@ def test_a_cam_of_a_law_swings_an_arm_by_it(mirrored):
     ):
         assert_allclose(found[:, 0], sense * expected[::10], atol=tolerance)
     assert s.checks.power.max() < 1e-12
-    # by virtual work: the load acts at the centre of the roller
+    # by virtual work: the load acts at the center of the roller
     arm = s.link("follower").point(at)[0] - pivot
     power = s["A"].effort[:, 0] * 3.0 - 5.0 * arm[:, 0] * s["F"].velocity[:, 0]
     turning = 0.3 + 1.0 * 1.4**2  # the arm about its pivot, its mass at the roller; the cam turns at a constant rate
@@ -340,7 +340,7 @@ def test_a_response_round_a_closed_curve_is_tabulated_once():
 
 
 def test_two_cams_in_contact_by_their_closed_form():
-    """Two eccentric discs that touch: their centres keep their distance, so that they move as a four-bar; forces along the centres."""
+    """Two eccentric discs that touch: their centers keep their distance, so that they move as a four-bar; forces along the centers."""
     pivot, ra, rb = np.array([1.6, 0.8, 0]), 0.9, 0.7
     ca = np.array([0.2, 0.1, 0])
     along = 0.1

@@ -11,7 +11,7 @@ SI = {"length": "m", "mass": "kg", "time": "s"}
 
 
 def block(*loads: object, drives: tuple[str, ...] = ("P",), **more: object) -> mg.Mechanism:
-    """A block of 2 kg that slides along x, its centre at the origin."""
+    """A block of 2 kg that slides along x, its center at the origin."""
     slide = mg.Pair("P", "P", "frame", "block", point=(0, 0, 0), axis=X)
     return mg.Mechanism("block", [mg.Link("frame"), mg.Link("block", 2.0, (0, 0, 0))], [slide], drives, loads, **more)  # type: ignore[arg-type]
 

@@ -64,13 +64,13 @@ def test_balance_with_every_kind_of_load_and_in_link_frames_that_turn() -> None:
     np.testing.assert_allclose(rod["loads[2] wrench"].moment, np.tile([0.1, 0.2, 0.3], (24, 1)), atol=1e-12)
     assert rod["loads[1] spring"].point == (0.05, 0.02, 0.1)
     np.testing.assert_allclose(rod["loads[1] spring"].moment, 0.0, atol=1e-12)  # a force through its point
-    np.testing.assert_allclose(rod["B"].moment, 0.0, atol=1e-11)  # a ball joint transmits none about its centre
+    np.testing.assert_allclose(rod["B"].moment, 0.0, atol=1e-11)  # a ball joint transmits none about its center
     np.testing.assert_allclose(np.linalg.norm(rod["B"].force, axis=1), np.linalg.norm(s["B"].force, axis=1))
     np.testing.assert_allclose(rod["loads[0] gravity"].force[0], [0, 0, -0.5 * 9.81], atol=1e-12)
 
 
 def test_the_frame_is_supported_against_all_that_acts_on_it_its_own_loads_too() -> None:
-    """Gas between piston and head cancels; what shakes the frame is weight and inertia of all links, by hand from their centres."""
+    """Gas between piston and head cancels; what shakes the frame is weight and inertia of all links, by hand from their centers."""
     m = crank_slider().mechanism
     frame = m.link(m.frame).replace(mass=5.0, center=(0.3, 0.2, 0.1))
     gas = [

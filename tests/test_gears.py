@@ -39,7 +39,7 @@ def spur(**more):
 
 @pytest.mark.parametrize("torque", [10.0, -10.0])
 def test_spur_gears_by_hand(torque):
-    """F_t = M / r across the line of centres, F_t tan 20 deg apart along it, whichever way the torque acts."""
+    """F_t = M / r across the line of centers, F_t tan 20 deg apart along it, whichever way the torque acts."""
     s = solved(two(spur(), torque=torque))
     np.testing.assert_allclose(s["B"].position[:, 0], -s["A"].position[:, 0] / 2, atol=1e-14)
     tangential, apart = torque / 0.2, abs(torque) / 0.2 * TAN

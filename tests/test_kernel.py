@@ -156,7 +156,7 @@ def test_rotation_vectors_go_on_beyond_half_a_turn():
 
 
 def uneven_rod():
-    """RSSR with a coupler whose mass centre is off its line, under gravity and a couple about it; its drive makes more than a turn."""
+    """RSSR with a coupler whose mass center is off its line, under gravity and a couple about it; its drive makes more than a turn."""
     m = mg.load("rssr")
     links = [link.replace(center=(0.1, 0.2, 0.3), mass=2.0) if link.name == "coupler" else link for link in m.links]
     loads = [mg.Gravity((1.0, 2.0, -9.81)), mg.Wrench("coupler", moment=(1.0, 0.5, 2.0))]

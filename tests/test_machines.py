@@ -1,6 +1,6 @@
 """Fourteen machines as a designer meets them, each against a calculation by hand that shares no code with mechgraph.
 
-By hand means: closed-form positions, free bodies and their six balances, or virtual work, in numpy. Metres, kilograms, newtons; z up.
+By hand means: closed-form positions, free bodies and their six balances, or virtual work, in numpy. Meters, kilograms, newtons; z up.
 """
 
 from __future__ import annotations
@@ -392,7 +392,7 @@ def test_scissor_lift() -> None:
     push = (stages * (deck + load) + stages**2 * arm) * G / np.tan(angles)
     np.testing.assert_allclose(s["ram"].effort[:, 0], -push, rtol=1e-9)
     np.testing.assert_allclose(s["ram"].position[:, 0], long * (np.cos(angles) - np.cos(low)), atol=1e-10)
-    # the whole lift about its fixed foot: the load stays 0.4 from it, the deck's centre where it was, the arms' half way
+    # the whole lift about its fixed foot: the load stays 0.4 from it, the deck's center where it was, the arms' half way
     foot = G * (load * 0.4 + deck * wide / 2 + stages * arm * long * np.cos(angles)) / (long * np.cos(angles))
     np.testing.assert_allclose(s["B"].force[:, 2], foot, rtol=1e-9)
     np.testing.assert_allclose(s["A"].force[:, 0], push, rtol=1e-9)

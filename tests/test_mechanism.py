@@ -71,8 +71,8 @@ FAULTS = {
     "negative mass": ({"links": leaf(mass=-1.0)}, ["door", "mass", "-1"]),
     "NaN mass": ({"links": leaf(mass=NAN)}, ["door", "mass", "finite"]),
     "mass is a text": ({"links": leaf(mass="heavy")}, ["door", "mass"]),
-    "NaN centre": ({"links": leaf(center=(NAN, 0, 0))}, ["door", "center", "finite"]),
-    "mass without centre": ({"links": leaf(center=None, inertia=None)}, ["door", "center"]),
+    "NaN center": ({"links": leaf(center=(NAN, 0, 0))}, ["door", "center", "finite"]),
+    "mass without center": ({"links": leaf(center=None, inertia=None)}, ["door", "center"]),
     "inertia without mass": ({"links": leaf(mass=0.0)}, ["door", "inertia without mass"]),
     "inertia against the triangle inequality": (
         {"links": leaf(inertia=np.diag([1.0, 0.1, 0.1]))},
@@ -328,8 +328,8 @@ def test_replace_leaves_the_original_and_checks_again():
     assert other.pairs == m.pairs
     with pytest.raises(mg.DeclarationError, match="gate"):
         m.replace(loads=[mg.Wrench("gate", force=(1, 0, 0))])
-    with pytest.raises(mg.DeclarationError, match="colour"):
-        m.replace(colour="red")
+    with pytest.raises(mg.DeclarationError, match="color"):
+        m.replace(color="red")
 
 
 def test_with_pair_type_keeps_the_place_and_drops_drives_that_are_gone():
@@ -491,7 +491,7 @@ def test_a_freedom_given_twice_by_two_spellings_is_refused() -> None:
 
 
 def test_lengths_in_a_pair_type_of_its_own_change_with_the_units() -> None:
-    """A turn with a pitch given as a number advances the same way in metres and in millimetres."""
+    """A turn with a pitch given as a number advances the same way in meters and in millimetres."""
     screw = mg.PairType("Screw", freedoms=[mg.Freedom("Rz", (0, 0, 1, 0, 0, 0.002))])
     m = door(pairs=hinge(type=screw), units={"length": "m"}).to_units(length="mm")
     assert m.pairs[0].type.freedoms[0].twist == pytest.approx((0, 0, 1, 0, 0, 2.0))

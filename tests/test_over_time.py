@@ -9,7 +9,7 @@ import mechgraph as mg
 
 Z = (0, 0, 1)
 M, R, G = 3.0, 0.8, 10.0
-"""Mass, radius of its centre, gravity: of a crank in a vertical plane."""
+"""Mass, radius of its center, gravity: of a crank in a vertical plane."""
 
 
 def crank(

@@ -146,7 +146,7 @@ def test_the_policy_allows_what_is_there_and_nothing_else() -> None:
 
 
 def test_what_was_built_is_what_is_recorded() -> None:
-    """Versions, licences and hashes of the bundled libraries; and nothing in the sources changed since they were built."""
+    """Versions, licenses and hashes of the bundled libraries; and nothing in the sources changed since they were built."""
     built = json.loads((WEB / "built.json").read_text(encoding="utf-8"))
     assert {p["name"]: p["license"] for p in built["packages"]} == {"three": "MIT", "uplot": "MIT"}
     lock = json.loads((WEB / "package-lock.json").read_text(encoding="utf-8"))["packages"]

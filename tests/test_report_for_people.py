@@ -65,7 +65,7 @@ def turned(m: mg.Mechanism, rng: np.random.Generator) -> mg.Mechanism:
 
 
 def random_mechanism(kind: str, types: str, rng: np.random.Generator) -> mg.Mechanism:
-    """A ring with random points: pins along z and slides across it, pins through one centre, or anything."""
+    """A ring with random points: pins along z and slides across it, pins through one center, or anything."""
     n = len(types)
     points = rng.normal(size=(n, 3))
     axes = rng.normal(size=(n, 3))

@@ -122,7 +122,7 @@ def test_rounding_beside_change_points_of_a_long_row_stays_out_of_the_motion():
 
 @pytest.mark.slow
 def test_spatial_slider_crank_starts_as_printed_and_moves_alone_and_in_charts():
-    """Printed initial velocities (rod centre, rod angular, slider); two choices of coordinates give one motion."""
+    """Printed initial velocities (rod center, rod angular, slider); two choices of coordinates give one motion."""
     m, t = slider_crank(), np.linspace(0, 1, 21)
     r = mg.respond(m, t, rates={"A": 6.0}, rtol=1e-10, atol=1e-12)
     np.testing.assert_allclose(r.link("rod").center_velocity[0], [0.12, -0.24, 0], atol=1e-12)
@@ -183,7 +183,7 @@ def test_double_pendulum():
 
 @pytest.mark.slow
 def test_tumbling_body_keeps_its_angular_momentum():
-    """An asymmetric body free about its mass centre, near its unstable axis: rotations without a singular place."""
+    """An asymmetric body free about its mass center, near its unstable axis: rotations without a singular place."""
     I = np.diag([1.0, 2.0, 3.0])
     m = mg.Mechanism(
         "body",
@@ -455,7 +455,7 @@ def test_the_spin_of_a_rod_between_spheres_is_held_by_a_slotted_one():
 
 
 def coupled(m):
-    """RSSR with a coupler whose centre and inertia are off its line, free to move."""
+    """RSSR with a coupler whose center and inertia are off its line, free to move."""
     links = [
         link
         if link.name == m.frame

@@ -18,7 +18,7 @@ MOTION = mg.Motion([0.0, 0.5, 10.0], 100.0, 3.0)
 
 
 def shaft(*loads: object, drives: tuple[str, ...] = ("M.Rz",), motor: bool = True) -> mg.Mechanism:
-    """A shaft of 5 kg along z, its centre at 0.2 m, and a motor between frame and shaft."""
+    """A shaft of 5 kg along z, its center at 0.2 m, and a motor between frame and shaft."""
     links = [mg.Link("frame"), mg.Link("shaft", 5.0, (0, 0, 0.2), np.diag([0.1, 0.1, I_AXIAL]))]
     turn = [mg.Pair("M", "Fr", "frame", "shaft", point=(0, 0, 0.8), axis=Z)] if motor else []
     return mg.Mechanism("shaft", links, BEARINGS + turn, drives, loads)  # type: ignore[arg-type]

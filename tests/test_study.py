@@ -666,7 +666,7 @@ def test_what_a_declaration_refuses_is_refused_in_a_variant() -> None:
     study = mg.study(sprung(), {"loads[3].free_length": [-1.0, 1.0]}, "A.effort", motions={"A": 0.0}, sampling="grid")
     assert study.failed.tolist() == [True, False]
     assert "free_length" in study.messages[0]
-    with pytest.raises(mg.DeclarationError, match="has no mass centre"):
+    with pytest.raises(mg.DeclarationError, match="has no mass center"):
         mg.study(four_bar(), {"coupler.mass": [1.0]}, "A.effort", motions={"A": 0.5})
 
 
@@ -768,7 +768,7 @@ def test_shares_of_couplings_that_say_the_same_are_those_of_every_variant() -> N
 
 @pytest.mark.filterwarnings(
     "ignore::mechgraph.MechgraphWarning"
-)  # the centre of mass does not move with the varied point
+)  # the center of mass does not move with the varied point
 @pytest.mark.parametrize("number", ["coupler.mass", "B.point.x"])
 @pytest.mark.parametrize("positions", [[2.0], [0.0339174, 2.0]])
 def test_no_position_solved_of_a_mechanism_with_passive_freedoms(number: str, positions: list[float]) -> None:

@@ -98,7 +98,7 @@ def eccentric():
 @pytest.mark.daily(1)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 def test_radius_centre_and_roller_of_an_eccentric(engine):
-    """The follower stands at ``y_c + sqrt((R + r)^2 - (0.1 - x_c)^2)``, (x_c, y_c) the centre as it turns."""
+    """The follower stands at ``y_c + sqrt((R + r)^2 - (0.1 - x_c)^2)``, (x_c, y_c) the center as it turns."""
     m, at = eccentric()
     given = {
         "K.curve.radius": [1.0, 0.8, 1.4, 1.01],

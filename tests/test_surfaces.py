@@ -212,7 +212,7 @@ def test_a_sphere_on_a_sphere_is_a_rod_between_spheres():
 
 
 def swung(axis, away=(0.3, 0, 0.4), **more):
-    """A crank that turns about y beside the centre of a sphere, and a slide on it whose tip stays on the sphere."""
+    """A crank that turns about y beside the center of a sphere, and a slide on it whose tip stays on the sphere."""
     pivot, tip = np.array([0.1, 0, 0]), np.array(away)
     links = [
         mg.Link("frame"),

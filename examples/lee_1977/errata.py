@@ -56,7 +56,7 @@ def letters() -> Row:
 
 
 def positions(r: Row) -> dict[str, tuple[float, float]]:
-    """Equations 2.20 (closure) and 2.28 (mass centre of link 2)."""
+    """Equations 2.20 (closure) and 2.28 (mass center of link 2)."""
     left = columns(-P2 * SA * r.n2 - r.s2 * CA - S1,
                    r.c1 * (-P2 * r.c2 - P1) + r.n1 * (P2 * CA * r.n2 - r.s2 * SA),
                    r.c1 * (P2 * CA * r.n2 - r.s2 * SA) + r.n1 * (P2 * r.c2 + P1))  # fmt: skip
@@ -77,7 +77,7 @@ def positions(r: Row) -> dict[str, tuple[float, float]]:
 
 
 def velocities(r: Row) -> dict[str, tuple[float, float]]:
-    """Equations 2.44 to 2.55: closure, direction of A2, point O2, mass centre of link 1."""
+    """Equations 2.44 to 2.55: closure, direction of A2, point O2, mass center of link 1."""
     v1 = columns(P2 * SA * r.c2, -P2 * r.n2 * r.c1 - P2 * CA * r.c2 * r.n1, r.n1 * P2 * r.n2 - P2 * CA * r.c1 * r.c2)
     v3 = columns(P3 * S4A * r.c4, -P3 * r.n4, P3 * C4A * r.c4)
     vy = r.c1 * (P2 * CA * r.n2 - r.s2 * SA) + r.n1 * (P2 * r.c2 + P1)
@@ -102,7 +102,7 @@ def velocities(r: Row) -> dict[str, tuple[float, float]]:
 
 
 def accelerations(r: Row) -> dict[str, tuple[float, float]]:
-    """Equations 2.64 (point O2) and 2.66 (mass centre of link 1)."""
+    """Equations 2.64 (point O2) and 2.66 (mass center of link 1)."""
     o2 = r.s.link("link2").point((0.0, 0.0, 0.0))
     true_o2 = lees(o2.acceleration)
     inner = columns(

@@ -152,7 +152,7 @@ def true_driver() -> dict[int, tuple[float, float]]:
     return {int(theta[i]): (float(found[i]), float(shown[i])) for i in (0, -1)}
 
 
-READINGS = ("without tensors", "about the mass centre", "about O_i")
+READINGS = ("without tensors", "about the mass center", "about O_i")
 """What the printed tensors may refer to, in link axes; the thesis does not keep it apart."""
 
 

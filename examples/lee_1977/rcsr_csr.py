@@ -234,7 +234,7 @@ def reactions(s: mg.Solution) -> dict[str, np.ndarray]:
 
 
 DAMAGED = {"XXVI": [(14, 1), (25, 0)], "XXVII": [(27, 6)]}
-"""Rows and columns whose digits do not fit their neighbours: row 188 F21y, row 210 F21x, row 214 FA4."""
+"""Rows and columns whose digits do not fit their neighbors: row 188 F21y, row 210 F21x, row 214 FA4."""
 
 
 @cache

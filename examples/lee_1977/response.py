@@ -98,7 +98,7 @@ def identities() -> dict[str, float]:
 
 
 def link_3() -> dict[str, float]:
-    """Force row of link 3: R43 + R23 against M3 times the acceleration of its centre, R23 of Table XXII.
+    """Force row of link 3: R43 + R23 against M3 times the acceleration of its center, R23 of Table XXII.
 
     ``decoded`` leaves the velocity terms out and takes alpha1 alone, ``true`` has both.
     """

@@ -127,7 +127,7 @@ class ActingData:
     kind: Annotated[str, "pair, load, inertia, hold (of a passive body) or support (of the frame)"]
     about: str
     point: tuple[float, float, float]
-    distributed: Annotated[bool, "whether it acts on all of the mass, at whose centre it stands"]
+    distributed: Annotated[bool, "whether it acts on all of the mass, at whose center it stands"]
 
 
 @dataclass(frozen=True)

@@ -230,7 +230,7 @@ def _numbers(tables: Tabled) -> Iterator[str]:
         ("start", (), known["states"]), ("coordinates of the start", (), len(freedoms)), ("pose of the frame", (), 12),
         ("marker on a, over L", pairs, 12), ("marker on b, over L", pairs, 12),
         ("pitches (over L) and poses of factors", (), known["factor numbers"]),
-        ("unit effort", freedoms, 6), (f"mass{_unit(unit_of(m.units, (0, 1, 0)))}", links, 1), ("mass centre, over L", links, 3),
+        ("unit effort", freedoms, 6), (f"mass{_unit(unit_of(m.units, (0, 1, 0)))}", links, 1), ("mass center, over L", links, 3),
         ("inertia about it, over L^2: xx yy zz xy xz yz", links, 6), ("frame of the link, over L", links, 12),
         ("rates of the passive motions at the start", (), known["passive motions"] * len(freedoms)),
         ("coefficients of couplings", (), known["terms"]), ("their constants", (), known["couplings"]),

@@ -6,7 +6,7 @@ point of b at P, a form of the rate of turn omega and of the sliding u = t . v t
 
     l (B - omega u_s) + u_s^2 = 0  for all omega, u:     l = -1 / b_uu,   s = l (1 - b_wu) / 2,   l (b_ww - s) + s^2 = 0.
 
-The points are the centres of curvature of both sides, l the sum of their radii. Where b_uu = 0 one side is straight, and a slide along t
+The points are the centers of curvature of both sides, l the sum of their radii. Where b_uu = 0 one side is straight, and a slide along t
 takes the place of its turning pair; the other point is at s = b_ww (of link b, b_wu = 1) or s = -b_ww (of link a, b_wu = -1).
 Gears and belts: a link between the feet of both axes on the line of contact; of a rack, which is straight, a slide across that line.
 Source: Marghitu, Fundamentals, section 2.15; Hall, Kinematics and Linkage Design, 1961 (Euler-Savary).
@@ -39,7 +39,7 @@ FLAT = 1e-8
 ONE_POINT = 1e-8
 """Distance (over L) below which two points are one, and misfit of the circle up to which there is one."""
 SPATIAL = (
-    "is no planar mechanism: not all its pairs move in one plane. Two surfaces that touch in space have two centres of curvature each, "
+    "is no planar mechanism: not all its pairs move in one plane. Two surfaces that touch in space have two centers of curvature each, "
     "between which no single link moves as they do; keep the higher pairs, which check and solve take as they are"
 )
 NAMES = ("{}_link", "{}_a", "{}_b")
@@ -89,7 +89,7 @@ def equivalent(m: Mechanism, at: Mapping[str, float] | None = None, *, rollers: 
     Parameters
     ----------
     at : values of freedoms at the position; left out, the declared start.
-    rollers : ``"removed"``: a roller on a pin itself becomes the link between its pin and the centre of curvature; ``"kept"``: it stays,
+    rollers : ``"removed"``: a roller on a pin itself becomes the link between its pin and the center of curvature; ``"kept"``: it stays,
         and spins passively.
 
     Raises
@@ -155,7 +155,7 @@ def _in_place_of_pair(parts: _Parts, rows: LinkRows, k: int, remove: bool) -> li
 
 
 def _is_roller(parts: _Parts, link: str, centre: Array, k: int) -> bool:
-    """Whether a moving link has one other pair, a turn about the centre of curvature of its side."""
+    """Whether a moving link has one other pair, a turn about the center of curvature of its side."""
     m, here = parts.m, parts.here
     others = [i for i, p in enumerate(m.pairs) if link in (p.a, p.b) and i != k]
     if link == m.frame or len(others) != 1:

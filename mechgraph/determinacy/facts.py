@@ -270,7 +270,7 @@ class Facts(GraphFacts):
 
     @cached_property
     def kind(self) -> MotionKind:
-        """Planar, spherical or neither: of all pairs, else of the motion; its normal or centre in the global frame."""
+        """Planar, spherical or neither: of all pairs, else of the motion; its normal or center in the global frame."""
         g = self.geometry
         return self._kind.in_global(g.system.par) if g else MotionKind()
 
@@ -347,7 +347,7 @@ class Facts(GraphFacts):
 
     @cached_property
     def own_forces_unique(self) -> bool:
-        """Whether what a planar mechanism carries in its plane (a spherical one about its centre) is unique, driver efforts with it."""
+        """Whether what a planar mechanism carries in its plane (a spherical one about its center) is unique, driver efforts with it."""
         return bool(self.kind.name and self.reactions and self.reactions.is_unique_on(self.kind.twists))
 
     # --- how sure that is ----------------------------------------------------------------------------------------------

@@ -1,7 +1,7 @@
 """Kinds of mobility, and families of bodies that move with the same freedoms.
 
 The kind of a mechanism or of one loop: planar, spherical, or neither, found from the twists of its pairs.
-Planar twists are parallel to one plane with normal n, spherical ones are turns about one centre O:
+Planar twists are parallel to one plane with normal n, spherical ones are turns about one center O:
 
     planar  n x w = 0,  n . v = 0        spherical  v + w x O = 0
 
@@ -45,7 +45,7 @@ from mechgraph.model.parameters import Parameters
 
 @dataclass(frozen=True)
 class MotionKind:
-    """A kind by ``name`` ("" for neither) with its ``place (3,)``: the unit normal (``is_direction``), or the centre.
+    """A kind by ``name`` ("" for neither) with its ``place (3,)``: the unit normal (``is_direction``), or the center.
 
     ``outside (3, 6)`` are functionals that vanish on its twists about the internal origin; ``by_pairs`` whether all pairs have such
     twists alone.
@@ -63,7 +63,7 @@ class MotionKind:
         return np.zeros((6, 0)) if self.outside is None else np.linalg.svd(self.outside)[2][3:].T
 
     def in_global(self, par: Parameters) -> MotionKind:
-        """The kind with its centre in the global frame."""
+        """The kind with its center in the global frame."""
         centre = par.L * np.array(self.place) + par.origin if self.place and not self.is_direction else self.place
         return replace(self, place=tuple(map(float, centre)))
 
@@ -104,7 +104,7 @@ def _principal(vectors: Array) -> tuple[Array, Array]:
 
 
 def spherical(twists: Array) -> MotionKind:
-    """The centre through which the turns ``(6, n)`` pass: of the least squares of ``v + w x O``."""
+    """The center through which the turns ``(6, n)`` pass: of the least squares of ``v + w x O``."""
     rows = np.moveaxis(skew(twists[:3]), -1, 0).reshape(-1, 3)
     if np.linalg.matrix_rank(rows, tol=RANKS.position) < 3:
         return MotionKind()

@@ -303,7 +303,7 @@ def _sets(search: _Search, left: Array) -> Iterator[tuple[int, ...]]:
             seen.add(links)
             yield links
     for in_series in search.series():
-        # pairs of one series up to which any two are tried as a border; in longer ones neighbours only
+        # pairs of one series up to which any two are tried as a border; in longer ones neighbors only
         few = len(in_series) <= 40
         for one, two in combinations(in_series, 2) if few else pairwise(in_series):
             if search.common_twist(one, two):

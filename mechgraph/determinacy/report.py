@@ -307,7 +307,7 @@ class LedgerData:
 
 @dataclass(frozen=True)
 class KindData:
-    """``name`` "planar", "spherical" or ""; ``place``: unit normal (``is_direction``) or centre; ``by_pairs``: all pairs are of it."""
+    """``name`` "planar", "spherical" or ""; ``place``: unit normal (``is_direction``) or center; ``by_pairs``: all pairs are of it."""
 
     name: str
     is_direction: bool

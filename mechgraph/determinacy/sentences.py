@@ -356,8 +356,8 @@ def kind_line(r: Facts) -> str:
 
 
 def place(kind: MotionKind) -> str:
-    """The plane or the centre of a kind."""
-    return f"{'normal of the plane' if kind.is_direction else 'centre'} {vector(kind.place)}" if kind.name else ""
+    """The plane or the center of a kind."""
+    return f"{'normal of the plane' if kind.is_direction else 'center'} {vector(kind.place)}" if kind.name else ""
 
 
 def doubts(r: Facts) -> list[str]:

@@ -1,15 +1,15 @@
 """Near-special geometry made exact with the least change.
 
-Relations that axes, directions, centres and lengths nearly meet: parallel, perpendicular, intersecting, in one line or place, equal.
+Relations that axes, directions, centers and lengths nearly meet: parallel, perpendicular, intersecting, in one line or place, equal.
 Nothing here knows a pair type. What a pair shows of itself follows from its twists: a turn is an axis, in a fixed place where no slide
-of the pair moves it aside; one slide is a direction, two are the normal of a plane; three turns about one point are a centre.
+of the pair moves it aside; one slide is a direction, two are the normal of a plane; three turns about one point are a center.
 Directions are unit vectors, lengths are over L; a miss is an angle (radians) or a length over L.
 
 The mechanism with the smallest change that makes near-special geometry exact.
 Every pair is moved as a whole, by a small turn w_k about its point and a shift t_k, where it stands in the closed start (with
 loops that close only to the tolerance: closed in the least-squares sense, the misfit shared by all pairs). Among all changes that meet
 
-    the relations of axes, directions, centres and lengths that are missed by no more than the tolerance (``Relations``), and
+    the relations of axes, directions, centers and lengths that are missed by no more than the tolerance (``Relations``), and
     N_i^T (c_i + C_i (w, t)) = 0   at positions i along the motions that the tolerance leaves,
 
 the smallest is taken, sum over the pairs of w^2 + (t / L)^2, by successive linearization. c_i is what the loops leave open, C_i its
@@ -85,7 +85,7 @@ def _shown(k: int, name: str, type: PairType, S: Array) -> Iterator[Feature]:
     if any(step.holds_rotation for step in type.steps):
         if all(f.turns for f in type.freedoms):
             center = np.linalg.lstsq(_arms(S[:3, turning]), S[3:, turning].T.ravel(), rcond=None)[0]
-            yield Feature(k, f"centre of {name}", True, None, np.asarray(center))
+            yield Feature(k, f"center of {name}", True, None, np.asarray(center))
         free = set()
     shown: list[Array] = []
     for j in sorted(free):
@@ -205,7 +205,7 @@ class Relations:
         return gap, np.where(both, arms[0] + arms[1], np.minimum(*arms))
 
     def _lengths(self, width: float) -> Iterator[Relation]:
-        """Equal distances, on different links, of parallel axes and of centres."""
+        """Equal distances, on different links, of parallel axes and of centers."""
         on_link: dict[str, list[int]] = {}
         for i, f in enumerate(self.features):
             if f.point is not None:
@@ -276,7 +276,7 @@ def _dot(a: Array, b: Array) -> Array:
 
 
 def _across(D: Array, P: Array) -> Array:
-    """Distance of two points across the first direction (zero: of centres)."""
+    """Distance of two points across the first direction (zero: of centers)."""
     to = P[1] - P[0]
     to = to - _dot(to, D[0])[:, None] * D[0]
     return np.sqrt(_dot(to, to))

@@ -116,7 +116,7 @@ class Table:
 
     @property
     def lines(self) -> list[tuple[str, ...]]:
-        """The head, if there is one, and the rows, white space normalised."""
+        """The head, if there is one, and the rows, white space normalized."""
         lines = [self.header, *self.rows] if self.header else list(self.rows)
         return [tuple(plain(cell) for cell in line) for line in lines]
 

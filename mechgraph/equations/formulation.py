@@ -268,7 +268,7 @@ class MotionWords:
                 yield self._inertia(link, "I", "a", "dw")
 
     def _center(self, link: Link, out: str, dv: str, dw: str) -> Block:
-        """Acceleration of the mass centre."""
+        """Acceleration of the mass center."""
         a, rate, turning, v, w, c = (self.of_link(letter, link.name) for letter in (out, dv, dw, "v", "w", "c"))
         return Block(
             (a, "=", rate, "+", turning, "x", c, "+", w, "x", "(", v, "+", w, "x", c, ")"), "inertia", link.name
@@ -298,7 +298,7 @@ class MotionWords:
         return out
 
     def influence(self, link: Link, k: int, j: int) -> tuple[Symbol, Symbol]:
-        """Acceleration of the mass centre of a link, and rate of its moment of momentum about the origin, for a unit acceleration."""
+        """Acceleration of the mass center of a link, and rate of its moment of momentum about the origin, for a unit acceleration."""
         f = self.freedoms[k][j]
         place = f"{self.names.link_number[link.name]},{k + 1}"
         return Symbol("K", place, "vector", along=f.line.letter), Symbol("H", place, "vector", along=f.line.letter)
@@ -630,7 +630,7 @@ SYMBOLS = (
         _entry(Symbol("F", "k", along="A")),
         "unknown force of pair k along A; likewise along X and Y, and couples M about them",
     ),
-    (_entry(_dual("F", "Ib")), "inertia of link b: minus mass times acceleration of its mass centre, and the moment"),
+    (_entry(_dual("F", "Ib")), "inertia of link b: minus mass times acceleration of its mass center, and the moment"),
 )
 """What the symbols of every formulation mean."""
 LEE = (_entry(_dual("F", "ab")), "part of the reaction with no force along and no moment about the axis of the pair")
@@ -679,7 +679,7 @@ MOTION = (
     ),
     (
         _entry(Symbol("m", "b"), ",", _vector("c"), ",", _vector("a"), ",", _vector("I")),
-        "mass of link b, position and acceleration of its mass centre, inertia about it in global directions, turning with the link",
+        "mass of link b, position and acceleration of its mass center, inertia about it in global directions, turning with the link",
     ),
 )
 """What the symbols of closure and motion mean."""
@@ -690,7 +690,7 @@ VARYING = (
 RESPONSE = (
     (
         _entry(Symbol("K", "b,k", "vector", along="A"), ",", Symbol("H", "b,k", "vector", along="A")),
-        "acceleration of mass centre b, rate of the moment of momentum of link b about the origin, for a unit acceleration of pair k",
+        "acceleration of mass center b, rate of the moment of momentum of link b about the origin, for a unit acceleration of pair k",
     ),
     (
         _entry(_dual("F", "Bb")),

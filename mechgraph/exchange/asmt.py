@@ -10,7 +10,7 @@ FreeCAD assemblies as files hold them: parts, markers, joints, motions, limits, 
 
 The format is that of FreeCAD's Assembly workbench and its solver (OndselSolver 2023 to 2026, class names ASMT...): an indented text whose
 first line names the program; `Position3D` and `RotationMatrix` place a part in the assembly, a `RefPoint` in its part and a `Marker` in
-its RefPoint, the rows of a matrix one below the other; a `PrincipalMassMarker`, which is a marker too, has the mass centre, the principal
+its RefPoint, the rows of a matrix one below the other; a `PrincipalMassMarker`, which is a marker too, has the mass center, the principal
 directions as columns and the principal moments; joints and motions name markers by path, `/Assembly/Part/Marker`. Joints hold marker J to
 marker I. `Variables` have names and formulas. An `Assembly` among the parts is a part of its own and brings its parts, placed in its frame,
 its joints, motions, limits and forces; what is of it has its name before its own, `Inner/Part`.
@@ -570,7 +570,7 @@ class Standing:
 
     @functools.cached_property
     def size(self) -> float:
-        """Mean radius of the markers and of the mass centres; 1 where all are one point."""
+        """Mean radius of the markers and of the mass centers; 1 where all are one point."""
         a = self.assembly
         centers = [part.pose @ [*part.center, 1.0] for part in a.parts.values() if part.center is not None]
         points = np.array([self.pose(path)[:, 3] for path in a.markers] + centers or [np.zeros(3)])

@@ -12,7 +12,7 @@ from J to I, seen in J,
     GearJoint:        a_J + (radiusI / radiusJ) a_I = const
     RackPinionJoint:  x + pitchRadius b = const,   x of J in I, b the turn of J against I about z of I.
 
-A gear that turns by q about its z against the carrier sees the line of centres turn by -q; a rack that slides by s along its x sees the
+A gear that turns by q about its z against the carrier sees the line of centers turn by -q; a rack that slides by s along its x sees the
 pinion slide by -s. So ``q_J + (radiusI / radiusJ) q_I`` and ``q_J - s / pitchRadius`` are constant. Where pairs about one axis lie between
 a gear and the carrier (a sun wheel on the frame, its planet on an arm), their turns are added. Source: OndselSolver, constraints of these
 joints.

@@ -278,7 +278,7 @@ class Writer:
     # --- text --------------------------------------------------------------------------------------------------------
 
     def inertial(self, body: WrittenBody) -> dict[str, Any]:
-        """Mass, centre and inertia of a body: its share of those of its link."""
+        """Mass, center and inertia of a body: its share of those of its link."""
         link = self.m.link(body.link)
         share = 1 / (1 + self.cuts.get(body.link, 0))
         inertia = np.zeros((3, 3)) if link.inertia is None else np.array(link.inertia)
@@ -670,7 +670,7 @@ class MjcfReader:
 
 
 def joined(one: Link, other: Link) -> Link:
-    """Two parts of one link, in the same frame: masses added, centre and inertia of both."""
+    """Two parts of one link, in the same frame: masses added, center and inertia of both."""
     if not other.mass:
         return one
     if not one.mass:

@@ -20,7 +20,7 @@ from mechgraph.quantities import real_array, wrong
 def inertia_wrenches(here: Configuration, rates: Rates) -> Array:
     """Inertia wrenches ``-(I A + V x* I V)`` of all links about the internal origin, ``(6, N, T)``.
 
-    Force ``-m a_c``, moment about the mass centre ``-(I_c alpha + w x I_c w)``, the inertia turning with the link.
+    Force ``-m a_c``, moment about the mass center ``-(I_c alpha + w x I_c w)``, the inertia turning with the link.
     """
     par = here.system.par
     R, p = here.poses[:, :3], here.poses[:, 3]
@@ -92,7 +92,7 @@ class Site:
         return self.L * at, self.L * (V[3:] + cross(V[:3], at))
 
     def center(self, link: str) -> Any:
-        """Mass centre in the link's frame, ``(3, 1)`` or ``(3, T)``, or None."""
+        """Mass center in the link's frame, ``(3, 1)`` or ``(3, T)``, or None."""
         i, par = self._link[link], self.here.system.par
         return None if self.m.link(link).center is None else self.L * par.center[:, i] + par.offset[:, i, None]
 
@@ -166,7 +166,7 @@ class Site:
     # --- what loads do -----------------------------------------------------------------------------------------------
 
     def add_weight(self, acceleration: Any) -> None:
-        """Force ``m g`` at the mass centre of every link."""
+        """Force ``m g`` at the mass center of every link."""
         par, X = self.here.system.par, self.here.poses
         at = self.L * (rotate(X[:, :3], par.center) + X[:, 3])
         force = np.broadcast_to(par.mass * np.asarray(acceleration, dtype=float).reshape(3, 1, -1), at.shape)

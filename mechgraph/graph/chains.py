@@ -103,7 +103,7 @@ def least_order(matrix: Matrix) -> Order:
 
 
 def _singled_out(matrix: Matrix, colours: list[int]) -> Iterator[list[int]] | None:
-    """The colours when one of the first nodes that look alike is told from the others, each in turn; None where all are told apart."""
+    """The colors when one of the first nodes that look alike is told from the others, each in turn; None where all are told apart."""
     shared = [c for c in set(colours) if colours.count(c) > 1]
     if not shared:
         return None
@@ -112,7 +112,7 @@ def _singled_out(matrix: Matrix, colours: list[int]) -> Iterator[list[int]] | No
 
 
 def _refined(matrix: Matrix, colours: Iterable[int]) -> list[int]:
-    """Colours 0, 1, ... of the nodes, refined until nodes of one colour see the same labels on the way to the same colours."""
+    """Colors 0, 1, ... of the nodes, refined until nodes of one color see the same labels on the way to the same colors."""
     mine = _numbered(list(colours))
     while True:
         seen = [

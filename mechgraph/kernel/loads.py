@@ -48,7 +48,7 @@ class _Places:
         return self.system.m.link_index[name]
 
     def point(self, link: str, p: Any) -> Array:
-        """A material point ``(3, B)``, given in the link's frame or by its name; the mass centre where it is None."""
+        """A material point ``(3, B)``, given in the link's frame or by its name; the mass center where it is None."""
         i, par = self.link(link), self.system.par
         given = self.system.m.links[i].point(p) if isinstance(p, str) else p
         local = par.center[:, i] if given is None else (rows(given, 3) - par.offset[:, i, None]) / self.L

@@ -129,7 +129,7 @@ def _kept_starts(m: Mechanism) -> dict[bytes, tuple[dict[str, Any], dict[str, An
 
 
 def scaled(here: Configuration) -> Configuration:
-    """A state in the system about the centroid of the pair points there, with lengths over their RMS distance L (with mass centres)."""
+    """A state in the system about the centroid of the pair points there, with lengths over their RMS distance L (with mass centers)."""
     raw = here.system
     # pairs of six freedoms hold nothing: they may stand anywhere
     holding = np.flatnonzero(np.diff(raw.first_column) < 6)

@@ -259,7 +259,7 @@ def continued(path: DriverPath, found: Positions) -> Array:
 
 
 def _continue(path: DriverPath, found: Positions, tracks: Index, out: Array) -> None:
-    """Put the coordinates of the positions of some neighbouring ``tracks`` in their places, some periods after the other."""
+    """Put the coordinates of the positions of some neighboring ``tracks`` in their places, some periods after the other."""
     s, every = path.system, found.tracks.nodes.track
     mine = np.flatnonzero((found.track >= tracks[0]) & (found.track <= tracks[-1]) & found.moved)
     if not mine.size:

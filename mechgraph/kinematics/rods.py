@@ -3,7 +3,7 @@
 The reduced form of a mechanism for following a path: rods and spheres in grooves or on planes as rows of points.
 
 A rod (a link with two S pairs and nothing else, or two that slide along the line of theirs) holds two points at a distance; a pair that
-ends in a rotation (S, Sg, Sp) holds the centre of a sphere in as many planes as there are directions in which it does not slide. These
+ends in a rotation (S, Sg, Sp) holds the center of a sphere in as many planes as there are directions in which it does not slide. These
 links and pairs fall away, and with them loops of six rows each: a smaller mechanism is left with ``kinematics.loop_rows`` behind its own
 rows. A link that nothing joins to the frame any more floats: it has a pair of six freedoms.
 

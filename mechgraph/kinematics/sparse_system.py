@@ -374,7 +374,7 @@ class LoopSystem(ReducedRows):
         """The pattern of the square system and its constant values.
 
         A random column for every row left over, in the rows of its loop, or where it is ``beside`` them also in those of the
-        neighbours; a random row for every column left over. Or the borders that are given.
+        neighbors; a random row for every column left over. Or the borders that are given.
         """
         rows, cols, data = self._inner
         rng = np.random.default_rng(BORDERS_SEED)

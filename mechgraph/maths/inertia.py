@@ -1,4 +1,4 @@
-"""Inertia tensors of simple bodies about their mass centre.
+"""Inertia tensors of simple bodies about their mass center.
 
 The tensor of a body about a point is I = integral (|r|^2 1 - r r^T) dm, r from that point: its diagonal holds
 the moments of inertia, its off-diagonals are *minus* the products of inertia (integral x y dm). Units are
@@ -96,7 +96,7 @@ def rod(mass: float, start: ArrayLike, end: ArrayLike) -> Array:
 
 @door
 def box(mass: float, size: ArrayLike, axes: ArrayLike | None = None) -> Array:
-    """Return the inertia of a uniform box about its centre.
+    """Return the inertia of a uniform box about its center.
 
     I = R diag(b^2 + c^2, c^2 + a^2, a^2 + b^2) R^T m / 12 for edges a, b, c along the columns of R.
 
@@ -139,7 +139,7 @@ def box(mass: float, size: ArrayLike, axes: ArrayLike | None = None) -> Array:
 
 @door
 def cylinder(mass: float, radius: float, length: float, axis: ArrayLike = (0.0, 0.0, 1.0)) -> Array:
-    """Return the inertia of a uniform solid cylinder about its centre.
+    """Return the inertia of a uniform solid cylinder about its center.
 
     I = m r^2 / 2 u u^T + m (3 r^2 + l^2) / 12 (1 - u u^T), u the unit vector along the axis.
 
@@ -182,7 +182,7 @@ def cylinder(mass: float, radius: float, length: float, axis: ArrayLike = (0.0, 
 
 @door
 def sphere(mass: float, radius: float) -> Array:
-    """Return the inertia of a uniform solid sphere about its centre, I = 2/5 m r^2 1.
+    """Return the inertia of a uniform solid sphere about its center, I = 2/5 m r^2 1.
 
     Parameters
     ----------
@@ -247,18 +247,18 @@ def from_components(xx: float, yy: float, zz: float, xy: float = 0.0, xz: float 
 
 @door
 def shifted(inertia: ArrayLike, mass: ArrayLike, offset: ArrayLike) -> Array:
-    """Return the inertia about a point away from the mass centre (parallel axes, Huygens and Steiner).
+    """Return the inertia about a point away from the mass center (parallel axes, Huygens and Steiner).
 
-    I_P = I_G + m (|d|^2 1 - d d^T), d from the mass centre G to P (its sign does not matter).
+    I_P = I_G + m (|d|^2 1 - d d^T), d from the mass center G to P (its sign does not matter).
 
     Parameters
     ----------
     inertia : (..., 3, 3) array_like
-        Tensor about the mass centre.
+        Tensor about the mass center.
     mass : (...) array_like
         Mass, not negative.
     offset : (..., 3) array_like
-        The point, from the mass centre.
+        The point, from the mass center.
 
     Returns
     -------
@@ -296,7 +296,7 @@ def physical_faults(inertia: Any, tol: float = 1e-9) -> list[str]:
     Parameters
     ----------
     inertia : (3, 3) array_like
-        The tensor about the mass centre, or about any other point.
+        The tensor about the mass center, or about any other point.
     tol : float
         Tolerance of each comparison, relative to the largest entry of the tensor.
 

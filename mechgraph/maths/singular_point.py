@@ -1,4 +1,4 @@
-"""Places on a track where branches cross: recognised, passed, and the states at and beside them.
+"""Places on a track where branches cross: recognized, passed, and the states at and beside them.
 
 Crossings that a track has passed: states at and beside them, on the branch that is followed.
 

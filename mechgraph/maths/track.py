@@ -155,7 +155,7 @@ class Nodes:
 
     @property
     def steps(self) -> tuple[Index, Index]:
-        """First and last node of every step: neighbours on a track, apart."""
+        """First and last node of every step: neighbors on a track, apart."""
         left = np.flatnonzero((self.track[1:] == self.track[:-1]) & (self.place[1:] > self.place[:-1]))
         return left, left + 1
 

@@ -27,7 +27,7 @@ from mechgraph.maths.track import Nodes, Paths, cubic, through
 
 
 def between(problem: Problem, a: Nodes, b: Nodes, part: Array | float, drive: Array) -> Array:
-    """States at a ``part`` of the way between neighbours, at path values ``drive (d, n)``, by Hermite interpolation of both ends."""
+    """States at a ``part`` of the way between neighbors, at path values ``drive (d, n)``, by Hermite interpolation of both ends."""
     h = b.place - a.place
     direction = (b.drive - a.drive) / h
     y = problem.difference(b.x, a.x)
@@ -332,7 +332,7 @@ class Follower(Marching):
         The middle is predicted by Hermite interpolation of both ends and closed. The matrix along the track is, up to third order, the
         parabola through those at both ends and in the middle; no matrix on it, nor near it for complex places, may be singular (see
         ``Factored.regular_between``). At a crossing or a fold between the ends the parabola has a singular point however short the
-        step. That the middle closes with a small correction and moves on as its neighbours do (see ``certificate.smooth``) excludes
+        step. That the middle closes with a small correction and moves on as its neighbors do (see ``certificate.smooth``) excludes
         that the ends lie on different branches. What is left out is the third order: a test, not interval arithmetic.
         """
         a, b = nodes.take(left), nodes.take(right)

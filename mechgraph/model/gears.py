@@ -70,7 +70,7 @@ class SpurGears(Contact):
 
     @property
     def _sum(self) -> float:
-        """Teeth along the line of centres: the sum, or the difference of an internal pair."""
+        """Teeth along the line of centers: the sum, or the difference of an internal pair."""
         return abs(self.teeth[1] - self.teeth[0]) if self.internal else self.teeth[0] + self.teeth[1]
 
     def misfits(self, axes: Axes, fitting: float) -> list[str]:

@@ -63,7 +63,7 @@ class LoadSite(Protocol):
     """What a load sees of a mechanism at a batch of ``T`` positions (component axes first, positions last)."""
 
     def add_weight(self, acceleration: Any) -> None:
-        """Force ``m g`` at the mass centre of every link, for one ``g (3,)``."""
+        """Force ``m g`` at the mass center of every link, for one ``g (3,)``."""
 
     def rotation(self, link: str) -> Array:
         """Rotation of the link, ``(3, 3, T)``."""
@@ -72,7 +72,7 @@ class LoadSite(Protocol):
         """Position and velocity ``(3, T)`` of a material point, given in the link's frame or by its name."""
 
     def center(self, link: str) -> Any:
-        """Mass centre in the link's frame, or None."""
+        """Mass center in the link's frame, or None."""
 
     def values(self, value: Value, link: str, width: int) -> Array:
         """A value at every position, ``(width, T)``; callables are called with the pose and twist of ``link``."""
@@ -243,7 +243,7 @@ class ForceTable(Described):
     force: Annotated[Any, SAMPLES("one for each `x` or `v`, or for both a row of `v` for each `x`", FORCE, MOMENT)] = ()
     interpolation: Annotated[
         Literal["monotone", "cubic"],
-        TEXT('`"monotone"`: not beyond the neighbouring values; `"cubic"`: smoother', choices=tuple(CUBICS)),
+        TEXT('`"monotone"`: not beyond the neighboring values; `"cubic"`: smoother', choices=tuple(CUBICS)),
     ] = "monotone"
     outside: Annotated[
         Literal["error", "hold"],
@@ -690,7 +690,7 @@ class Wrench(Load):
         NAMED_POINT(
             "material point, in the coordinates of the declared configuration, or the name of one of the link",
             LENGTH,
-            default="mass centre",
+            default="mass center",
             of="link",
         ),
     ] = None
@@ -706,7 +706,7 @@ class Wrench(Load):
         if self.force is None and self.moment is None:
             found.append(f"{self.where}has neither force nor moment")
         if self.force is not None and self.point is None and not found and names.link(self.link).center is None:
-            found.append(f"{self.where}has a force but no point, and the link no mass centre; give point=(x, y, z)")
+            found.append(f"{self.where}has a force but no point, and the link no mass center; give point=(x, y, z)")
         return found
 
     def act(self, site: LoadSite) -> None:

@@ -85,7 +85,7 @@ def _links(m: Parts) -> Iterator[Block]:
         )
         for link in m.links
     )
-    head = ("link", "", f"mass{mass}", f"mass centre{length}", "inertia", "points")
+    head = ("link", "", f"mass{mass}", f"mass center{length}", "inertia", "points")
     yield from _rows(head, rows, len(m.links), "llrlll")
 
 

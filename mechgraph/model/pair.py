@@ -91,7 +91,7 @@ class Link(Described):
     center: Annotated[
         Any,
         POINT(
-            "mass centre in the link's frame (global where pairs are given by point and axis)",
+            "mass center in the link's frame (global where pairs are given by point and axis)",
             LENGTH,
             default="needed where mass > 0",
         ),
@@ -99,7 +99,7 @@ class Link(Described):
     inertia: Annotated[
         Any,
         TENSOR(
-            "tensor about the mass centre, in the link's frame; off-diagonals are minus the products of inertia",
+            "tensor about the mass center, in the link's frame; off-diagonals are minus the products of inertia",
             INERTIA,
             default="0",
         ),
@@ -325,11 +325,11 @@ class Pair(Described):
     roller: Annotated[
         float | None,
         POSITIVE(
-            "radius of a roller on `curve`, or a ball on `surface`; `point` is its centre", LENGTH, default="none"
+            "radius of a roller on `curve`, or a ball on `surface`; `point` is its center", LENGTH, default="none"
         ),
     ] = None
     surface: Annotated[
-        Surface | None, NESTED("surface on link a on which the centre of a sphere travels, of Sp", table="surface")
+        Surface | None, NESTED("surface on link a on which the center of a sphere travels, of Sp", table="surface")
     ] = None
     contact: ClassVar[PlacedRow | None] = None
     asked_point: ClassVar[Any] = None

@@ -2,7 +2,7 @@
 
 Every assembly followed over the range of one driver, all in one batch: pieces between samples, joined into branches and circuits.
 
-At evenly spread samples of the driver all assemblies are known; from each, the engine's path follower goes to both neighbours, or out to
+At evenly spread samples of the driver all assemblies are known; from each, the engine's path follower goes to both neighbors, or out to
 the rim of the range. A piece that arrives meets an assembly there; a piece that ends at a fold meets the other one that ends there; pieces
 that pass the same crossing meet in it. Pieces that arrive, one after the other, are a branch; branches that meet are a circuit.
 """
@@ -71,7 +71,7 @@ class BranchPiece:
 
 
 class Tracer:
-    """Follows assemblies ``states[i] (nx, M_i)`` at ``samples (S,)`` of a driver to the neighbours, with ``points`` values between.
+    """Follows assemblies ``states[i] (nx, M_i)`` at ``samples (S,)`` of a driver to the neighbors, with ``points`` values between.
 
     ``rims`` are the ends of the range of the driver, None where it goes right round.
     """

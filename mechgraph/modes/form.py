@@ -628,7 +628,7 @@ def _constraints(family: Family) -> Constraints:
     for rates in family.passive.T:
         V = here.link_twists(rates[:, None])[:, :, 0]
         moved = {i: (v @ T)[None] for i, v in enumerate(V.T) if np.abs(v).max() > MODES.span}
-        # against a neighbour that rests
+        # against a neighbor that rests
         rests = next(b if a in moved else a for a, b in s.graph.ends if (a in moved) != (b in moved))
         moved[rests] = -np.sum(list(moved.values()), axis=0)
         out.append(Constraint(len(out), moved))

@@ -328,8 +328,8 @@ def outside(curve: Curve) -> float:
 
 
 def roller_faults(curve: Curve, radius: float, what: str, where: str, side: float | None = None) -> list[str]:
-    """Where a roller is larger than the radius of curvature of the path of its centre (``side`` None: that path is ``curve``, on the
-    outside of the shape) or of the curve on which it runs, with its centre on the side of the normal y (1) or the other (-1).
+    """Where a roller is larger than the radius of curvature of the path of its center (``side`` None: that path is ``curve``, on the
+    outside of the shape) or of the curve on which it runs, with its center on the side of the normal y (1) or the other (-1).
     """
     travel = curve.once(Travel)
     towards = -outside(curve) if side is None else side

@@ -206,7 +206,7 @@ def in_contact(
 ) -> PlacedRow:
     """A row of a ``pair`` with its curves put in; coordinates zero where the curves pass ``point`` (where they begin if it is left out).
 
-    ``axis`` says in which sense of two z points; ``roller`` is that of the roller whose centre is the point. Where the marker ``on_b``
+    ``axis`` says in which sense of two z points; ``roller`` is that of the roller whose center is the point. Where the marker ``on_b``
     ``(3, 4)`` is given apart, the point is only near the curve, and the curve of link b touches at that marker.
     """
     first, *others = takes_curves(row)
@@ -248,7 +248,7 @@ def _across(curve: Curve, place: AlongCurve, z: Sequence[float] | Array | None) 
 
 
 def kept_side(row: PairType, curve: Curve, roller: float | None, point: Sequence[float]) -> Sequence[float]:
-    """Where the centre of a roller, which stood at ``point``, stands beside another curve: on the same side, nearest to its old foot."""
+    """Where the center of a roller, which stood at ``point``, stands beside another curve: on the same side, nearest to its old foot."""
     path = takes_curves(row)[0].curve if takes_curves(row) else None
     if not isinstance(path, Beside) or not roller or _of_shape(curve, ""):
         return point
@@ -259,7 +259,7 @@ def kept_side(row: PairType, curve: Curve, roller: float | None, point: Sequence
 
 
 def _path(curve: Curve, roller: float | None, point: Sequence[float] | None) -> Curve:
-    """The curve itself, or that of the centre of a roller, on the side of the point, or outside."""
+    """The curve itself, or that of the center of a roller, on the side of the point, or outside."""
     return Beside(base=curve, distance=_side(curve, point) * roller) if roller else curve
 
 
@@ -419,7 +419,7 @@ def on_surface(
 ) -> PlacedRow:
     """A row of a ``pair`` with its surface put in; coordinates zero at ``point`` (in the middle if left out), z towards ``axis``.
 
-    The centre of a ball (``roller``) travels beside the surface, on the side of the point.
+    The center of a ball (``roller``) travels beside the surface, on the side of the point.
     """
     surface = _beside(surface, roller, point) or surface
     if point is not None:
@@ -439,7 +439,7 @@ def on_surface(
 
 
 def _beside(surface: Surface, roller: float | None, point: Sequence[float] | None) -> Surface | None:
-    """The surface itself, or that of the centre of a ball on the side of the point, or of the normal; None where there is none."""
+    """The surface itself, or that of the center of a ball on the side of the point, or of the normal; None where there is none."""
     if not roller:
         return surface
     side = 1.0
@@ -457,8 +457,8 @@ def _ball_faults(surface: Surface, roller: Any, point: Any, where: str) -> list[
     if _beside(surface, roller, point) is not None:
         return []
     return [
-        f"{where}roller: the centre of a ball of radius {roller:.6g} has no {surface.kind} beside this one; give the surface on which the "
-        "centre travels, and radius="
+        f"{where}roller: the center of a ball of radius {roller:.6g} has no {surface.kind} beside this one; give the surface on which the "
+        "center travels, and radius="
     ]
 
 

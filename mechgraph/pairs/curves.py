@@ -212,7 +212,7 @@ class Curve(Described, Once):
 
     @property
     def roller(self) -> float:
-        """Radius of the roller whose centre the curve is the path of, on the outside of the shape."""
+        """Radius of the roller whose center the curve is the path of, on the outside of the shape."""
         return 0.0
 
     def faults(self, where: str) -> list[str]:
@@ -272,9 +272,9 @@ class Line(Curve):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Centred(Curve):
-    """What curves about a centre share: ``x = center + f e1 + g e2 + h e3``, e3 the axis and e1 along ``second``."""
+    """What curves about a center share: ``x = center + f e1 + g e2 + h e3``, e3 the axis and e1 along ``second``."""
 
-    center: Annotated[Any, POINT("centre", LENGTH, default="0")] = (0.0, 0.0, 0.0)
+    center: Annotated[Any, POINT("center", LENGTH, default="0")] = (0.0, 0.0, 0.0)
     axis: Annotated[Any, DIRECTION("normal of the plane, or axis", default="z")] = (0.0, 0.0, 1.0)
     second: Annotated[
         Any, DIRECTION("where the parameter is zero", default="global axis least aligned with `axis`")
@@ -335,7 +335,7 @@ class Circle(Centred):
         return self.angles is None
 
     def beside(self, distance: float, y: Array) -> Curve | None:
-        """A circle about the same centre."""
+        """A circle about the same center."""
         radius = self.radius + distance * float(
             np.sign(y @ (self.at(np.array(self.ends[0]))[0] - np.asarray(self.center)))
         )

@@ -239,7 +239,7 @@ def _by_the_turn(a: Array, b: Array) -> Array:
 class Cam(OfLaw):
     """The shape of a cam that lifts a follower by given amounts at given angles of the cam, over one whole turn.
 
-    ``roller`` (a knife edge where ``roller_radius`` is zero): the path of the roller's centre on the cam; the follower slides along
+    ``roller`` (a knife edge where ``roller_radius`` is zero): the path of the roller's center on the cam; the follower slides along
     ``second`` and passes the axis at the distance ``offset`` (towards axis x second). ``flat``: the profile, which touches a face at right
     angles to ``second``. The cam turns about its axis in the positive sense. Between the samples the lift is a polynomial of degree 5
     that meets lift and both derivatives. For a roller on an arm that swings take ``arm_cam``.
@@ -292,8 +292,8 @@ class Cam(OfLaw):
 class ArmCam(OfLaw):
     """The shape of a cam that swings an arm with a roller by given angles at given angles of the cam, over one whole turn.
 
-    It is the path of the roller's centre on the cam. The arm turns about a pivot, which stands at the distance ``pivot`` from the axis
-    along ``second``; where the swing is zero the centre of the roller is ``base_radius + roller_radius`` from the axis, on the side of axis
+    It is the path of the roller's center on the cam. The arm turns about a pivot, which stands at the distance ``pivot`` from the axis
+    along ``second``; where the swing is zero the center of the roller is ``base_radius + roller_radius`` from the axis, on the side of axis
     x second of the line to the pivot (``mirrored``: on the other). Swings lead away from the cam. The cam turns about its axis in the
     positive sense.
     """
@@ -303,7 +303,7 @@ class ArmCam(OfLaw):
     swing: Annotated[Any, SAMPLES("angles of the arm there, away from the cam", degrees=True)]
     slope: Annotated[Any, SAMPLES("their derivatives by the angle of the cam")]
     bend: Annotated[Any, SAMPLES("second derivatives")]
-    arm: Annotated[float, POSITIVE("length of the arm, from the pivot to the centre of the roller", LENGTH)]
+    arm: Annotated[float, POSITIVE("length of the arm, from the pivot to the center of the roller", LENGTH)]
     pivot: Annotated[float, POSITIVE("distance of the pivot from the axis", LENGTH)]
     mirrored: Annotated[
         bool, FLAG("whether the roller is on the other side of the line from the axis to the pivot")

@@ -1,4 +1,4 @@
-"""Surfaces on which a point or the centre of a sphere travels, by two parameters: those about an axis, through points, by a function.
+"""Surfaces on which a point or the center of a sphere travels, by two parameters: those about an axis, through points, by a function.
 
     x(u, v): position in the frame of the link that bears the surface, with its first and second derivatives.
 
@@ -110,7 +110,7 @@ class Surface(Described):
         return u.ravel(), v.ravel()
 
     def offset(self, distance: float) -> Surface | None:
-        """The surface at a distance towards the normal, on which the centre of a ball travels; None where it is of no known kind."""
+        """The surface at a distance towards the normal, on which the center of a ball travels; None where it is of no known kind."""
         return None
 
     def curvatures(self, u: Array, v: Array) -> Array:
@@ -171,9 +171,9 @@ def _between(ends: tuple[float, float], size: float) -> Array:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class AboutAxis(Surface):
-    """What a plane and surfaces of revolution share: a centre and an axis."""
+    """What a plane and surfaces of revolution share: a center and an axis."""
 
-    center: Annotated[Any, POINT("a point of the axis: centre, apex, or a point of the plane", LENGTH, default="0")] = (
+    center: Annotated[Any, POINT("a point of the axis: center, apex, or a point of the plane", LENGTH, default="0")] = (
         0.0,
         0.0,
         0.0,
@@ -314,7 +314,7 @@ class Sphere(Turned):
         return np.where(np.cos(v.real) < 0, -1.0, 1.0)
 
     def offset(self, distance: float) -> Surface | None:
-        """A sphere about the same centre."""
+        """A sphere about the same center."""
         return self.replace(radius=self.radius + distance) if self.radius + distance > 0 else None
 
 
@@ -337,7 +337,7 @@ class Cylinder(Turned):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Cone(Turned):
-    """A cone, from its apex at the centre."""
+    """A cone, from its apex at the center."""
 
     kind = "cone"
     half_angle: Annotated[float, POSITIVE("between axis and surface, below 90 degrees", PURE, degrees=True)]
@@ -375,7 +375,7 @@ class Torus(Turned):
     """A torus."""
 
     kind = "torus"
-    radius: Annotated[float, POSITIVE("radius of the circle of centres", LENGTH)]
+    radius: Annotated[float, POSITIVE("radius of the circle of centers", LENGTH)]
     tube: Annotated[float, POSITIVE("radius of the tube, below that", LENGTH)]
 
     @property
@@ -384,7 +384,7 @@ class Torus(Turned):
         return self._circle(self.tube, self.radius)
 
     def offset(self, distance: float) -> Surface | None:
-        """A torus with the same circle of centres."""
+        """A torus with the same circle of centers."""
         return self.replace(tube=self.tube + distance) if 0 < self.tube + distance < self.radius else None
 
     def faults(self, where: str) -> list[str]:

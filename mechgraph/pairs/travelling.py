@@ -270,7 +270,7 @@ class AlongCurve(Travelling):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Beside(Curve):
-    """The curve at a ``distance`` from a plane curve, towards its normal y, by the arc length of that: where a roller's centre goes."""
+    """The curve at a ``distance`` from a plane curve, towards its normal y, by the arc length of that: where a roller's center goes."""
 
     kind: ClassVar[str] = "beside"
     base: Curve

@@ -1,1 +1,1 @@
-"""What a solution hands back: labelled values, checks, export."""
+"""What a solution hands back: labeled values, checks, export."""

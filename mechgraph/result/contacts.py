@@ -1,7 +1,7 @@
 """Contacts: where elements touch, with what force and stress, how they slide and roll, where a force would have to pull.
 
 Facts of contacts: where the elements of a pair touch, with what force, how they slide and roll, and where a force would have to pull.
-With the origin c of the frame of the normal force (centre of a ball or roller, point of a curve), the radius r and the normal n in which a
+With the origin c of the frame of the normal force (center of a ball or roller, point of a curve), the radius r and the normal n in which a
 presses on b:
 
     p = c - r n,   sliding v = v_b(p) - v_a(p),   travel over a: u, over b: u - v,   rolling: the mean of both,
@@ -41,7 +41,7 @@ from mechgraph.result.views import CouplingResult, PositionLabels
 
 
 class ContactGeometry:
-    """Centre, point, normal and curvatures of one contact, arrays over the positions."""
+    """Center, point, normal and curvatures of one contact, arrays over the positions."""
 
     def __init__(self, values: Trajectory, index: int) -> None:
         self._values, self._index = values, index
@@ -112,7 +112,7 @@ class ContactGeometry:
 
     @property
     def center(self) -> Array:
-        """Centre ``(..., 3)`` of the ball, roller or cylinder on b, global; where they touch where b has none."""
+        """Center ``(..., 3)`` of the ball, roller or cylinder on b, global; where they touch where b has none."""
         return self._values.frame_origin(self._index, self._frame)
 
     @property
@@ -128,8 +128,8 @@ class ContactGeometry:
 
     @cached_property
     def _of_centre(self) -> tuple[Array, Array]:
-        """Curvatures ``(...)`` towards the normal: both principal ones of the surface of the centres of a ball; that of the curve of the
-        centres of a ball or roller, twice; of two curves the relative one, twice.
+        """Curvatures ``(...)`` towards the normal: both principal ones of the surface of the centers of a ball; that of the curve of the
+        centers of a ball or roller, twice; of two curves the relative one, twice.
         """
         row = self._pair.type
         if (surface := placed_surface(row)) is not None:
@@ -432,7 +432,7 @@ class ContactResult(ContactGeometry, Shown):
     def _bends(self, radius: float) -> tuple[Array, Array]:
         """Relative curvatures ``(...)`` along and across, where elements are curves or surfaces; NaN where a ball or roller does not fit.
 
-        The centre of a ball or roller of ``radius`` r that bends by k towards the normal n touches what bends by ``k / (1 + r k)``: the
+        The center of a ball or roller of ``radius`` r that bends by k towards the normal n touches what bends by ``k / (1 + r k)``: the
         relative curvature is ``1 / r - k / (1 + r k) = 1 / (r (1 + r k))``; of the cross section of a groove ``1 / r - 1 / groove_radius``.
         """
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -471,14 +471,14 @@ class ContactResult(ContactGeometry, Shown):
     def pressure_angle(self, link: str, at: str | None = None) -> Array:
         """Angle ``(...)`` from 0 to pi/2 between the normal and the path of a point of a link; NaN where that has no direction.
 
-        Of link b it is that of the books for cams: the point is the centre of its roller, ball or cylinder (roller and round followers,
+        Of link b it is that of the books for cams: the point is the center of its roller, ball or cylinder (roller and round followers,
         also where they swing), and where they touch for flat faces, edges and curves, as for link a. ``at="contact"`` or ``at="center"``
         says which of the two, as some take the contact of a roller that swings too; on a follower that slides both are the same.
 
         The path of a link with one freedom on the frame is that of its pair, at rest too. Of any other link it has the direction of the
         velocity, and where that is zero of the acceleration. Of the driven link the angle is its deviation angle: the force moves it best
         at 0 and not at all at pi/2. Source: H. A. Rothbart, Cam Design Handbook, 2004, and R. L. Norton, Cam Design and Manufacturing
-        Handbook, 2009, chapters on pressure angle: between the common normal and the velocity of the follower, of a roller its centre.
+        Handbook, 2009, chapters on pressure angle: between the common normal and the velocity of the follower, of a roller its center.
 
         Raises
         ------
@@ -511,7 +511,7 @@ class ContactResult(ContactGeometry, Shown):
 
 
 def _between(radius: float, k: Array) -> Array:
-    """Relative curvature of a ball or roller, whose centre bends by ``k`` towards the normal, and what it touches."""
+    """Relative curvature of a ball or roller, whose center bends by ``k`` towards the normal, and what it touches."""
     fits = 1.0 + radius * k
     return np.where(fits > 0, 1.0 / (radius * np.where(fits > 0, fits, 1.0)), np.nan)
 

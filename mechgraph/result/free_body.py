@@ -38,11 +38,11 @@ At = Literal["worst", "all"] | int | slice | Sequence[int]
 class PointLoad(Shown):
     """What one thing does to the link at one point of it.
 
-    ``kind``: ``"pair"`` (all that the pair transmits: reaction and efforts), ``"load"``, ``"inertia"`` (at the mass centre), ``"hold"``
+    ``kind``: ``"pair"`` (all that the pair transmits: reaction and efforts), ``"load"``, ``"inertia"`` (at the mass center), ``"hold"``
     (what keeps a passive body at rest, a load that no part supplies) or ``"support"`` (what holds the frame). ``point (3,)`` and
     ``wrench (..., 6)``, (M, F) about that point, are in the link's frame; ``unique (..., 6)`` says which numbers equilibrium alone gives:
     the others are NaN, or those of least norm where the solution has these. ``about``: in words, what it is; ``distributed``: whether it
-    acts on all of the mass (weight and inertia), at whose centre it stands.
+    acts on all of the mass (weight and inertia), at whose center it stands.
     """
 
     name: str
@@ -111,7 +111,7 @@ class Range(NamedTuple):
 class BalancedLoads:
     """All that acts on a link, ``acting``: its positions, its sum and its greatest values.
 
-    ``acceleration (..., 9)``: of the mass centre (of the frame's origin where it has none), angular velocity and angular acceleration,
+    ``acceleration (..., 9)``: of the mass center (of the frame's origin where it has none), angular velocity and angular acceleration,
     in the link's frame.
     """
 
@@ -337,7 +337,7 @@ def load_deck(
     model : name of the file with mesh, material, sections and the couplings of these nodes to the mesh; the deck includes it between its
         nodes and its steps. Left out, a comment says where it belongs.
     held : what acts at the node at which the model holds the link: its loads are written as comments, and come out as reactions there.
-    inertia : ``"wrench"``, as force and couple on a node at the mass centre, or ``"acceleration"``, weight and inertia as loads of
+    inertia : ``"wrench"``, as force and couple on a node at the mass center, or ``"acceleration"``, weight and inertia as loads of
         the elements (``GRAV``, ``CENTRIF``; their density must give the mass of the link), the couple of angular acceleration alone there;
         one position a file, as CalculiX takes the axis of ``CENTRIF`` from the first step alone.
     elements : the set of elements that these loads are for.
@@ -437,7 +437,7 @@ class _Deck:
                 f"NOT UNIQUE: {', '.join(missing)} of {name}. These are values of least norm, one set of many: every pair as stiff "
                 "as every other, nothing strained at assembly."
             )
-        yield from _comment(f"mass centre: {_named(self.body, case)}")
+        yield from _comment(f"mass center: {_named(self.body, case)}")
         loads, given = self._loads(case)
         yield from ["*STEP", "*STATIC", "*CLOAD, OP=NEW"]
         yield from [_line(*load[:2], load[2]) for load in loads] or [_line(self.first_node, 1, 0.0)]
@@ -487,7 +487,7 @@ class _Deck:
         return left
 
     def _body_loads(self, case: Case) -> Iterator[str]:
-        """Weight and inertia of the elements: ``-a + g`` everywhere, and the centrifugal part about the mass centre."""
+        """Weight and inertia of the elements: ``-a + g`` everywhere, and the centrifugal part about the mass center."""
         body = self.body
         field = sum((_at(one, case)[3:] for one in body.acting if one.distributed), np.zeros(3)) / body.link.mass
         w = body.acceleration.reshape(-1, 9)[case.position, 3:6]
@@ -720,7 +720,7 @@ def _gears(m: Mechanism, c: BaseCoupling) -> Iterator[tuple[str, Marker, float]]
 
 
 def _inertia(link: Link, s: Solution, R: Array) -> tuple[Array, Array]:
-    """The inertia wrench about the mass centre and the accelerations (see ``FreeBody``), in the link's frame."""
+    """The inertia wrench about the mass center and the accelerations (see ``FreeBody``), in the link's frame."""
     motion = s.link(link.name)
     point = motion.point(_point(link.center))
     a, w, alpha = (
@@ -748,7 +748,7 @@ def _point(p: Any) -> tuple[float, float, float]:
 
 
 def _place(load: Load, link: Link) -> Any:
-    """The point of a link at which a load acts: the one that it names, else the mass centre."""
+    """The point of a link at which a load acts: the one that it names, else the mass center."""
     for name, about in load.formats.items():
         point = getattr(load, name)
         if about.kind is NAMED_POINT and point is not None and getattr(load, about.of) == link.name:

@@ -146,7 +146,7 @@ def _links(s: Trajectory) -> Iterator[Extra]:
 
 
 def _centers(s: Trajectory) -> Iterator[Extra]:
-    """Motion of the mass centres: ``crank center:x``, ``crank center velocity:x``, ..."""
+    """Motion of the mass centers: ``crank center:x``, ``crank center velocity:x``, ..."""
     for i, link in enumerate(s.mechanism.links):
         if link.center is not None:
             yield from _point(f"{link.name} center", s.link_point(i, None))

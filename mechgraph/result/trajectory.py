@@ -373,7 +373,7 @@ class Trajectory:
         return pose, self._out(found[16:22]), self._out(found[22:])
 
     def link_point(self, link: int, p: Any) -> MaterialPoint:
-        """A material point given in the link's frame; the mass centre where it is None."""
+        """A material point given in the link's frame; the mass center where it is None."""
 
         def motion(block: BlockMotion) -> Array:
             par = block.here.system.par

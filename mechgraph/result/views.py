@@ -138,7 +138,7 @@ def _pair_rows(values: Trajectory, pair: Pair, k: int) -> Iterator[Row]:
 
 
 def link_document(values: Trajectory, k: int) -> Document:
-    """Motion of the mass centre and the named points of a link, and how it turns."""
+    """Motion of the mass center and the named points of a link, and how it turns."""
     m, places = values.mechanism, PositionLabels(values)
     link = m.links[k]
     if _large(values):
@@ -152,7 +152,7 @@ def _link_rows(values: Trajectory, k: int) -> Iterator[Row]:
     m = values.mechanism
     link = m.links[k]
     length, speed, rate = (bracket(unit_of(m.units, (1, 0, -n))) for n in range(3))
-    named = {"mass centre": None} if link.center is not None else {}
+    named = {"mass center": None} if link.center is not None else {}
     for name, at in {**named, **link.points}.items() or {"origin of the frame": (0.0, 0.0, 0.0)}.items():
         point = values.link_point(k, at)
         yield from ((f"{name} {axis}{length}", point.position[..., i]) for i, axis in enumerate("xyz"))
@@ -409,22 +409,22 @@ class LinkResult(Shown):
     def _center(self) -> MaterialPoint:
         link = self._values.mechanism.links[self._index]
         if link.center is None:
-            raise DeclarationError(f"link {link.name!r}", ["has no mass centre; declare center=, or use point(p)"])
+            raise DeclarationError(f"link {link.name!r}", ["has no mass center; declare center=, or use point(p)"])
         return self._values.link_point(self._index, None)
 
     @property
     def center(self) -> Array:
-        """Mass centre ``(..., 3)``."""
+        """Mass center ``(..., 3)``."""
         return self._center().position
 
     @property
     def center_velocity(self) -> Array:
-        """Velocity of the mass centre ``(..., 3)``."""
+        """Velocity of the mass center ``(..., 3)``."""
         return self._center().velocity
 
     @property
     def center_acceleration(self) -> Array:
-        """Acceleration of the mass centre ``(..., 3)``."""
+        """Acceleration of the mass center ``(..., 3)``."""
         return self._center().acceleration
 
 

@@ -1,4 +1,4 @@
-"""Where it is drawn: axes, colours, names, painting in depth, and places for texts and graphs."""
+"""Where it is drawn: axes, colors, names, painting in depth, and places for texts and graphs."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ MUTED = "#7b8794"
 FAINT = "#c8d0d8"
 GRID = "#e4e7eb"
 PALETTE = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#6b3a00")
-"""Colours of moving links and of curves, in order and then again; told apart by colour-blind readers too (Okabe and Ito, and a brown)."""
+"""Colors of moving links and of curves, in order and then again; told apart by color-blind readers too (Okabe and Ito, and a brown)."""
 REACTION, LOAD = "#d55e00", "#a3006a"
-"""Colours of reaction forces and of loads."""
+"""Colors of reaction forces and of loads."""
 HATCH = "/////"
 """How what is not unique is filled: it has no value."""
 
@@ -105,7 +105,7 @@ def axis_label(text: str, unit: str) -> str:
 
 
 def colours(m: Mechanism, highlight: Sequence[str] = ()) -> dict[str, str]:
-    """A colour for every link; grey for the frame and, where pairs are highlighted, for links that lie at none or one of them."""
+    """A color for every link; grey for the frame and, where pairs are highlighted, for links that lie at none or one of them."""
     moving = [k for k in m.link_names() if k != m.frame]
     out = {m.frame: MUTED} | {k: PALETTE[i % len(PALETTE)] for i, k in enumerate(moving)}
     if highlight:
@@ -132,7 +132,7 @@ class Painter(Protocol):
         """Directions to the right, up and towards the viewer."""
 
     def polygons(self, corners: Sequence[Array], faces: Array, edges: Array, zorder: float) -> Any:
-        """Polygons ``(n, 3)`` with colours ``(count, 4)``, the nearest last."""
+        """Polygons ``(n, 3)`` with colors ``(count, 4)``, the nearest last."""
 
     def lines(self, runs: Sequence[Array], **style: Any) -> Any:
         """Polylines of one style."""
@@ -278,7 +278,7 @@ class SpacePainter:
 
 
 def shaded(colour: str, corners: Sequence[Array], camera: Array, alpha: float = 1.0) -> Array:
-    """Colours ``(n, 4)`` of polygons in the light: ``c (a + (1 - a) |n . l|)``."""
+    """Colors ``(n, 4)`` of polygons in the light: ``c (a + (1 - a) |n . l|)``."""
     from matplotlib.colors import to_rgba
 
     light = LIGHT @ camera
@@ -308,7 +308,7 @@ LARGE = 40
 
 
 def places(names: Iterable[str], edges: Iterable[tuple[str, str]]) -> dict[str, Array]:
-    """Where the nodes of a graph are drawn, neighbours at a distance of about one; the same each time."""
+    """Where the nodes of a graph are drawn, neighbors at a distance of about one; the same each time."""
     number = {name: i for i, name in enumerate(names)}
     graph: nx.Graph[int] = nx.Graph()  # of numbers: sets of texts have another order each time
     graph.add_nodes_from(number.values())
@@ -347,7 +347,7 @@ def _clashes(graph: nx.Graph[int], at: dict[int, Array]) -> int:
             if name not in (a, b):
                 along = at[b] - at[a]
                 u = np.clip((at[name] - at[a]) @ along / (along @ along), 0.0, 1.0)
-                # distance of a line from a node that is not its end, over that of neighbours, below which they clash
+                # distance of a line from a node that is not its end, over that of neighbors, below which they clash
                 count += bool(np.linalg.norm(at[a] + u * along - at[name]) < 0.15)
     return count
 
@@ -435,7 +435,7 @@ class Arrangement(Artist):
         self._bars.append((line, self._text(text, colour, fontsize=8.5), length))
 
     def legend(self, lines: Sequence[tuple[str, str]]) -> None:
-        """Lines of a text and a colour each, on the right, in as many columns as they need."""
+        """Lines of a text and a color each, on the right, in as many columns as they need."""
         self._legend = [self._text(text, colour, fontsize=8.0) for text, colour in lines]
         self._lines = [text.get_text() for text in self._legend]
 

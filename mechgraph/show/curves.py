@@ -104,7 +104,7 @@ def draw_curve(ax: Any, x: Abscissa, y: Array, label: str, **style: Any) -> None
 
 
 def hatched_strips(ax: Any, x: Abscissa, lost: Sequence[tuple[str, Array, str]]) -> None:
-    """Along the upper edge one strip for each ``(name, where (positions), colour)`` that is not unique somewhere."""
+    """Along the upper edge one strip for each ``(name, where (positions), color)`` that is not unique somewhere."""
     from matplotlib.patches import Rectangle
 
     if not lost:
@@ -583,7 +583,7 @@ RANK = {"position": 0, "velocity": 1, "acceleration": 2}
 
 
 def motion_of(s: Solution, point: str) -> MaterialPoint:
-    """Motion of a named point ``"bucket.tip"``, of a mass centre by its link ``"bucket"``, or of a pair's point on its link b.
+    """Motion of a named point ``"bucket.tip"``, of a mass center by its link ``"bucket"``, or of a pair's point on its link b.
 
     Raises
     ------

@@ -88,7 +88,7 @@ def draw_graph(m: Mechanism, *, ax: Axes = None) -> Any:
         tangents = np.gradient(curve, axis=0)
         across = np.stack([-tangents[:, 1], tangents[:, 0]], axis=1) / np.linalg.norm(tangents, axis=1, keepdims=True)
         for place, i in enumerate(within or [-1]):
-            # distance of the strands of an edge in several loops, over that of neighbours
+            # distance of the strands of an edge in several loops, over that of neighbors
             shift = 0.035 * (place - 0.5 * (max(len(within), 1) - 1))
             colour = PALETTE[i % len(PALETTE)] if i >= 0 else FAINT
             canvas.line(curve + shift * across, colour, f"pair {pair}")
@@ -127,7 +127,7 @@ def _edges(m: Mechanism, at: dict[str, Array]) -> Iterator[tuple[str, Array]]:
         p, q = (at[name] for name in sorted((pair.a, pair.b)))
         side = same.index(pair.name) - 0.5 * (len(same) - 1)
         across = np.array([p[1] - q[1], q[0] - p[0]])
-        # distance of edges between the same two links, over that of neighbours
+        # distance of edges between the same two links, over that of neighbors
         yield pair.name, (1 - u) * p + u * q + 4 * u * (1 - u) * 0.22 * side * across
 
 
@@ -464,7 +464,7 @@ def _joint_places(count: int, joints_of: list[list[int]]) -> Array:
 
 
 def _rings(joints_of: list[list[int]], count: int) -> Iterator[tuple[float, Array]]:
-    """Radius and angles of the joints one after the other along the links: joints that are neighbours stand side by side."""
+    """Radius and angles of the joints one after the other along the links: joints that are neighbors stand side by side."""
     import networkx as nx
 
     graph: nx.Graph[int] = nx.Graph((a, b) for joints in joints_of for a, b in combinations(joints, 2))
@@ -475,7 +475,7 @@ def _rings(joints_of: list[list[int]], count: int) -> Iterator[tuple[float, Arra
 
 
 def _untangled(at: Array, edges: Index, apart: Index, beside: Index) -> tuple[Array, float]:
-    """Places after moves of one joint at a time that cost less, to places nearby and to places between its neighbours; the cost."""
+    """Places after moves of one joint at a time that cost less, to places nearby and to places between its neighbors; the cost."""
     rng = np.random.default_rng(3)
     near = [np.unique(edges[(edges == k).any(axis=1)]) for k in range(len(at))]
     cost = _cost(at, edges, apart, beside)

@@ -40,7 +40,7 @@ class Scene:
     frames : name -> affine maps ``(T, 3, 4)``.
     parts, labels : what is drawn.
     points : pair points ``points[pair, link]``, ``(T, 3)``.
-    everything : these, mass centres and points of interest, ``(n, 3)``.
+    everything : these, mass centers and points of interest, ``(n, 3)``.
     size, symbol : extent of the mechanism over all positions, and half width of its largest symbols.
     normal : of a mechanism all of whose points lie in a plane, else None.
     upright : axes of what stands upright, as columns: two level ones, and up.
@@ -166,7 +166,7 @@ Role = Literal[
 class DrawnPart:
     """One body of a drawing.
 
-    ``role`` says how it is painted: ``link`` (rods) and ``plate`` in the colour of ``link``, ``guide`` likewise but translucent, ``body``
+    ``role`` says how it is painted: ``link`` (rods) and ``plate`` in the color of ``link``, ``guide`` likewise but translucent, ``body``
     (white) and ``dark`` of a pair symbol, ``axis`` (a line), ``tie`` (from a link to a point off it), ``foot`` (of the frame), ``center``
     and ``point`` (one vertex), ``spring``, ``load``, ``drive``, ``reaction``. ``owner`` is the name of the pair, link, point or load.
     """
@@ -181,7 +181,7 @@ class DrawnPart:
 
 @dataclass(frozen=True)
 class Label:
-    """A text that belongs to the point ``at (3,)`` of a frame; ``link`` gives its colour, empty for ink."""
+    """A text that belongs to the point ``at (3,)`` of a frame; ``link`` gives its color, empty for ink."""
 
     kind: Literal["pair", "link", "point"]
     text: str
@@ -206,7 +206,7 @@ class DrawnPose:
     ----------
     frames : name -> affine maps ``(T, 3, 4)``; those of links and pairs, to which parts add their own.
     points : pair points ``points[pair, link]``, ``(T, 3)``.
-    everything : these, mass centres and points of interest, ``(n, 3)``.
+    everything : these, mass centers and points of interest, ``(n, 3)``.
     normal : of the plane in which all of these lie, else None.
     size, symbol : extent over all positions, and half width of the largest symbols.
     gravity : the vector g, None where there is none.
@@ -318,7 +318,7 @@ def plane_normal(points: Array) -> Array | None:
 
 
 def links(stage: DrawnPose) -> Iterator[DrawnPart]:
-    """Links as what they join: a rod between two points, a plate or a body between more; mass centres and points of interest."""
+    """Links as what they join: a rod between two points, a plate or a body between more; mass centers and points of interest."""
     for link in stage.m.links:
         frame, moving = f"link:{link.name}", link.name != stage.m.frame
         corners = [*stage.corners(link.name), *(np.asarray(p, dtype=float) for p in link.points.values())]

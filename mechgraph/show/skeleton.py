@@ -57,7 +57,7 @@ SOLID = {
     "reaction": REACTION,
     "foot": "#d5dbe1",
 }
-"""Colours of the polygons of parts by their role; others have that of their link."""
+"""Colors of the polygons of parts by their role; others have that of their link."""
 LINE_COLOUR = {"axis": INK, "spring": "#3e4c59", "load": LOAD, "drive": INK, "reaction": REACTION, "foot": MUTED}
 ABOVE = {"plate": 2.0, "foot": 2.1, "guide": 3.0, "spring": 5.0, "load": 6.0, "drive": 6.0, "reaction": 6.5}
 """Height of roles over others; links and symbols lie together at 4, sorted by depth."""

@@ -196,7 +196,7 @@ def _link_field(m: Mechanism, i: int, rest: str) -> Field | ItemField | str | No
         return ItemField("links", i, ("points", point), at_of[at][0]) if point in link.points and at in at_of else None
     (what,), _, places = found
     if what == "mass" and link.center is None:
-        return f"'{link.name}.mass': link {link.name!r} has no mass centre; declare center=(x, y, z)"
+        return f"'{link.name}.mass': link {link.name!r} has no mass center; declare center=(x, y, z)"
     return Field(what, tuple((*place, i) for place in places))
 
 

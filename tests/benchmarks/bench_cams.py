@@ -1,7 +1,7 @@
 """Cams beside linkages of the same size and motion: ``python tests/benchmarks/bench_cams.py``.
 
 An eccentric with a roller moves as a slider-crank does (``test_followers``), so both do the same work but for the curve; a cam of a
-law, whose jerk jumps, takes more steps, and so does a roller on a profile through points, whose centre goes beside the spline. Timed in
+law, whose jerk jumps, takes more steps, and so does a roller on a profile through points, whose center goes beside the spline. Timed in
 turn in one run: ``mg.solve`` with rates, reactions and checks.
 """
 

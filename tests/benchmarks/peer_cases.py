@@ -15,7 +15,7 @@ SWING = 0.4
 
 @dataclass(frozen=True)
 class Body:
-    """A link in global coordinates at the first position: mass centre, inertia about it, velocity of the mass centre."""
+    """A link in global coordinates at the first position: mass center, inertia about it, velocity of the mass center."""
 
     name: str
     mass: float

@@ -1,7 +1,7 @@
 """Driver torque and all reactions over a cycle with Exudyn: the graph of bodies and joints, integrated over the prescribed motion.
 
 The crank is welded to a rotor of one coordinate whose law is prescribed (written as a symbolic function, so that it runs compiled);
-the weld measures the torque. Index 3, generalised alpha, one step a position, starting with the true velocities, which are given.
+the weld measures the torque. Index 3, generalized alpha, one step a position, starting with the true velocities, which are given.
 Spectral radius and Newton tolerance are those of least error among some tried: faults of the start die away sooner than with the
 defaults, for about the same time.
 """

@@ -41,7 +41,7 @@ def test_joints_go_round_the_loop(case):
 
 @each_case
 def test_velocities_are_those_of_the_first_step(case):
-    """Velocity of a mass centre against the difference of its places."""
+    """Velocity of a mass center against the difference of its places."""
     step = 1e-6
     q, rate = case.motion.position[0], case.turned()[1][0]
     s = mg.kinematics(case.mechanism, {case.driver: np.array([q - step * rate, q, q + step * rate])})

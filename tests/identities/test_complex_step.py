@@ -209,7 +209,7 @@ class Circle(Factor):
         return replace(self, radius=self.radius / L)
 
     def _screw(self):
-        """About an axis along z through the centre."""
+        """About an axis along z through the center."""
         return np.array([0, 0, 1, self.radius, 0, 0])[:, None, None]
 
 

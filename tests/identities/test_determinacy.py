@@ -160,7 +160,7 @@ def test_components_that_are_not_unique_are_nan_and_those_that_are_do_not_change
 
 
 def size(m, s):
-    """L of the design, RMS distance of pair points and mass centres from the centroid of the pair points; and the pair points."""
+    """L of the design, RMS distance of pair points and mass centers from the centroid of the pair points; and the pair points."""
     points = np.array([(s.link(p.b).pose @ [*(p.on_b.point if p.on_b else p.point), 1.0])[:3] for p in m.pairs])
     centers = np.array([s.link(k.name).center for k in m.links if k.center is not None])
     return np.sqrt(((np.vstack([points, centers]) - points.mean(axis=0)) ** 2).sum(axis=1).mean()), points

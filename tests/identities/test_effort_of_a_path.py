@@ -67,7 +67,7 @@ def test_variants_near_a_dead_point_are_followed_together(monkeypatch):
 
 @pytest.mark.filterwarnings(
     "ignore::mechgraph.MechgraphWarning"
-)  # the centre of mass does not move with the varied points
+)  # the center of mass does not move with the varied points
 def test_variants_that_differ_by_little_are_led_in_a_step(monkeypatch):
     """The difference over the numbers is taken over a step that shows: rounding of its rates would halve steps a thousand times."""
     led, follow = [], tracker.Follower.follow

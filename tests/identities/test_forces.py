@@ -64,7 +64,7 @@ def assert_same_forces(a, b, m, tolerance=1e-9):
 
 
 def inertia_wrench(m, s, link):
-    """-d/dt of the momentum, from mass, centre and tensor in the declared frame, about the global origin."""
+    """-d/dt of the momentum, from mass, center and tensor in the declared frame, about the global origin."""
     k = m.link(link)
     r = s.link(link)
     if k.center is None:

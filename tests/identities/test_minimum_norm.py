@@ -55,7 +55,7 @@ def test_no_self_stress_makes_them_smaller() -> None:
     """Second formulation: scipy's least squares on the sum of |F|^2 + |M / L|^2 at the pair points over all self-stresses."""
     m = mg.load("four-bar")
     s = mg.solve(m, {"A": 0.5}, redundant="minimum_norm")
-    # lengths over L, the RMS distance of pair points and mass centres from their middle at the start
+    # lengths over L, the RMS distance of pair points and mass centers from their middle at the start
     at = np.array([p.point for p in m.pairs] + [link.center for link in m.links if link.mass])
     L = np.sqrt(((at - at.mean(axis=0)) ** 2).sum(axis=1).mean())
     state, rows, parts = s.state(()), [], []

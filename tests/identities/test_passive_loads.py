@@ -14,14 +14,14 @@ G = 9.81
 
 
 def shaft(*loads: object) -> mg.Mechanism:
-    """A shaft on a ball and a groove along it, its centre 25 mm off the line."""
+    """A shaft on a ball and a groove along it, its center 25 mm off the line."""
     return mg.Mechanism("shaft", [mg.Link("frame"), mg.Link("shaft", 2.0, (0.025, 0, 0.3))], [
         mg.Pair("A", "S", "frame", "shaft", point=(0, 0, 0)), mg.Pair("B", "Sg", "frame", "shaft", point=(0, 0, 1), axis=Z),
     ], loads=loads, units=SI)  # fmt: skip
 
 
 def rsss() -> mg.Mechanism:
-    """A crank and two rods on three balls, flat in a horizontal plane under gravity; the centre of the second rod is on its line."""
+    """A crank and two rods on three balls, flat in a horizontal plane under gravity; the center of the second rod is on its line."""
     return mg.Mechanism("rsss", [
         mg.Link("frame"), mg.Link("crank", 1.0, (0.1, 0, 0)), mg.Link("rod1", 2.0, (0.5, 0.5, 0)), mg.Link("rod2", 3.0, (1.5, 0.5, 0)),
     ], [

@@ -1,6 +1,6 @@
 """The printed equations hold: text and LaTeX are read back and evaluated with numbers that owe nothing to the formulation.
 
-Directions and points come from the poses of the links and the markers, inertia from the accelerations of the mass centres, loads
+Directions and points come from the poses of the links and the markers, inertia from the accelerations of the mass centers, loads
 from their declaration, unknowns from the reactions of a solution, taken apart by Lee's definitions; rates of pairs and links from
 the same solution. Closure of position, velocity and acceleration, motion, inertia, forces, couplings, and the response.
 """
@@ -109,7 +109,7 @@ class Numbers(dict[str, Dual]):
             self[f"K_C({coupling.name})"] = Dual.of(np.dot(coupling.coefficients, values))
 
     def put_motion(self, link: mg.Link) -> None:
-        """Twist and its rate, acceleration of the mass centre, inertia in global directions."""
+        """Twist and its rate, acceleration of the mass center, inertia in global directions."""
         here, n = self.s.link(link.name), self.number[link.name]
         for mark, both in (("", here.twist[self.i]), ("d", here.acceleration[self.i])):
             turning, moving = both[:3], both[3:]

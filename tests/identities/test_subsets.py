@@ -130,7 +130,7 @@ def test_several_drivers(seed):
 
 
 def rssr(mass=True, follower="S"):
-    """RSSR, the coupler's mass centre off its line; ``follower`` in place of the second sphere: E, Sp take spins as well."""
+    """RSSR, the coupler's mass center off its line; ``follower`` in place of the second sphere: E, Sp take spins as well."""
     body = {"mass": 2.0, "center": (0.2, 0.15, 0.1), "inertia": 0.01 * np.eye(3)} if mass else {}
     links = [mg.Link("frame"), mg.Link("crank"), mg.Link("coupler", **body), mg.Link("rocker")]
     pairs = [

@@ -12,7 +12,7 @@ G = 9.81
 
 
 def test_driven_pendulum():
-    """A bar (m, c, I) turned about z with w, alpha under gravity -g y; a = alpha x r - w^2 r at the mass centre.
+    """A bar (m, c, I) turned about z with w, alpha under gravity -g y; a = alpha x r - w^2 r at the mass center.
 
     Newton-Euler about the hinge: force F = m (a - g), driver M = (I + m c^2) alpha + m g c cos q (textbook).
     """
@@ -179,7 +179,7 @@ def test_slider_crank_of_marghitu():
 
 
 def test_spatial_slider_crank_of_haug():
-    """Printed initial velocities: rod mass centre (0.12, -0.24, 0), rod angular (1.92, -0.96, 0.48), slider 0.24 (Haug 1989).
+    """Printed initial velocities: rod mass center (0.12, -0.24, 0), rod angular (1.92, -0.96, 0.48), slider 0.24 (Haug 1989).
 
     Read with the crank turning at 6 rad/s about +x; the rod may not spin about itself as the universal pair holds it.
     """

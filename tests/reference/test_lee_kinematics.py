@@ -5,7 +5,7 @@ library file has z = -A_1 and x from O1 towards O2, which is -y of Lee's, so
 
     (x, y, z) of Lee = G (x, y, z) of ours,   G = [[0, 0, -1], [-1, 0, 0], [0, 1, 0]];
 
-the origins coincide. P_m are the mass centres; O2 is the point of the cylindrical pair on link 2, O3 the sphere centre.
+the origins coincide. P_m are the mass centers; O2 is the point of the cylindrical pair on link 2, O3 the sphere center.
 """
 
 import csv

@@ -29,7 +29,7 @@ def test_true_input_torque() -> None:
     assert rcsr.true_driver()[202] == pytest.approx((-135.036, -45.57), abs=1e-3)
     found = rcsr.true_drivers()
     assert found["without tensors"] == pytest.approx((-27.289, -134.850), abs=1e-3)
-    assert found["about the mass centre"] == pytest.approx((-27.313, -135.036), abs=1e-3)
+    assert found["about the mass center"] == pytest.approx((-27.313, -135.036), abs=1e-3)
     assert found["about O_i"] == pytest.approx((-14.522, -53.720), abs=1e-3)
 
 

@@ -23,7 +23,7 @@ def test_every_column_is_printed_to_the_same_place() -> None:
 
 
 def test_equilibrium_of_link_1() -> None:
-    """R51 + R21 + M_IN = 0 (link 1 turns about its own centre line slowly: inertia below rounding), each side rounded."""
+    """R51 + R21 + M_IN = 0 (link 1 turns about its own center line slowly: inertia below rounding), each side rounded."""
     assert rchch.force_identities()["XXXIII: R51 + R21 + M_IN"] <= 0.7 * 2 * PLACE
 
 

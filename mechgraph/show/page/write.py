@@ -65,7 +65,7 @@ def view_style() -> str:
 
 
 def libraries() -> str:
-    """What the scripts stand on, with versions and licences."""
+    """What the scripts stand on, with versions and licenses."""
     packages = json.loads(text_of(f"{WEB}/built.json"))["packages"]
     return " and ".join(f"{p['name']} {p['version']} ({p['license']})" for p in packages)
 
@@ -146,7 +146,7 @@ def stills(m: Mechanism, s: Solution | None) -> Pictures:
 
 def pictures_of_graph(m: Mechanism) -> Pictures:
     """The link-pair graph."""
-    return [("Links and pairs, coloured by the loops in which they lie", _picture(lambda: draw_graph(m)))]
+    return [("Links and pairs, colored by the loops in which they lie", _picture(lambda: draw_graph(m)))]
 
 
 def pictures_of_study(study: Study) -> Pictures:
@@ -328,7 +328,7 @@ def _equations(m: Mechanism) -> Document:
 
 
 def _judged(r: DeterminacyReport) -> tuple[str, str]:
-    """A colour and a word for the verdict, the word for those who do not see the colour."""
+    """A color and a word for the verdict, the word for those who do not see the color."""
     if not r.mechanism.has_geometry:
         return "fair", "Topology only"
     if r.mobility is None or r.undriven or r.contradicting_drives:
