@@ -1,5 +1,6 @@
 """mechgraph: spatial mechanisms as graphs of links and pairs; determinacy, equations, motion, drivers and reactions."""
 
+import sys
 from typing import TYPE_CHECKING, Any
 
 from mechgraph import errors  # noqa: F401  # isort: skip  # before all that takes time to load
@@ -58,6 +59,7 @@ from mechgraph.pairs.curves import Curve
 from mechgraph.pairs.factors import Bookkeeping, Component, Freedom
 from mechgraph.pairs.pair_type import PairType, pair_types
 from mechgraph.pairs.surfaces import Surface
+from mechgraph.quantities import with_clear_calls
 from mechgraph.response.course import Response
 from mechgraph.response.equilibrium import equilibrium, linearize
 from mechgraph.response.respond import respond
@@ -114,6 +116,14 @@ methods.TABLE |= {
 }
 
 
+for _name in set(__all__) & set(globals()):
+    _public = globals()[_name]
+    if isinstance(_public, type) and _public.__module__.startswith(
+        ("mechgraph.model", "mechgraph.pairs", "mechgraph.maths")
+    ):
+        with_clear_calls(_public)
+
+
 def __dir__() -> list[str]:
     """The public names."""
     return sorted(__all__)
@@ -121,6 +131,13 @@ def __dir__() -> list[str]:
 
 def __getattr__(name: str) -> Any:
     """What takes time to load, and few calls need."""
+    if name == "__version__":
+        from importlib.metadata import PackageNotFoundError, version
+
+        try:
+            return version("mechgraph")
+        except PackageNotFoundError:
+            return "(not installed)"
     if name in ("Compiled", "compile"):
         from mechgraph.compiled import compiled
 
@@ -129,4 +146,4 @@ def __getattr__(name: str) -> Any:
         from mechgraph.show.page.write import write_report
 
         return write_report
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}", name=name, obj=sys.modules[__name__])

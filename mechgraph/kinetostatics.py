@@ -38,7 +38,7 @@ from mechgraph.force.reactions import MethodName
 from mechgraph.kinematics.assembly import CLOSED, assembled_at, closed_start, last_closed, named_columns
 from mechgraph.kinematics.motion_path import FARTHEST, DriverPath, Positions, Status, far_faults, requests
 from mechgraph.kinematics.passive_rest import unspun
-from mechgraph.kinematics.prescribed import DriverMotion
+from mechgraph.kinematics.prescribed import Actuators, DriverMotion
 from mechgraph.kinematics.rates import PassiveMotion, PassiveMotions, are_alone, distance_to_dead_point
 from mechgraph.kinematics.reach import away_from_poles, ends_at_pole, follow
 from mechgraph.kinematics.rods import Reduction, follow_reduced, reduction_of
@@ -379,7 +379,7 @@ def _solve(
     motions: Mapping[str, Any] | None,
     on_reach: str,
     options: Options,
-    actuate: str | Iterable[str] | None = None,
+    actuate: Actuators | None = None,
     tol: float | None = None,
     quiet: bool = False,
 ) -> Solution:
@@ -396,7 +396,7 @@ def _solved(
     motions: Mapping[str, Any] | None,
     on_reach: str,
     options: Options,
-    actuate: str | Iterable[str] | None,
+    actuate: Actuators | None,
     quiet: bool,
 ) -> Solution:
     line, outcome = _outcome(m, motions, options, actuate)
@@ -413,7 +413,7 @@ def _solved(
 
 
 def _outcome(
-    m: Mechanism, motions: Mapping[str, Any] | None, options: Options, actuate: Iterable[str] | None
+    m: Mechanism, motions: Mapping[str, Any] | None, options: Options, actuate: Actuators | None
 ) -> tuple[Pipeline, Outcome]:
     """All positions, with the closure errors of the geometry as it is declared."""
     m, line, outcome = _run(m, motions, options, actuate)
@@ -425,7 +425,7 @@ def _outcome(
 
 
 def _run(
-    m: Mechanism, motions: Mapping[str, Any] | None, options: Options, actuate: Iterable[str] | None
+    m: Mechanism, motions: Mapping[str, Any] | None, options: Options, actuate: Actuators | None
 ) -> tuple[Mechanism, Pipeline, Outcome]:
     """All positions; again with other axes of spheres where some of them, or what ends the path, lie beside poles: of that mechanism."""
     # axes of spheres that are tried for a path: each keeps far from what is known of it, which may be a part
@@ -441,9 +441,7 @@ def _run(
     return m, line, outcome
 
 
-def solve_quietly(
-    m: Mechanism, motions: Mapping[str, Any], options: Options, actuate: Iterable[str] | None
-) -> Solution:
+def solve_quietly(m: Mechanism, motions: Mapping[str, Any], options: Options, actuate: Actuators | None) -> Solution:
     """One of many: positions out of reach flagged, and what ``Solution.warnings`` says not said as Python warnings."""
     return _solve(m, motions, "flag", options, actuate, quiet=True)
 
@@ -492,7 +490,7 @@ def solve(
     m: Mechanism,
     motions: Mapping[str, Any] | None = None,
     *,
-    actuate: str | Iterable[str] | None = None,
+    actuate: Actuators | None = None,
     method: MethodName = "loop_wrench",
     loads: Iterable[Load] | None = None,
     redundant: RedundantName = "nan",
@@ -517,7 +515,7 @@ def solve(
         (``"bucket.tip"``: positions ``(..., 3)``), a link (poses ``(..., 4, 4)``, rates: twist and its rate ``(..., 6)``) or a
         coordinate of these: ``"bucket.tip.Tz"``, ``"bucket.tip.T(1,0,1)"`` along a direction, ``"platform.Rz"`` of the rotations
         about x, the new y and the new z.
-    actuate : str or iterable of str, optional
+    actuate : freedom, pair or drive, or iterable of them, optional
         Freedoms in which actuators act, one per independent prescribed motion. Default: those with prescribed motion. If they are
         stationary while the mechanism moves, forces are NaN (status "actuators at dead point").
     method : {"loop_wrench", "newton_euler", "printed"}

@@ -26,7 +26,7 @@ from typing import Annotated, Any, Literal, NamedTuple, ParamSpec, TypeVar, Unio
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mechgraph.errors import DeclarationError, MissingExtraError
+from mechgraph.errors import DeclarationError, MissingExtraError, did_you_mean, near_names, unknown
 from mechgraph.memo import ASKED, Remembers, as_asked, carried
 
 BASE_UNITS = ("length", "mass", "time")
@@ -59,6 +59,7 @@ KNOWN: dict[str, dict[str, float]] = {
         "km": 1e3,
         "ft": 0.3048,
         "in": 0.0254,
+        "yd": 0.9144,
     },
     "mass": {
         "kg": 1.0,
@@ -67,11 +68,13 @@ KNOWN: dict[str, dict[str, float]] = {
         "t": 1e3,
         "tonne": 1e3,
         "Mg": 1e3,
+        "lb": 0.45359237,
+        "oz": 0.45359237 / 16,
         "slug": 0.45359237 * 9.80665 / 0.3048,
     },
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0, "h": 3600.0},
 }
-"""Units of a base in terms of m, kg, s, as far as they make forces that have names."""
+"""Units of a base in terms of m, kg, s."""
 EARTH, EARTHLY = 9.80665, 0.005
 """Acceleration of gravity on earth in m/s^2, and by what part of it it varies and is rounded."""
 FORCES = {"N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "µN": 1e-6, "nN": 1e-9, "dyn": 1e-5, "lbf": 0.45359237 * 9.80665}
@@ -101,6 +104,15 @@ def force_hint(units: Mapping[str, str]) -> str:
         else "m.to_units(length='m', mass='kg') makes it N"
     )
     return f"Units: {set_} belong to the force {name} ({FORCES[name]:g} N), in which loads are read and results given; {advice}."
+
+
+def unit_hints(units: Mapping[str, str]) -> list[str]:
+    """What to say of units that are none of the known ones: they are labels alone."""
+    return [
+        f"units: {base}: {unknown('unit', units[base], known)}; it labels results, and forces get no name of their own"
+        for base, known in KNOWN.items()
+        if units.get(base, next(iter(known))) not in known
+    ]
 
 
 def gravity_hint(units: Mapping[str, str], size: float) -> str:
@@ -182,8 +194,7 @@ def base_factors(old: Mapping[str, str], new: Mapping[str, str]) -> tuple[float,
                 out.append(float(registry.Quantity(1.0, old[name]).to(new[name]).magnitude))
             except Exception as error:
                 faults.append(f"{name}: cannot convert {old[name]!r} to {new[name]!r} ({error})")
-    unknown = [name for name in new if name not in BASE_UNITS]
-    faults += [f"unknown base unit {name!r}; expected {', '.join(BASE_UNITS)}" for name in unknown]
+    faults += [unknown("base unit", name, BASE_UNITS) for name in new if name not in BASE_UNITS]
     if faults:
         raise DeclarationError("to_units", faults)
     return out[0], out[1], out[2]
@@ -383,7 +394,7 @@ def door(function: Callable[P, R]) -> Callable[P, R]:
         try:
             bound = signature.bind(*args, **named).arguments
         except TypeError as error:
-            raise DeclarationError(_called(function, args), [f"{error}; it takes {_told(signature)}"]) from None
+            raise DeclarationError(_called(function, args), [_call_fault(error, named, signature)]) from None
         faults = [
             wrong(value, SPOKEN.get(name, name), one.words)
             for name, value in bound.items()
@@ -403,6 +414,32 @@ def door(function: Callable[P, R]) -> Callable[P, R]:
             ASKED.reset(token)
 
     return entered
+
+
+def _call_fault(error: TypeError, named: Iterable[str], signature: inspect.Signature) -> str:
+    """Why a call does not fit, and the names that may be meant."""
+    strange = (name for name in named if name not in signature.parameters)
+    near = [one for name in strange for one in near_names(name, signature.parameters, 0.6)]
+    return f"{error}; {(near and f'{did_you_mean(near)} It') or 'it'} takes {_told(signature)}"
+
+
+def with_clear_calls(cls: type) -> None:
+    """Let a class refuse calls without or with too many arguments as doors do; it looks at the values itself."""
+    make = vars(cls)["__init__"]
+
+    @functools.wraps(make)
+    def made(self: Any, *args: Any, **named: Any) -> None:
+        try:
+            make(self, *args, **named)
+        except TypeError:
+            signature = inspect.signature(make)
+            try:
+                signature.bind(self, *args, **named)
+            except TypeError as error:
+                raise DeclarationError(cls.__name__, [_call_fault(error, named, signature)]) from None
+            raise
+
+    cls.__init__ = made  # type: ignore[misc]
 
 
 def _asked_with(tolerances: Any, arguments: Iterable[Any]) -> tuple[Any, ...]:

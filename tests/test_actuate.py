@@ -176,6 +176,14 @@ def test_names_of_actuators_are_checked() -> None:
     assert mg.solve(slider_crank(), {"A": 0.1}, actuate="B").actuated == ("B.Rz",)
 
 
+@pytest.mark.parametrize(
+    "of", [lambda m: m.pair("B"), lambda m: [m.pair("B")], lambda m: m.replace(drives=["B"]).drives]
+)
+def test_actuators_are_given_as_the_pairs_or_drives_at_hand(of) -> None:
+    m = slider_crank()
+    assert mg.solve(m, {"A": 0.1}, actuate=of(m)).actuated == ("B.Rz",)
+
+
 def test_drives_that_depend_on_each_other_are_taken_as_one_motion() -> None:
     m = slider_crank()
     theta = np.deg2rad([30.0, 60])

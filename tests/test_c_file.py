@@ -127,6 +127,7 @@ def hostile() -> mg.Mechanism:
     )  # fmt: skip
 
 
+@pytest.mark.filterwarnings("ignore:.*unknown unit")
 @pytest.mark.usefixtures("compiled")
 def test_hostile_names(tmp_path):
     m = hostile()
@@ -253,6 +254,7 @@ def test_a_unit_runs_in_fmpy(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:.*unknown unit")
 @pytest.mark.usefixtures("compiled")
 def test_a_unit_of_hostile_names(tmp_path):
     from xml.etree import ElementTree

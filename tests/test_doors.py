@@ -1,6 +1,7 @@
 """Wrong types at the public doors: one sentence that names the argument, never an error of Python's own; options known to type checkers."""
 
 import base64
+import importlib.metadata
 import inspect
 import pickle
 import signal
@@ -64,7 +65,7 @@ WRONG = {
     "a drive of a number": (lambda: door(drives=[mg.Drive(3)]), "freedom 3"),
     "an unhashable name of a link": (lambda: door(links=[mg.Link([]), mg.Link("door")]), "name must be"),
     "an unhashable name of a pair": (lambda: door(pairs=[mg.Pair([], "R", "frame", "door")]), "name must be"),
-    "an unhashable frame": (lambda: door(frame=[]), "frame []"),
+    "an unhashable frame": (lambda: door(frame=[]), "frame: unknown link []"),
     "an unhashable type": (lambda: door(pairs=[mg.Pair("A", [], "frame", "door")]), "unknown type"),
     "a load on an unhashable link": (lambda: door(loads=[mg.Wrench([], moment=Z)]), "link = []"),
     "a wrench in an unhashable frame": (lambda: door(loads=[mg.Wrench("door", moment=Z, frame=[])]), "frame = []"),
@@ -96,6 +97,17 @@ WRONG = {
     "options of a table": (lambda: S.write("x.csv", nonsense=1), "for a load deck"),
     "an argument too many": (lambda: mg.check(M, {}, {}), "too many positional arguments; it takes m, at, engine, tol"),
     "an argument too few": (lambda: mg.solve(), "missing a required argument: 'm'"),
+    "an argument that a mechanism lacks": (lambda: door(drive=["A"]), "'drive'; did you mean drives? It takes name, links"),
+    "a mechanism of nothing": (lambda: mg.Mechanism(), "missing a required argument: 'name'; it takes name"),
+    "an argument that a pair lacks": (lambda: mg.Pair("A", "R", "frame", "door", axes=Z), "did you mean axis? It takes"),
+    "an argument that a load lacks": (lambda: mg.Effort("A", 1, breaking=1), "did you mean breaks? It takes freedom"),
+    "an unknown group of tolerances": (lambda: mg.Tolerances(ranks={}), "did you mean rank? It takes rank, motion"),
+    "an option that a call lacks": (lambda: mg.solve(M, {"A": 0.0}, on_rech="flag"), "did you mean on_reach? It takes m"),
+    "a field that a copy lacks": (lambda: M.replace(load=[]), "unknown field 'load'; did you mean loads"),
+    "a freedom in small letters": (lambda: mg.solve(M, {"a": 0.0}), "unknown freedom 'a'; did you mean A? (freedoms: A.Rz"),
+    "a link that is misspelled": (lambda: M.link("crnk"), "unknown link 'crnk'; did you mean crank? (links: frame"),
+    "a base unit that is misspelled": (lambda: door(units={"lenght": "m"}), "unknown base unit 'lenght'; did you mean length?"),
+    "a unit that is no text": (lambda: door(units={"length": 3}), "units: length = 3: expected the name of a unit"),
     "a field that no chain has": (lambda: mg.chain("RRRR", nonsense=1), "unknown field 'nonsense'"),
     "a tolerance in a list": (lambda: door(tol=[1], pairs=[BALL]), "tol = (1.0,): expected radians"),
     "a curve without a second direction": (
@@ -227,6 +239,22 @@ with whole_file({str(tmp_path / "x.csv")!r}) as temporary:
 
 def test_the_names_of_the_package_are_the_public_ones():
     assert dir(mg) == sorted(mg.__all__)
+
+
+def test_the_version_is_that_of_the_package():
+    assert mg.__version__ == importlib.metadata.version("mechgraph")
+    with pytest.raises(AttributeError, match="no attribute 'slove'") as caught:
+        _ = mg.slove
+    assert (caught.value.name, caught.value.obj) == ("slove", mg)
+
+
+def test_a_type_error_of_a_users_own_class_stays_one():
+    class Lever(mg.Mechanism):
+        def __init__(self, length):
+            super().__init__("lever", pairs=[HINGE.replace(point=(length + "", 0, 0))])
+
+    with pytest.raises(TypeError, match="unsupported operand"):
+        Lever(1)
 
 
 def test_a_notebook_shows_a_picture():

@@ -44,7 +44,7 @@ MARKER = mg.Marker((0, 0, 0), (0, 0, 1), (1, 0, 0))
 NAN, INF = float("nan"), float("inf")
 
 FAULTS = {
-    "unknown link": ({"pairs": hinge(b="gate")}, ["gate", "not declared"]),
+    "unknown link": ({"pairs": hinge(b="gate")}, ["unknown link 'gate'"]),
     "unknown type": ({"pairs": hinge(type="Q"), "drives": []}, ["unknown type", "'Q'"]),
     "type is no pair type": ({"pairs": hinge(type=3), "drives": []}, ["unknown type", "3"]),
     "zero axis": ({"pairs": hinge(axis=(0, 0, 0))}, ["axis", "length 0"]),
@@ -549,10 +549,17 @@ def test_full_names_with_curves_and_in_files(tmp_path):
         mg.Mechanism("m", None, [mg.Pair("A", "revolut", "a", "b")])
 
 
+def test_a_unit_that_is_not_known_is_a_label():
+    pairs = [mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=(0, 0, 1))]
+    with pytest.warns(mg.MechgraphWarning, match=r"units: length: unknown unit 'furlong' \(units: m, .*label"):
+        m = mg.Mechanism("m", pairs=pairs, units={"length": "furlong", "mass": "kg", "time": "s"})
+    assert "length in furlong" in str(m)
+
+
 @pytest.mark.parametrize(
     ("length", "g", "meant"),
     [("mm", 9.81, "m"), ("mm", 981, "cm"), ("m", 9810, "mm"), ("ft", 386.1, "in"), ("mm", 9.80665, "m"),
-     ("m", 9.81, ""), ("mm", 9810, ""), ("ft", 32.174, ""), ("m", 1.62, ""), ("mm", 1620, ""), ("m", 0.0, ""), ("furlong", 9.81, "")],
+     ("m", 9.81, ""), ("mm", 9810, ""), ("ft", 32.174, ""), ("m", 1.62, ""), ("mm", 1620, ""), ("m", 0.0, ""), ("yd", 10.725, "")],
 )  # fmt: skip
 def test_gravity_in_other_units_than_those_declared_is_doubted(length, g, meant):
     pairs = [mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=(0, 0, 1))]

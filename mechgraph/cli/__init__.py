@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import sys
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
+import mechgraph
 from mechgraph.cli.commands import check, compile_, equations, list_library, loads, respond, save, solve, structure
 from mechgraph.cli.drawn import assemblies, branches, plot, report
 from mechgraph.cli.options import DONE, EXIT_STATUS, outcome, warned, write
@@ -49,11 +49,7 @@ def _main(
     context: typer.Context, version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False
 ) -> None:
     if version:
-        try:
-            number = importlib.metadata.version("mechgraph")
-        except importlib.metadata.PackageNotFoundError:
-            number = "(not installed)"
-        write(f"mechgraph {number}\n")
+        write(f"mechgraph {mechgraph.__version__}\n")
         raise typer.Exit(DONE)
 
 

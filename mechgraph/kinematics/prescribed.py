@@ -417,7 +417,11 @@ def _batch(m: Mechanism, motions: Mapping[str, Motion], asked: str) -> tuple[int
         ) from None
 
 
-def actuators(m: Mechanism, actuate: Any) -> tuple[str, ...]:
+Actuators = str | Pair | Drive | Iterable[str | Pair | Drive]
+"""Where actuators act: names of freedoms, or the pairs and drives that have them."""
+
+
+def actuators(m: Mechanism, actuate: Actuators) -> tuple[str, ...]:
     """Full names of the freedoms in which the unknown efforts stand.
 
     Raises
@@ -425,10 +429,12 @@ def actuators(m: Mechanism, actuate: Any) -> tuple[str, ...]:
     DeclarationError
     """
     faults: list[str] = []
-    names = items_of([actuate] if isinstance(actuate, str) else actuate, "actuate", faults)
-    faults += [f"actuate {name!r}: {why}" for name in names if (why := m.freedom_fault(name, single=True))]
+    items = items_of([actuate] if isinstance(actuate, str | Pair | Drive) else actuate, "actuate", faults)
+    given = [one.name if isinstance(one, Pair) else one.freedom if isinstance(one, Drive) else one for one in items]
+    faults += [f"actuate {name!r}: {why}" for name in given if (why := m.freedom_fault(name, single=True))]
+    names: tuple[str, ...] = ()
     if not faults:
-        names = tuple(map(m.full_name, names))
+        names = tuple(map(m.full_name, given))
         faults += [f"actuate: {name} is given twice" for name in dict.fromkeys(names) if names.count(name) > 1]
     if faults:
         raise DeclarationError(f"solve {m.name!r}", faults)
@@ -442,7 +448,7 @@ class DriverMotion:
     """
 
     def __init__(
-        self, m: Mechanism, motions: Mapping[str, Any] | None, actuate: Any = None, asked: str = "solve"
+        self, m: Mechanism, motions: Mapping[str, Any] | None, actuate: Actuators | None = None, asked: str = "solve"
     ) -> None:
         self.m, self.motions = driven(m, motions, asked)
         self.actuated = None if actuate is None else actuators(m, actuate)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechgraph.errors import DeclarationError
+from mechgraph.errors import DeclarationError, unknown
 from mechgraph.fields import plain
 from mechgraph.maths.se3 import Array, identity, inverse
 from mechgraph.model.mechanism import Mechanism
@@ -117,11 +117,9 @@ def chain(
         if isinstance(link, Link) and isinstance(link.name, str) and link.name in names:
             massive[link.name] = link
         else:
-            faults.append(
-                f"link {shown(getattr(link, 'name', link))}: is not in this chain (links: {', '.join(names)})"
-            )
-    unknown = set(more) - set(inspect.signature(Mechanism).parameters)
-    faults += [f"unknown field {name!r}" for name in sorted(unknown)]
+            faults.append(unknown("link", getattr(link, "name", link), names))
+    fields = set(inspect.signature(Mechanism).parameters)
+    faults += [unknown("field", name, sorted(fields)) for name in sorted(set(more) - fields)]
     if faults:
         raise DeclarationError(f"chain {shown(title)}", faults)
     placed = any(v is not None for v in (twist, length, offset))

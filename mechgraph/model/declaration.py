@@ -19,7 +19,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from mechgraph.errors import DeclarationError
+from mechgraph.errors import DeclarationError, unknown
 from mechgraph.fields import (
     BY_FREEDOM,
     FACTS,
@@ -159,9 +159,7 @@ class Parts(Formatted):
 
     def _index(self, name: str, places: Mapping[str, int], what: str) -> int:
         if not isinstance(name, str) or name not in places:
-            raise DeclarationError(
-                f"mechanism {self.name!r}", [f"unknown {what} {shown(name)} ({what}s: {', '.join(places) or 'none'})"]
-            )
+            raise DeclarationError(f"mechanism {self.name!r}", [unknown(what, name, places)])
         return places[name]
 
     def freedom_names(self) -> tuple[str, ...]:
@@ -213,7 +211,7 @@ class Parts(Formatted):
             return f"freedom {shown(name)}: expected a name such as 'B' or 'B.Tz'"
         k = self._place_of_named(name)
         if k is None:
-            return f"unknown freedom {name!r} (freedoms: {', '.join(self.freedom_names())})"
+            return unknown("freedom", name, self.freedom_names(), self.pair_index)
         pair = self.pairs[k]
         names = pair.freedom_names
         if name in names:
@@ -302,9 +300,12 @@ def declaration_faults(m: Parts) -> list[str]:
     if not _pairs_are_sound(m.pairs, tol):
         faults += [fault for pair in m.pairs for fault in pair.faults(tol)]
     faults += _end_faults(m, names)
-    for key, value in m.units.items():
-        if key not in BASE_UNITS or not isinstance(value, str) or not value:
-            faults.append(wrong(value, f"units: {key}", f"names for {', '.join(BASE_UNITS)}"))
+    faults += [f"units: {unknown('base unit', key, BASE_UNITS)}" for key in m.units if key not in BASE_UNITS]
+    faults += [
+        wrong(value, f"units: {key}", "the name of a unit")
+        for key, value in m.units.items()
+        if key in BASE_UNITS and not (isinstance(value, str) and value)
+    ]
     if m.tol is not None:
         faults += filter(None, [tolerance_fault(m.tol)])
     faults += [
@@ -334,9 +335,9 @@ def _end_faults(m: Parts, names: Sequence[str]) -> list[str]:
             if end is None:
                 faults.append(f"pair {pair.name!r}: is on one link only; name both links")
             elif isinstance(end, str) and end not in known:
-                faults.append(f"pair {pair.name!r}: link {end!r} is not declared (links: {', '.join(names)})")
+                faults.append(f"pair {pair.name!r}: {unknown('link', end, names)}")
     if not isinstance(m.frame, str) or m.frame not in known:
-        faults.append(f"frame {shown(m.frame)}: is not a link (links: {', '.join(names)})")
+        faults.append(f"frame: {unknown('link', m.frame, names)}")
     elif all_known and len(names) == len(m.links):
         faults += _connection_faults(m)
     return faults

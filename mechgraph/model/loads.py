@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Protocol, S
 import numpy as np
 import scipy
 
-from mechgraph.errors import DeclarationError
+from mechgraph.errors import DeclarationError, unknown
 from mechgraph.fields import (
     BREAKS,
     FREEDOM_NAME,
@@ -140,7 +140,7 @@ class Load(Described, ABC):
             if not isinstance(value, str):
                 continue
             if about.kind is LINK_NAME and value not in names.link_index:
-                found.append(f"unknown link {value!r} (links: {', '.join(names.link_index)})")
+                found.append(unknown("link", value, names.link_index))
             elif about.kind is FREEDOM_NAME:
                 found.append(names.freedom_fault(value, single=about.single))
             elif about.of and (link := getattr(self, about.of)) in names.link_index:

@@ -16,7 +16,7 @@ import numpy as np
 
 from mechgraph import methods
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table
-from mechgraph.errors import DeclarationError, MechgraphWarning, counted
+from mechgraph.errors import DeclarationError, MechgraphWarning, counted, unknown
 from mechgraph.fields import plain, same_fields
 from mechgraph.maths.tolerances import Tolerances
 from mechgraph.memo import Once, carried, under
@@ -37,6 +37,7 @@ from mechgraph.quantities import (
     is_numeric,
     items_of,
     shown,
+    unit_hints,
     unit_of,
     wrong,
 )
@@ -304,11 +305,13 @@ class Mechanism(Parts, Once, Shown):
             self._set(response=self.response.with_full_names(self.full_name))
 
     def _doubt(self) -> None:
-        """Warn of what is sound and hardly meant: gravity in other units than those declared."""
-        for load in self.loads if self.units else ():
-            g = load.acceleration if isinstance(load, Gravity) else (0.0, 0.0, 0.0)
-            if hint := gravity_hint(self.units, math.hypot(*g)):
-                warnings.warn(f"mechanism {self.name!r}: {hint}", MechgraphWarning, stacklevel=3)
+        """Warn of what is sound and hardly meant: units that are not known, gravity in other units than those declared."""
+        if not self.units:
+            return
+        sizes = [math.hypot(*load.acceleration) for load in self.loads if isinstance(load, Gravity)]
+        for hint in [*unit_hints(self.units), *(gravity_hint(self.units, size) for size in sizes)]:
+            if hint:
+                warnings.warn(f"mechanism {self.name!r}: {hint}", MechgraphWarning, stacklevel=4)
 
     def __eq__(self, other: object) -> bool:
         return same_fields(self, other)
@@ -361,10 +364,9 @@ class Mechanism(Parts, Once, Shown):
         >>> mg.load("four-bar").replace(loads=[]).loads
         ()
         """
-        unknown = set(changes) - set(self.formats)
-        if unknown:
+        if strange := set(changes) - set(self.formats):
             raise DeclarationError(
-                f"mechanism {self.name!r}", [f"replace: unknown field {k!r}" for k in sorted(unknown)]
+                f"mechanism {self.name!r}", [f"replace: {unknown('field', k, self.formats)}" for k in sorted(strange)]
             )
         if not set(changes) <= {"drives", "loads", "start"}:
             changed = under(carried(self), Mechanism, **{**self._arguments(), **changes})

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from mechgraph.errors import ContentError, DeclarationError, FileError
+from mechgraph.errors import ContentError, DeclarationError, FileError, unknown
 from mechgraph.fields import (
     BY_FREEDOM,
     COEFFICIENTS,
@@ -164,8 +164,7 @@ class _Reader:
             elif key in table.in_degrees:
                 out[table.in_degrees[key]] = self.radians(value, f"{where}.{key}")
             else:
-                known = ", ".join([*table.fields, *table.in_degrees])
-                self.faults.append(f"{where}: unknown field {shown(key)} (fields: {known})")
+                self.faults.append(f"{where}: {unknown('field', key, [*table.fields, *table.in_degrees])}")
         missing = [key for key in table.needed if key not in out]
         for key, value in list(out.items()):
             wanted = table.fields[key].kind.stands_as

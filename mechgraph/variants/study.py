@@ -6,7 +6,7 @@ import concurrent.futures
 import os
 import pickle
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -21,7 +21,7 @@ from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Sho
 from mechgraph.errors import DeclarationError, MechgraphError, MechgraphWarning, StudyError, counted
 from mechgraph.files import optional
 from mechgraph.force.reactions import MethodName
-from mechgraph.kinematics.prescribed import Motions, actuators, driven
+from mechgraph.kinematics.prescribed import Actuators, Motions, actuators, driven
 from mechgraph.kinematics.solver import MotionEngineName
 from mechgraph.kinetostatics import RedundantName
 from mechgraph.maths.se3 import Array
@@ -595,7 +595,7 @@ def study(
     seed: Index = 0,
     *,
     motions: Mapping[str, Any] | None = None,
-    actuate: str | Iterable[str] | None = None,
+    actuate: Actuators | None = None,
     sampling: SamplingName = "random",
     executor: concurrent.futures.Executor | None = None,
     method: MethodName = "loop_wrench",
