@@ -41,7 +41,6 @@ from mechgraph.kinematics.passive_rest import unspun
 from mechgraph.kinematics.prescribed import Actuators, DriverMotion
 from mechgraph.kinematics.rates import PassiveMotion, PassiveMotions, are_alone, distance_to_dead_point
 from mechgraph.kinematics.reach import away_from_poles, ends_at_pole, follow
-from mechgraph.kinematics.rods import Reduction, follow_reduced, reduction_of
 from mechgraph.kinematics.solver import ClosureSolver, MotionEngineName, closure_solver, engine_for, solver_at_start
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
@@ -220,16 +219,13 @@ class Pipeline:
         return FollowedPositions(self, starts, batch, variant, found, path)
 
     def _followed(self, path: DriverPath, starts: Starts, batch: tuple[int, ...]) -> Positions:
-        """The positions along the path, by the reduced form of the mechanism where it has one."""
-        values, total = self.values("position", batch)[self.lead], int(np.prod(batch))
-        form = self.reduction
-        found = None if form is None else follow_reduced(path, form, starts.x, values, batch, total)
-        if found is None:
-            found = follow(path, requests(starts.x, values, batch), total)
-            if self.passive:
-                self._check_still_passive(path, found)
-                found = unspun(path, found, self.passive)
-                found.interpolate()
+        """The positions along the path."""
+        values = self.values("position", batch)[self.lead]
+        found = follow(path, requests(starts.x, values, batch), int(np.prod(batch)))
+        if self.passive:
+            self._check_still_passive(path, found)
+            found = unspun(path, found, self.passive)
+            found.interpolate()
         return found
 
     def _check_still_passive(self, path: DriverPath, found: Positions) -> None:
@@ -250,12 +246,6 @@ class Pipeline:
             values = nodes.drive[:, first] * self.unit[self.lead]
             drives = dict(zip(np.array(self.drive.names)[self.lead].tolist(), values.tolist(), strict=True))
             raise no_longer_passive_error(self.drive.m, names, drives)
-
-    @cached_property
-    def reduction(self) -> Reduction | None:
-        """The reduced form of the mechanism, where paths are followed by it."""
-        key = "reduced", self.options.form, self.leading.tobytes()
-        return self._with_start(key, lambda: reduction_of(self.start, self.leading, self.passive, self.options.form))
 
     def _with_start(self, key: tuple[object, ...], make: Callable[[], Made]) -> Made:
         """What follows from the start and the drivers alone is kept with the start."""

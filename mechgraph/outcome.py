@@ -17,7 +17,6 @@ from mechgraph.kinematics.assembly import CLOSED
 from mechgraph.kinematics.motion_path import BLOCK, DriverPath, Positions, Status, continued, in_blocks
 from mechgraph.kinematics.prescribed import DriverMotion
 from mechgraph.kinematics.rates import PassiveMotion, Rates, Velocities, accuracy, at_dead_points, disagreement, rates
-from mechgraph.kinematics.rods import FORMS
 from mechgraph.kinematics.solver import ClosureSolver, FactoredClosure, closure_solver
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
@@ -26,7 +25,6 @@ from mechgraph.maths.singular_point import passed
 from mechgraph.maths.tracker import Follower
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.quantities import option_faults
 from mechgraph.result.trajectory import BlockMotion, Trajectory
 from mechgraph.result.values import PassedCrossing
 
@@ -35,7 +33,6 @@ from mechgraph.result.values import PassedCrossing
 class Options:
     """How to solve: force ``method`` (None: motion alone), what becomes of ``redundant`` reactions, and the ``engine``.
 
-    ``form`` says by which form of the equations paths are followed, ``"full"`` or ``"reduced"``, or ``"auto"``: the faster one.
     ``progress`` is called with the numbers of positions done and of all that were reached, block by block.
     """
 
@@ -43,11 +40,6 @@ class Options:
     redundant: str = "nan"
     engine: str = "auto"
     progress: Callable[[int, int], None] | None = field(default=None, compare=False)
-    form: str = "auto"
-
-    def __post_init__(self) -> None:
-        if faults := option_faults({"form": (self.form, FORMS)}):
-            raise DeclarationError("options of a solution", faults)
 
 
 @dataclass(frozen=True)

@@ -288,9 +288,6 @@ class Finder:
         """The assemblies at all positions."""
         return [self._result(found, i) for i, found in enumerate(self.solutions(guesses, turns))]
 
-    def _distinct(self, x: Array, i: int) -> Array:
-        return x[:, distinct(self.family.prints(Configuration(self.form.at(i), x)))]
-
     def _searched(self, drive: Array, guesses: int, turns: float) -> _Solutions:
         q = self.question
         x = searched(q.system, q.x, q.columns, drive, guesses, turns, self.rng, self.progress)
@@ -315,7 +312,7 @@ class Finder:
         solved, error = close_all(system, found.x[:, real].real, self.family.columns)
         # two that meet at a place that is not real are next to one another there
         real, solved = real[error < MODES.real_closed], solved[:, error < MODES.real_closed]
-        solved, once = self._distinct(solved, i), solved.shape[1]
+        solved, once = solved[:, distinct(self.family.prints(Configuration(self.form.at(i), solved)))], solved.shape[1]
         word, evidence = _completeness(found, self.groups, self.starts)
         if solved.shape[1] < once:
             word, evidence = "searched", (*evidence, "Different ends came to one real assembly.")

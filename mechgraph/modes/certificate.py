@@ -94,15 +94,11 @@ def exact(mid: Array) -> Ball:
 
 def crossed(a: Ball, b: Ball) -> Ball:
     """Cross products of vectors ``(3,)`` and ``(3, n)``."""
-    return Ball(_skew(a.mid), _skew_size(a.rad)) @ b
+    return Ball(_skew(a.mid), np.abs(_skew(a.rad))) @ b
 
 
 def _skew(v: Array) -> Array:
     return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
-
-
-def _skew_size(v: Array) -> Array:
-    return np.abs(_skew(v))
 
 
 class Open(ValueError):
@@ -122,7 +118,7 @@ def rod_row(here: Configuration, rod: int) -> tuple[Ball, Ball]:
     walk = _Walk(here, np.zeros(3))
     for pair, sign in here.system.way(rod):
         walk.along(pair, sign)
-    return walk.distance(k.at_a[:, rod, 0], k.at_b[:, rod, 0], k.length[rod, 0])
+    return walk.distance(k.at_a[:, rod, 0], k.at_b[:, rod, 0], k.squares[rod, 0])
 
 
 def loop_rows(here: Configuration, loop: int) -> tuple[Ball, Ball]:

@@ -10,7 +10,7 @@ The equations in which assemblies are looked for: those of the mechanism, or of 
 
 A rod is a chain of links with a ball at its one end and a ball or two turns at the other, in which all between is driven or welded (S-S,
 S-P-S, U-P-S). Over the complex numbers all that it does is to keep two points at a distance, as both ends turn so that they point at
-each other wherever the bodies are that it joins. So it falls away, and with it its loops of six rows, for one row (see ``modes.rods``);
+each other wherever the bodies are that it joins. So it falls away, and with it its loops of six rows, for one row;
 a body that nothing else joins to the frame floats on a pair of six freedoms. A rod that holds nothing that others do not hold has no
 row: an assembly in which it does not fit is none of the mechanism. Put back, a ball turns as little as it can, and two turns
 go that of their two ways that is nearest to the start: ways of rods are no assemblies of their own.
@@ -19,8 +19,8 @@ go that of their two ways that is nearest to the start: ways of rods are no asse
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
 from itertools import count
 from operator import itemgetter
 from typing import NamedTuple, Protocol, cast
@@ -30,8 +30,6 @@ import numpy as np
 from mechgraph.determinacy.decomposition import MOST_SPLIT, Constraint, Constraints, rows_of_pair, smallest
 from mechgraph.errors import counted
 from mechgraph.graph.linkgraph import LinkGraph, components_of_edges
-from mechgraph.kinematics.loop_rows import PointNumbers, PointRows
-from mechgraph.kinematics.rods import floating_type
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import Evaluated, PositionRows, System
 from mechgraph.maths.linear import rank_of, singular_values
@@ -56,30 +54,68 @@ from mechgraph.pairs import kinematics
 from mechgraph.pairs.pair_type import PairType
 
 
-class RodRows(PointRows):
-    """``(d^2 - l^2) / 2`` of every rod, polynomial in the poses; ``length`` of the numbers holds the squares ``l^2``."""
+@dataclass(frozen=True)
+class RodPoints:
+    """Rods between links ``a, b (n,)``, from points ``at_a`` to ``at_b (3, n, B)`` in their frames, and squares ``l^2 (n, B)``."""
+
+    a: Index
+    b: Index
+    at_a: Array
+    at_b: Array
+    squares: Array
+
+
+class RodRows:
+    """``(d^2 - l^2) / 2`` of every rod, polynomial in the poses; ``way (n, F)``: the freedoms between both links, with signs.
+
+    Implements ``system.PositionRows``. Its rate is the relative twist of the links on the line of ``d`` through ``p_b``:
+    ``phi' = W . (V_b - V_a)``, ``W = (p_b x d, d)``.
+    """
+
+    def __init__(self, points: RodPoints, way: Reals) -> None:
+        self.points, self.way = points, way
+
+    @property
+    def scale(self) -> Reals:
+        """Ones."""
+        return np.ones((len(self.way), 1))
 
     def lines(self, here: Evaluated) -> tuple[Reals, Reals]:
-        """``phi (n, T)`` and ``W (6, n, T)`` with ``phi' = W . (V_b - V_a)``."""
-        k = self.numbers
+        """``phi (n, T)`` and ``W (6, n, T)``."""
+        k = self.points
         A, B = here.poses.take(k.a, axis=2), here.poses.take(k.b, axis=2)
         p = rotate(B[:, :3], k.at_b) + B[:, 3]
         d = p - rotate(A[:, :3], k.at_a) - A[:, 3]
-        return 0.5 * ((d * d).sum(axis=0) - k.length), np.concatenate([cross(p, d), d])
+        return 0.5 * ((d * d).sum(axis=0) - k.squares), np.concatenate([cross(p, d), d])
+
+    def residual(self, here: Evaluated) -> Reals:
+        """``phi (n, T)``."""
+        return self.lines(here)[0]
+
+    def error(self, here: Evaluated) -> Reals:
+        """The largest of them."""
+        return np.asarray(np.abs(self.residual(here)).max(axis=0, initial=0.0))
+
+    def jacobian(self, here: Evaluated) -> Reals:
+        """``W . S`` in the freedoms between both links."""
+        return ((self.lines(here)[1].transpose(2, 1, 0) @ here.S.transpose(2, 0, 1)) * self.way).transpose(1, 2, 0)
+
+    def rates(self, here: Evaluated, dq: Reals) -> Reals:
+        """``J q'``."""
+        return np.asarray((self.jacobian(here) * dq).sum(axis=1))
 
 
 class RodSystem(System):
     """A mechanism with rows of rods behind its own; their points and squares of lengths are numbers as its markers are."""
 
-    def __init__(self, m: Mechanism, graph: LinkGraph | None, par: Parameters, points: PointNumbers) -> None:
+    def __init__(self, m: Mechanism, graph: LinkGraph | None, par: Parameters, points: RodPoints) -> None:
         super().__init__(m, graph, par)
         self.points = points
 
     @cached_property
     def rod_rows(self) -> RodRows:
         """The rows of rods."""
-        none = np.full(len(self.points.a), -1)
-        return RodRows(self.points, self.ways[:, self.pair_of_freedom], none, none)
+        return RodRows(self.points, self.ways[:, self.pair_of_freedom])
 
     @cached_property
     def ways(self) -> Reals:
@@ -111,7 +147,7 @@ class RodSystem(System):
         """Those of loops and of rods."""
         return [*self.rows, self.rod_rows]
 
-    def with_points(self, points: PointNumbers) -> RodSystem:
+    def with_points(self, points: RodPoints) -> RodSystem:
         """The same with other points and lengths; all else that is known of it is taken over."""
         out = RodSystem(self.m, self.graph, self.par, points)
         for name in ("numbers", "ways"):
@@ -190,7 +226,7 @@ class RodFamily(Family):
         """The system with other markers and points ``(3, 4, 2 P + 2 n, B)``, and squares of lengths behind the drivers."""
         n, s = self.rods, self.system
         at = markers[:, 3, -2 * n :]
-        points = replace(s.points, at_a=at[:, :n], at_b=at[:, n:], length=drive[-n:])
+        points = replace(s.points, at_a=at[:, :n], at_b=at[:, n:], squares=drive[-n:])
         if self.still:
             return s.with_points(points)
         moved = super().system_with(markers[:, :, : -2 * n], drive)
@@ -232,6 +268,12 @@ def _rows(here: Configuration) -> RodRows:
 
 WAYS = "A leg that two turns carry can stand in two ways in the same assembly: nearest to the start, the other does not count"
 """What is said of rods with two turns at an end."""
+
+
+@cache
+def floating_type() -> PairType:
+    """A pair that holds nothing, with a rotation that has no chart."""
+    return PairType("floating", freedoms=["Tx", "Ty", "Tz", "rotation"], reactions=[])
 
 
 class EquationForm(Protocol):
@@ -450,9 +492,7 @@ class WithoutRods:
             (np.array([place for place, _ in side]), np.stack([at for _, at in side], axis=1)[..., None])
             for side in ends
         )
-        none, n = np.zeros((3, 0, 1)), len(self.rods)
-        squares = self.drive[-n:, :1]
-        points = PointNumbers(a, b, at_a, at_b, squares, none, np.full(n, -1), np.zeros((n, 1)))
+        points = RodPoints(a, b, at_a, at_b, self.drive[-len(self.rods) :, :1])
         return RodSystem(left, None, numbers, points)
 
     def at(self, position: int) -> System:
@@ -460,7 +500,7 @@ class WithoutRods:
         s = self._small
         if not isinstance(s, RodSystem):
             return s
-        return s.with_points(replace(s.points, length=self.drive[-len(self.rods) :, [position]]))
+        return s.with_points(replace(s.points, squares=self.drive[-len(self.rods) :, [position]]))
 
     # --- states ------------------------------------------------------------------------------------------------------
 

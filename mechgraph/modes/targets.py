@@ -26,7 +26,6 @@ import numpy as np
 
 from mechgraph.graph.linkgraph import components_of_edges
 from mechgraph.kinematics.assembly import CLOSED, close_all
-from mechgraph.kinematics.loop_rows import PointNumbers
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import complement
@@ -36,7 +35,7 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Pair
 from mechgraph.modes.continua import Nearby, irregular, least_value
 from mechgraph.modes.family import Array, Family, Member
-from mechgraph.modes.form import RodFamily, RodStep, RodSystem, behind, sets_of
+from mechgraph.modes.form import RodFamily, RodPoints, RodStep, RodSystem, behind, sets_of
 from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, Equations, Leg, follow, rounding
 from mechgraph.modes.start_sets import StartSet, distinct
 
@@ -420,9 +419,7 @@ class EquationGroup:
         assert isinstance(self.whole, RodFamily)
         a, b = (np.array([place[link] for link in side]) for side in np.split(ends[2 * P :], 2))
         at_a, at_b = np.split(markers[:, 3, 2 * P :], 2, axis=1)
-        points = PointNumbers(
-            a, b, at_a, at_b, s.points.length[self.rods], np.zeros((3, 0, 1)), np.full(n, -1), np.zeros((n, 1))
-        )
+        points = RodPoints(a, b, at_a, at_b, s.points.squares[self.rods])
         # points of links that known pairs join may lie at one place at the start and part when these move
         same = self.whole.joints[self._markers[2 * P :] - 2 * len(full.pairs)]
         return RodFamily(Configuration(RodSystem(m, None, numbers, points), x), columns, idle, held, same)
