@@ -32,8 +32,6 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker
 from mechgraph.quantities import is_numeric, shown, wrong
 
-COMES_OF_IT = 0.01
-"""Part of that distance above which the largest singular value that counted as zero comes of it: directions make it smaller."""
 NO_DISTANCE = 1e-14
 """Distance over that size, and singular value, that is rounding."""
 
@@ -65,7 +63,8 @@ def _fault(here: Configuration) -> str:
     near = np.flatnonzero((part < too_near) & (part > NO_DISTANCE))
     if not near.size:
         return ""
-    lost = near[closure_rank(here).dropped > np.maximum(COMES_OF_IT * part[near], NO_DISTANCE)]
+    # above this part of the distance the largest singular value that counted as zero comes of it: directions make it smaller
+    lost = near[closure_rank(here).dropped > np.maximum(0.01 * part[near], NO_DISTANCE)]
     if not lost.size:
         return ""
     i, names = int(lost[np.argmin(part[lost])]), [p.name for p in s.m.pairs]
@@ -79,22 +78,8 @@ def _fault(here: Configuration) -> str:
 
 CLOSED = 1e-10
 """Closure error (angle, or length / L) up to which loops count as closed."""
-SPARSE = 300
-"""Closure rows from which on loops are closed by sparse normal equations."""
 CLOSURE_GOAL = 1e-13
 """Closure error that Newton aims at."""
-ASSEMBLY_RANK = 1e-9
-"""Relative singular value below which a direction is left alone while closing."""
-RESTARTS = 40
-"""Perturbed guesses tried where the declared one does not lead to a closed position (fixed seed), all of them together."""
-ASKEW = 1.0
-"""Closure error (radians) from which on a reversed marker axis is looked for."""
-MOST_REVERSED = 30
-"""Pairs up to which that is done: every marker may cost an assembly."""
-FARTHEST_TOGETHER = 1e4
-"""Longest way of freedoms that are moved together, which is followed whole: some seconds."""
-TRIED_FIRST = 8
-"""How many of them are tried before the others; an even number, as they are of two kinds in turn."""
 
 
 def scaled_system(m: Mechanism, q: Array, system: System | None = None) -> System:
@@ -170,10 +155,12 @@ def close_all(
     free = complement(fixed, system.n_freedoms)
 
     def least(here: Configuration) -> Array:
-        if here.T == 1 and system.n_rows >= SPARSE and not tol:
+        # closure rows from which on loops are closed by sparse normal equations
+        if here.T == 1 and system.n_rows >= 300 and not tol:
             return ReducedRows(ClosureRows.at(here), fixed).correction(here.residual[:, 0])[:, None]
         dq = np.zeros((system.n_freedoms, here.T), dtype=here.x.dtype)
-        dq[free] = least_norm_steps(here.J[:, free], here.residual, max(ASSEMBLY_RANK, tol))
+        # relative singular value below which a direction is left alone while closing
+        dq[free] = least_norm_steps(here.J[:, free], here.residual, max(1e-9, tol))
         return dq
 
     goal = CLOSURE_GOAL
@@ -311,7 +298,8 @@ def _opposite_axis(m: Mechanism, preferred: Mapping[str, float], error: float) -
     loops miss by much and in few pairs: every try is an assembly.
     """
     marked = [k for k, pair in enumerate(m.pairs) if pair.on_a is not None]
-    if error < ASKEW or not 0 < len(marked) <= MOST_REVERSED:
+    # a closure error of a radian, in at most 30 pairs: every marker may cost an assembly
+    if error < 1.0 or not 0 < len(marked) <= 30:
         return ""
     axes = np.array(
         [[np.asarray(marker.axis) / np.linalg.norm(marker.axis) for marker in m.pairs[k].markers] for k in marked]
@@ -363,13 +351,14 @@ def _search(m: Mechanism, system: System, x: Array, preferred: Mapping[str, floa
         return best, best_error
     rng = np.random.default_rng(20231)
     guesses = []
-    for i in range(RESTARTS):
+    # perturbed guesses, of two kinds in turn, the first eight tried before the others
+    for i in range(40):
         guess, fixed = attempts[i % 2]
         free = complement(fixed, system.n_freedoms)
         dq = np.zeros((system.n_freedoms, 1))
-        dq[free, 0] = rng.normal(0.0, 0.2 + 1.3 * i / RESTARTS, len(free))
+        dq[free, 0] = rng.normal(0.0, 0.2 + 1.3 * i / 40, len(free))
         guesses.append(system.advance(guess[:, None], dq)[:, 0])
-    for round_ in (slice(0, TRIED_FIRST), slice(TRIED_FIRST, RESTARTS)):
+    for round_ in (slice(0, 8), slice(8, 40)):
         states, errors = np.stack(guesses[round_], axis=1), np.empty(len(guesses[round_]))
         for kind, (_, fixed) in enumerate(attempts[:2]):
             states[:, kind::2], errors[kind::2] = close_all(system, states[:, kind::2], fixed, tol=tol)
@@ -423,7 +412,8 @@ def assembled_at(
 
 def _refuse_far(m: Mechanism, names: Iterable[str], way: Array, unit: Array) -> None:
     """Refuse a way that would be followed for minutes; that of one freedom that turns is cut where the motion repeats itself."""
-    most = np.full(len(way), FARTHEST if len(way) == 1 else FARTHEST_TOGETHER)
+    # longest way of freedoms that are moved together, which is followed whole: some seconds
+    most = np.full(len(way), FARTHEST if len(way) == 1 else 1e4)
     faults = far_faults(names, np.abs(way), unit, most, ". Give a nearer value, or a guess")
     if faults:
         raise DeclarationError(f"assemble {m.name!r}", faults)

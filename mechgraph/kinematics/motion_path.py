@@ -300,17 +300,12 @@ def _continue(path: DriverPath, found: Positions, tracks: Index, out: Array) -> 
 def along_polygons(path: DriverPath, requests: list[Request], total: int) -> Positions:
     """Polygons followed with nodes where interpolation does not do."""
     legs = _polygons(path, requests, total)
-    for _ in range(REPEATS):
+    # times that polygons are followed, every time with a node at the positions that did not come out as predicted before
+    for _ in range(12):
         found = legs.followed()
         if not found.bad.size or not legs.stop_at(found.bad):
             break
     return found.positions
-
-
-REPEATS = 12
-"""Times that polygons are followed, every time with a node at the positions that did not come out as predicted before."""
-SURE = 1e-4
-"""Correction of an interpolated position from which on it is asked whether it lies on the branch of its nodes."""
 
 
 @dataclass
@@ -403,7 +398,8 @@ class Legs:
 
     def _read_off(self, out: Positions, inside: Index) -> Index:
         """The positions ``inside`` closed from interpolation, with more nodes where that does not do; those that did not come out."""
-        for _ in range(FINER):
+        # times that nodes are put where positions did not come out as predicted
+        for _ in range(4):
             interpolation = Interpolation(self.path, out.tracks.nodes)
             bad = [
                 part[self._closed(out, interpolation, part, inside.size == self.total)] for part in in_blocks(inside)
@@ -452,7 +448,8 @@ class Legs:
         found = out.follower.newton.close(x, drive, tracks, which)
         out.x[:, at], out.which[at] = found.x, found.which
         bad = ~found.done | (found.correction > PATH.correction)
-        doubt = np.flatnonzero(~bad & (found.correction > SURE))
+        # correction of an interpolated position from which on it is asked whether it lies on the branch of its nodes
+        doubt = np.flatnonzero(~bad & (found.correction > 1e-4))
         if doubt.size:
             here = path.at(found.x[:, doubt], drive[:, doubt], tracks[doubt])
             ends, sides = nodes.ends(left[doubt], right[doubt])
@@ -493,8 +490,6 @@ class Legs:
 
 BEYOND = {End.FOLD: Status.OUT_OF_REACH, End.GIVEN_UP: Status.NOT_FOLLOWED}
 """Outcome behind the end of a track."""
-FINER = 4
-"""Times that nodes are put where positions did not come out as predicted."""
 
 
 def _polygons(path: DriverPath, requests: list[Request], total: int) -> Legs:

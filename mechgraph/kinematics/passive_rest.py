@@ -24,14 +24,8 @@ from mechgraph.maths.tolerances import PATH
 from mechgraph.maths.track import Interpolation, Nodes, Rule, rule
 from mechgraph.maths.tracker import Follower
 
-MOST_TURNS = 80
-"""Most repetitions of the turn that takes the spin out; over a plane half a turn takes some thirty."""
-MOST_BENDS = 20_000
-"""Bends up to which steps end there; of more (many positions of several drivers) a step goes along its chord."""
 UNTURNED = 1e-13
 """Angle that is rounding."""
-MISSING = 1e-9
-"""Angle, or length / L, that may be missing to rest where repetition ends: what poor condition leaves of the rounding."""
 
 
 def unspun(path: DriverPath, found: Positions, passive: tuple[PassiveMotion, ...]) -> Positions:
@@ -93,7 +87,8 @@ def _with_bends(path: DriverPath, found: Positions) -> Nodes:
     for crossed, at in found.tracks.crossings:
         inside &= (track != crossed) | (np.abs(place - at) > WINDOW)
     track, place = track[inside], place[inside]
-    if not 0 < len(track) <= MOST_BENDS:
+    # bends up to which steps end at them; of more (many positions of several drivers) a step goes along its chord
+    if not 0 < len(track) <= 20_000:
         return nodes
     interpolation = Interpolation(path, nodes)
     step = interpolation.find(track, place)
@@ -312,7 +307,8 @@ class _Carried:
             amounts, dq, sure = self._missing(x, which, track, place, turns, left)
             amount = np.abs(list(amounts.values())).max(axis=0)
             if left is None:
-                most = MOST_TURNS * (1 + int(amount.max(initial=0.0) / np.pi))
+                # most repetitions of the turn that takes the spin out; over a plane half a turn takes some thirty
+                most = 80 * (1 + int(amount.max(initial=0.0) / np.pi))
             if amount.max(initial=0.0) < UNTURNED or times == most:
                 break
             times += 1
@@ -329,7 +325,8 @@ class _Carried:
             part = np.where(easily, np.minimum(2.0 * part, 1.0), np.where(near, part, 0.5 * part))
             # freedoms that held the motion may no longer do so where it has led
             which = self.path.chosen(self.path.at(x, x[self.path.rows], track), which)
-        return x, sure & (amount < MISSING)
+        # angle, or length / L, that may be missing to rest where repetition ends: what poor condition leaves of the rounding
+        return x, sure & (amount < 1e-9)
 
     def spin(self, nodes: Nodes) -> Array:
         """Increments ``(F, nodes)`` from nodes to one period later."""
@@ -386,14 +383,6 @@ def _wrapped(angle: Array) -> Array:
     return np.remainder(angle + np.pi, 2 * np.pi) - np.pi
 
 
-MOST_TIMES = 30
-"""Most repetitions of a step: each leaves a small part of what was wrong along the passive motions."""
-REPEATED = 1e-14
-"""Change of the increments of a step that is rounding."""
-SETTLED = 1e-10
-"""Change of the increments of a step up to which its repetitions have come to an end."""
-
-
 def rest_is_sure(closed: Closed, step: Index, begin: Index) -> Mask:
     """Steps with which, and up to which from where tracks ``begin``, the way is sure: states ``closed`` in a ``step`` are as foretold."""
     bad = np.zeros(len(begin), dtype=bool)
@@ -446,7 +435,8 @@ class PassiveSteps:
         place = nodes.place[np.repeat(left, rule().count)] + 0.5 * (t + 1.0) * self._h[many]
         track, which = nodes.track[np.repeat(left, rule().count)], nodes.which[np.repeat(left, rule().count)]
         drive = self.follower.paths.drive(track, place)
-        for _ in range(MOST_TIMES):
+        # most repetitions of a step: each leaves a small part of what was wrong along the passive motions
+        for _ in range(30):
             closed = self._at(many, t, drive, which)
             x, here = closed.x, self.path.at(closed.x, drive, track)
             f = self.path.factored(here, closed.which)
@@ -460,9 +450,11 @@ class PassiveSteps:
             series = self._h[steps, None] * (rates.reshape(-1, len(steps), rule().count) @ rule().to_series)
             change = np.abs(series - self._series[:, steps]).max(axis=(0, 2), initial=0.0)
             self._series[:, steps] = series
-            if change.max() < REPEATED * max(1.0, float(np.abs(series).max(initial=0.0))):
+            # change of the increments of a step that is rounding
+            if change.max() < 1e-14 * max(1.0, float(np.abs(series).max(initial=0.0))):
                 break
-        self._sure[steps] &= (change < SETTLED) & closed.done.reshape(-1, rule().count).all(axis=1)
+        # change of the increments of a step up to which its repetitions have come to an end
+        self._sure[steps] &= (change < 1e-10) & closed.done.reshape(-1, rule().count).all(axis=1)
 
     def turned(self, x: Array, which: Index, track: Index, place: Array, turns: Index) -> tuple[Array, Mask]:
         """States at rest at places of the tracks, as far as these have steps; their motion is followed all the way, without ``turns``.

@@ -29,12 +29,6 @@ from mechgraph.quantities import has_quantity, is_numeric, items_of
 
 SLIDES, TURNS = ("Tx", "Ty", "Tz"), ("Rx", "Ry", "Rz")
 PART = re.compile(r"(?P<point>.+)\.(?P<part>Tx|Ty|Tz|T\([^()]*\))")
-ALMOST_PARALLEL = 0.98
-"""Cosine between the first and the last axis of three successive turns from which on they do not describe a rotation well."""
-LITTLE_TURNED = 1.3
-"""Angle from the global directions to which poses are described by turns about x, the new y and the new z, as ``"arm.Rx"`` is."""
-PROPER = 1e-6
-"""Largest entry of ``R R^T - 1`` of a pose."""
 
 
 class Target(NamedTuple):
@@ -262,13 +256,15 @@ class Prescription:
         first: Array | None = None
         gap = np.abs(R @ np.swapaxes(R, -1, -2) - np.eye(3)).max(initial=0.0)
         chart: Array | None = None
-        if gap > PROPER or (np.linalg.det(R) < 0).any() or (poses[..., 3, :] != (0, 0, 0, 1)).any():
+        # largest entry of ``R R^T - 1`` of a pose
+        if gap > 1e-6 or (np.linalg.det(R) < 0).any() or (poses[..., 3, :] != (0, 0, 0, 1)).any():
             fault = "expected poses with a proper rotation and the last row 0 0 0 1"
         elif change is not None and twist is None:
             fault = "has an acceleration and no velocity; give both"
         elif name in self.free:
             fault = f"{name} is given twice"
-        elif (np.trace(R, axis1=-2, axis2=-1) > 1.0 + 2.0 * np.cos(LITTLE_TURNED)).all():
+        # within 1.3 of the global directions poses are described by turns about x, the new y and the new z, as ``"arm.Rx"`` is
+        elif (np.trace(R, axis1=-2, axis2=-1) > 1.0 + 2.0 * np.cos(1.3)).all():
             chart = np.eye(3)
         else:
             chart, first = _chart(R.reshape(-1, 3, 3)), R.reshape(-1, 3, 3)[0].T
@@ -300,7 +296,8 @@ def _chart(R: Array) -> Array | None:
         if abs(axes[a] @ axes[b]) < 1e-12
     ]
     a, b = min(square, key=lambda ab: (round(float(steep[ab]), 9), ab))
-    if steep[a, b] > ALMOST_PARALLEL:
+    # cosine between the first and the last axis of three successive turns from which on they do not describe a rotation well
+    if steep[a, b] > 0.98:
         return None
     return np.stack([axes[a], np.cross(axes[b], axes[a]), axes[b]], axis=1)
 

@@ -26,11 +26,6 @@ from mechgraph.maths.sparse import SparseFactors, singular_ratio
 from mechgraph.maths.tolerances import RANKS
 
 EngineName = Literal["auto", "dense", "sparse"]
-CROSSOVER = 144
-"""Rows from which ``auto`` takes the sparse engine: measured on verdicts of ladders and grids, where the two meet at 100 to 240 rows."""
-SHARE = 1e-9
-"""Part of a random self-stress below which a row has none."""
-SHARES_SEED = 23
 
 
 class RankSolution(Protocol):
@@ -180,10 +175,11 @@ class ClosureRank:
     def _connected_blocks(self) -> list[list[int]]:
         """Loops (and further rows) with parts of self-stresses that connect loops: those that share freedoms belong together."""
         r = self.reduced
-        probe = np.abs(self._solution.stresses(np.random.default_rng(SHARES_SEED).normal(size=(self.shared, 1))))[:, 0]
+        probe = np.abs(self._solution.stresses(np.random.default_rng(23).normal(size=(self.shared, 1))))[:, 0]
         size = np.zeros(r.loops + r.rows.further)
         np.maximum.at(size, r.owners, probe)
-        some = np.flatnonzero(size > SHARE * size.max())
+        # part of a random self-stress below which a row has none
+        some = np.flatnonzero(size > 1e-9 * size.max())
         K = r.matrix.tocoo()
         touch = scipy.sparse.csr_array((np.ones(K.nnz), (r.owners[K.row], K.col)), shape=(len(size), K.shape[1]))
         return [some[part].tolist() for part in members(labels_of_bipartite(touch[some]))]
@@ -211,7 +207,8 @@ def rank_of_rows(
     fixed = np.zeros(0, dtype=np.intp) if fixed is None else fixed
     tolerance = RANKS.position if tolerance is None else tolerance
     proved = RANKS.proved if proved is None else proved
-    if engine == "dense" or not rows.graph.n_loops or (engine == "auto" and rows.count < CROSSOVER):
+    # rows from which ``auto`` takes the sparse engine: measured on verdicts of ladders and grids, where the two meet at 100 to 240 rows
+    if engine == "dense" or not rows.graph.n_loops or (engine == "auto" and rows.count < 144):
         reduced = ReducedRows(rows, fixed, dense=True)
         return ClosureRank(reduced, _Dense(reduced, tolerance), tolerance)
     bordered = LoopSystem(rows, fixed)

@@ -24,9 +24,6 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Array, Index, cross, cross_twist
 from mechgraph.maths.tolerances import MOTIONS, PATH
 
-TURNING = 1e-6
-"""Part of a unit motion from which on it turns the links that it moves."""
-
 
 @dataclass(frozen=True)
 class PassiveMotion:
@@ -39,7 +36,8 @@ class PassiveMotion:
     @property
     def turns(self) -> bool:
         """Whether it turns its links, so that a couple holds them; else it displaces them, and a force does."""
-        return bool(np.abs(self.twist[:3]).max() > TURNING)
+        # part of a unit motion from which on it turns the links that it moves
+        return bool(np.abs(self.twist[:3]).max() > 1e-6)
 
 
 def are_alone(passive: Sequence[PassiveMotion]) -> bool:

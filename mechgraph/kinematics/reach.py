@@ -43,11 +43,6 @@ from mechgraph.model.pair import Pair
 from mechgraph.pairs import kinematics as evaluation
 from mechgraph.pairs.contact_types import placed_surface
 
-AT_POLE = 1e-4
-"""Angle from a pole below which a path that ends there ends because of it."""
-NEAR_POLE = 0.01
-"""Angle from a pole below which too many digits are lost: nearer, accelerations are off by more than 1e-12."""
-
 
 def away_from_poles(m: Mechanism, system: System, found: Positions) -> Mechanism | None:
     """The mechanism with spheres about other axes where positions lie beside poles, or a node of a path that ends; None where none does.
@@ -64,7 +59,8 @@ def away_from_poles(m: Mechanism, system: System, found: Positions) -> Mechanism
     for k, pair in enumerate(m.pairs):
         place, own = placed_surface(pair.type), slice(system.first_column[k], system.first_column[k + 1])
         free = pair.surface is not None and bound.isdisjoint(pair.freedom_names)
-        if place is None or not free or not (place.to_pole(q_near[own][:2]) < NEAR_POLE).any():
+        # angle from a pole below which too many digits are lost: nearer, accelerations are off by more than 1e-12
+        if place is None or not free or not (place.to_pole(q_near[own][:2]) < 0.01).any():
             continue
         assert pair.surface is not None
         pairs[k] = pair.reshaped(surface=pair.surface.with_poles_far_from(place.points(q[own][:2])))
@@ -79,7 +75,8 @@ def ends_at_pole(m: Mechanism, system: System, found: Positions, track: int) -> 
         place = placed_surface(pair.type) if pair.surface is not None else None
         if place is not None:
             q = system.coordinates_of(nodes.x[:, -1:])[system.first_column[k] :][:2]
-            if place.to_pole(q)[0] < AT_POLE:
+            # angle from a pole below which a path that ends there ends because of it
+            if place.to_pole(q)[0] < 1e-4:
                 return pair.name
     return ""
 
@@ -101,11 +98,7 @@ def _renamed(old: Pair, new: Pair, q: Array) -> Array:
 
 BEYOND_END = 1e-9
 """Lengths over L by which a coordinate may be beyond its range: rounding."""
-BISECTIONS = 52
-"""Times that a step is halved for the place where a coordinate leaves its range: to rounding."""
 NONE = np.zeros(0, dtype=np.intp)
-TURNS_FOUND = 4
-"""Nodes put one after the other where a coordinate turns back; the third is there to 1e-5, and the value to its square."""
 
 
 def beyond(system: System, x: Array) -> Array:
@@ -160,7 +153,8 @@ def range_ends(path: DriverPath, follower: Follower, nodes: Nodes, outside: Arra
         return far, nodes.take(NONE)
     low, high = near[left], far[left]
     between = Interpolation(path, nodes)
-    for _ in range(BISECTIONS if (high > low).any() else 0):
+    # times that a step is halved for the place where a coordinate leaves its range: to rounding
+    for _ in range(52 if (high > low).any() else 0):
         middle = 0.5 * (low + high)
         x = between(between.find(left, middle), middle, follower.paths.drive(left, middle))
         over = (beyond(system, x) > BEYOND_END).any(axis=0)
@@ -180,7 +174,8 @@ def range_ends(path: DriverPath, follower: Follower, nodes: Nodes, outside: Arra
 def _with_turns(path: DriverPath, follower: Follower, nodes: Nodes) -> Nodes:
     """The nodes of all tracks, and further ones where a limited coordinate turns back near an end of its range between two of them."""
     columns, low, high = path.system.limits
-    for _ in range(TURNS_FOUND):
+    # nodes put one after the other where a coordinate turns back; the third is there to 1e-5, and the value to its square
+    for _ in range(4):
         between = Interpolation(path, nodes)
         a, b = between.left, between.right
         width, q = nodes.place[b] - nodes.place[a], nodes.x[path.system.single_rows[columns]]
@@ -205,15 +200,8 @@ def _with_turns(path: DriverPath, follower: Follower, nodes: Nodes) -> Nodes:
     return nodes
 
 
-GAPS = 200
-"""Most gaps behind which a polygon is taken up again."""
-DIVISIONS = 64
-"""Most parts into which an edge is divided."""
 FIRST_CORNERS, MOST_CORNERS = 4, 128
 """Corners to which ways are tried together: of one polygon at first, and of all at most."""
-
-SHORTLY, CAREFUL = 0.05, 8
-"""Rest of a way that may be a poor condition only, and how many of these ways are followed carefully."""
 
 
 @dataclass
@@ -243,7 +231,8 @@ class _Polygon:
         ends = np.concatenate([[0], 1 + np.flatnonzero(bent), [len(places) - 1]])
         corners, at, edge = [points[:, :0]], [places[:0]], [places[:0]]
         for a, b in pairwise(ends.tolist()):
-            n = int(np.clip(np.ceil((places[b] - places[a]) / PATH.longest), 1, DIVISIONS))
+            # most parts into which an edge is divided
+            n = int(np.clip(np.ceil((places[b] - places[a]) / PATH.longest), 1, 64))
             u = np.arange(1, n + 1) / n
             corners.append(points[:, a, None] + u * (points[:, b] - points[:, a])[:, None])
             at.append(np.append(places[a] + u[:-1] * (places[b] - places[a]), places[b]))
@@ -277,7 +266,8 @@ def along_polygons_with_gaps(path: DriverPath, requests: list[Request], total: i
         if (ended := _ended(found, i)) is not None:
             points = request.polygon(path.rows)
             polygons.append(_Polygon(request, points, places_of(points), [i], ended))
-    for _ in range(GAPS):
+    # most gaps behind which a polygon is taken up again
+    for _ in range(200):
         ways = _ways_back(path, found, polygons)
         if not ways:
             break
@@ -392,9 +382,10 @@ def _nearly_passable(ways: list[_Way], left: list[float]) -> list[_Way]:
     out = []
     for (polygon, corner), (rest, way) in least.items():
         beside = [least[polygon, k][0] for k in (corner - 1, corner + 1) if (polygon, k) in least]
-        if 0.0 < rest < SHORTLY and rest <= min(beside, default=rest):
+        # the rest of the way may be a poor condition only
+        if 0.0 < rest < 0.05 and rest <= min(beside, default=rest):
             out.append(way)
-    return out[:CAREFUL]
+    return out[:8]
 
 
 def _left(path: DriverPath, found: Positions, ways: list[_Way], careful: bool = False) -> Array:
@@ -448,12 +439,6 @@ def _requests(found: Positions, polygon: _Polygon, way: _Way) -> tuple[Request, 
     return parts[0], parts[1:]
 
 
-TURNS = (1, 4, 16)
-"""Turns of the driver over which a motion is followed to see whether it repeats itself, one number after the other."""
-WORTH = 2
-"""How many times as far positions must lie for that."""
-AT_START = 1e-14
-"""Part of a driver's value up to which a position is the start itself: so near to it nothing is followed, dead point or not."""
 BACK_AGAIN = 1e-11
 """Distance (radians, lengths / L) up to which a motion is back: rounding over a poor condition; shifts are whole turns or nothing."""
 
@@ -496,8 +481,10 @@ def _along_curves(path: DriverPath, requests: list[Request], total: int) -> Posi
                 ways.append(_Curve(request, sense, np.flatnonzero(there), sense * along[there]))
     turn = path.system.periods[path.columns[0]]
     if np.isfinite(turn):
-        for most in TURNS:
-            far = [way for way in ways if way.period == np.inf and not way.ends and way.way.max() > WORTH * most * turn]
+        # turns of the driver over which a motion is followed to see whether it repeats itself, one number after the other
+        for most in (1, 4, 16):
+            # worth it where positions lie twice as far
+            far = [way for way in ways if way.period == np.inf and not way.ends and way.way.max() > 2 * most * turn]
             if far:
                 _find_periods(path, far, most)
     legs = Legs(path, total)
@@ -509,7 +496,8 @@ def _along_curves(path: DriverPath, requests: list[Request], total: int) -> Posi
             turns[places] = np.floor(at / way.period)
             at = np.clip(at - way.period * turns[places], 0.0, way.period)
             values = np.where(turns[places] > 0, begin + way.sense * at, values)
-        ahead = way.length > AT_START * max(1.0, abs(begin))
+        # part of a driver's value up to which a position is the start itself: so near to it nothing is followed, dead point or not
+        ahead = way.length > 1e-14 * max(1.0, abs(begin))
         points = np.array([[begin, begin + way.sense * way.length] if ahead else [begin]])
         legs.add(way.request, points, values, places, at)
     found = legs.followed().positions

@@ -25,8 +25,6 @@ from mechgraph.maths.tolerances import PATH
 PROBES = 6
 """Random self-stresses that represent all of them at every position: a component in which none has a part is unique but for chance."""
 SEED = 5
-POWERS = 5
-"""Steps of the power iteration that estimates a spectral radius."""
 
 
 Part = tuple[LoopSystem, Index, Factored]
@@ -150,7 +148,8 @@ class SparseFactored:
         for other in (a, b):
             v = rng.normal(size=(self.here.system.n_freedoms, self.here.T))
             v[self.solver.fixed] = 0.0
-            for _ in range(POWERS):
+            # steps of the power iteration that estimates a spectral radius
+            for _ in range(5):
                 size = np.sqrt((v * v).sum(axis=0))
                 v = v / np.where(size > 0, size, 1.0)
                 v = self.solve((self.here.closure_rates(v) - other.closure_rates(v))[:, None])[:, 0]

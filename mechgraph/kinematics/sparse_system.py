@@ -44,9 +44,6 @@ from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.sparse import BlockFactor, BlockTriangular, Factors, Pattern, SparseFactor, SparseFactors
 from mechgraph.maths.tolerances import MOTIONS, RANKS
 
-SPARE = 2.0
-"""Rows a column that the front may have before it is condensed."""
-
 
 @dataclass(frozen=True)
 class _Reflections:
@@ -141,7 +138,8 @@ class Elimination:
 
     def _condense(self, front: Array, rows: Index) -> tuple[Array, Index]:
         """Where the front has more rows than columns, reflect it to triangular form; rows left over are self-stresses."""
-        if front.shape[0] <= SPARE * front.shape[1] + 6:
+        # rows a column that the front may have before it is condensed
+        if front.shape[0] <= 2.0 * front.shape[1] + 6:
             return front, rows
         V, T, R = householder(front)
         self._steps.append(_Reflections(rows, V, T, np.eye(R.shape[0])))
@@ -200,13 +198,6 @@ PIVOT = 1e-8
 """Pivot (against unit rows and columns) below which a bordered system counts as singular."""
 WORSE = 1e-2
 """Part of the smallest pivot at the position of choice below which another bordering is chosen."""
-RETRY = 1e-3
-"""Smallest pivot below which another bordering is tried."""
-INDEPENDENT = 1e-5
-"""Smallest over largest singular value that a determinant has to prove, far above ``RANKS.loop`` and above its own rounding."""
-BORDERS_SEED = 17
-FEWEST, MOST = 8, 25
-"""Positions from which, and unknowns a position up to which it is asked whether group by group is faster: the order costs some factors."""
 
 
 class LoopSystem(ReducedRows):
@@ -230,7 +221,8 @@ class LoopSystem(ReducedRows):
         self._match()
         self.pattern, self._constant = self._border(beside=False)
         self.first = self.factor(rows)
-        if borders is None and self.shared and not self.first.smallest_pivot > RETRY:
+        # smallest pivot below which another bordering is tried
+        if borders is None and self.shared and not self.first.smallest_pivot > 1e-3:
             own = self.first, self.pattern, self._constant
             self.pattern, self._constant = self._border(beside=True)
             self.first = self.factor(rows)
@@ -302,7 +294,8 @@ class LoopSystem(ReducedRows):
         # columns independent no decomposition is needed
         G = rows.swapaxes(1, 2) @ rows
         size = np.maximum(np.trace(G, axis1=1, axis2=2), 1.0)
-        doubtful = np.linalg.slogdet(G)[1] <= 2 * np.log(INDEPENDENT) + c * np.log(size)
+        # smallest over largest singular value that a determinant has to prove, far above ``RANKS.loop`` and above its own rounding
+        doubtful = np.linalg.slogdet(G)[1] <= 2 * np.log(1e-5) + c * np.log(size)
         some, rows = some[doubtful], rows[doubtful]
         if not some.size:
             return []
@@ -377,7 +370,7 @@ class LoopSystem(ReducedRows):
         neighbors; a random row for every column left over. Or the borders that are given.
         """
         rows, cols, data = self._inner
-        rng = np.random.default_rng(BORDERS_SEED)
+        rng = np.random.default_rng(17)
         if self.borders is not None:
             (number, support), (held, columns) = (np.indices(part.T.shape).reshape(2, -1) for part in self.borders)
             constant = np.concatenate([part.T.ravel() for part in self.borders])
@@ -436,7 +429,8 @@ class LoopSystem(ReducedRows):
     def factors(self, here: Configuration, at: Index) -> Factored:
         """The system factored at positions: of many group by group, all positions together, where that takes less time."""
         values = self.values_at(here, at)
-        if len(at) >= FEWEST and self._size <= MOST * len(at) and self.groups.pays(len(at)):
+        # the order of groups costs some factors: it is made for 8 positions or more, and up to 25 unknowns a position
+        if len(at) >= 8 and self._size <= 25 * len(at) and self.groups.pays(len(at)):
             return self.groups.factor(values)
         return SparseFactors([self.pattern.factor(one) for one in values])
 

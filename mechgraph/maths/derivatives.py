@@ -20,12 +20,6 @@ CHEBYSHEV_NOISE = 8.0 * float(np.finfo(np.float64).eps)
 DERIVATIVE_TOLERANCE = 1e-6
 """Largest estimated error of s'' of a callable, relative to max |s''| or 4 max |s| / range^2."""
 
-MISS = 1e3
-"""How many times its rounding the interpolant of a callable may miss a position."""
-
-DEEPEST_PANEL = 16
-"""How often the range of a callable is halved at most before it counts as not smooth."""
-
 
 class NotSmooth(ArithmeticError):
     """A function whose derivatives cannot be found near ``t``."""
@@ -87,7 +81,8 @@ def derivatives(
     for panel in panels:
         here = (t >= panel.left) & (t <= panel.right)
         met, velocity[here], acceleration[here] = panel.at(t[here])
-        missed = np.abs(met - position[here]) > MISS * panel.rounding
+        # how many times its rounding the interpolant of a callable may miss a position
+        missed = np.abs(met - position[here]) > 1e3 * panel.rounding
         if missed.any():
             raise NotSmooth(float(t[here][missed][0]))
     size = max(float(np.abs(panel.coefficients).sum()) for panel in panels)
@@ -114,7 +109,8 @@ def _panels(function: Callable[[Array], Array], low: float, high: float) -> list
     transform[0] /= 2.0
     done: list[_Panel] = []
     ends = [(low, high)]
-    for _ in range(DEEPEST_PANEL + 1):
+    # how often the range of a callable is halved at most before it counts as not smooth
+    for _ in range(16 + 1):
         left, right = np.array(ends).T[:, :, None]
         times = (left + right) / 2.0 + (right - left) / 2.0 * nodes
         values = function(times)

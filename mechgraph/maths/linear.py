@@ -31,14 +31,6 @@ def rank_of(sigma: Array, tolerance: float = RANK_TOLERANCE) -> int:
     return int((sigma > tolerance * sigma[0]).sum()) if sigma.size and sigma[0] > 0 else 0
 
 
-WEAK = (1e-3, 1e-8)
-"""Part of a row that must be independent of the rows chosen before: wanted, and at least."""
-VANISHING = 1e-8
-"""Size of a row below which it is not chosen."""
-KEEP = 0.1
-"""Part of the smallest singular value that may be lost by holding the columns that are asked for."""
-
-
 def independent_rows(rows: Array, candidates: list[int], count: int) -> list[int]:
     """The first candidates (in order) whose rows are independent, up to ``count``; weakly independent ones where needed.
 
@@ -47,11 +39,13 @@ def independent_rows(rows: Array, candidates: list[int], count: int) -> list[int
     chosen: list[int] = []
     basis, taken = np.empty((min(rows.shape), rows.shape[1])), set[int]()
     size = np.sqrt((rows**2).sum(axis=1))
-    for limit in WEAK:
+    # part of a row that must be independent of the rows chosen before: wanted, and at least
+    for limit in (1e-3, 1e-8):
         for i in candidates:
             if len(chosen) == count:
                 return chosen
-            if i in taken or not size[i] > VANISHING:
+            # size of a row below which it is not chosen
+            if i in taken or not size[i] > 1e-8:
                 continue
             rest = rows[i] / size[i]
             for _ in range(2):
@@ -166,7 +160,8 @@ def choose(A: Array, fixed: Index, tolerance: float = RANK_TOLERANCE, keep: Inde
         others = np.setdiff1d(free, keep)
         with_keep, without = singular_values(A[:, free]), singular_values(A[:, others])
         rank = rank_of(with_keep, tolerance)
-        if rank_of(without, tolerance) == rank and (rank == 0 or without[rank - 1] > KEEP * with_keep[rank - 1]):
+        # part of the smallest singular value that may be lost by holding the columns in ``keep``
+        if rank_of(without, tolerance) == rank and (rank == 0 or without[rank - 1] > 0.1 * with_keep[rank - 1]):
             inner = choose(A, np.union1d(fixed, keep), tolerance)
             held = np.sort(np.concatenate([inner.held, keep]))
             return Choice(inner.rows, inner.cols, held, np.asarray(fixed, dtype=np.intp))

@@ -13,10 +13,6 @@ import scipy
 from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.tolerances import PATH
 
-UNMET = 30.0
-"""Residual over the step that takes it away from which on it is asked whether it does: rows are of size one, a few freedoms each."""
-
-
 LONGEST = 0.5
 """Longest step (largest increment) that is taken at once."""
 EVERY = slice(None)
@@ -275,7 +271,8 @@ class _Run:
 
     def _unmet(self, small: Mask, step: Array, size: Array) -> Mask | None:
         """Where a last step leaves the residual of rows that were left out as dependent as large as it is: they are not. None: nowhere."""
-        doubt = small & (self.left > np.maximum(UNMET * size, 10.0 * PATH.accepted))
+        # residual over the step that takes it away from which on it is asked whether it does: rows are of size one, a few freedoms each
+        doubt = small & (self.left > np.maximum(30.0 * size, 10.0 * PATH.accepted))
         if not np.count_nonzero(doubt):
             return None
         rest = largest(self.point.residual + self.point.closure_rates(step))

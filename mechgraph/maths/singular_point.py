@@ -36,22 +36,13 @@ from mechgraph.maths.tracker import LEAD, End, Follower, Tracks
 
 WINDOW = 5e-3
 """Distance from a crossing below which states and rates are interpolated: accelerations lose rounding over its cube."""
-WITHIN = 0.4
-"""Part of the span of the sides within which they are: towards the outermost sides polynomials lose digits."""
-NEAREST = 1e-3
-"""Distance from a crossing below which a node is not used: its sensitivities lose rounding over the square."""
 SIDES = np.array([-6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6]) / 6
 """Places of the states on both sides, in parts of a span."""
 SPANS = (0.08, 0.02, 0.005)
 """Spans tried. With the first, polynomials through the sides are exact to rounding where the branch is analytic within a distance of
 0.5; the others serve where another singular position is near."""
-SCATTER = 3.0
-"""Factor within which the answer to a residual times the distance is constant where there is no other singular position near."""
-PROBE_SEED = 3
 BETWEEN = np.linspace(-1.0, 1.0, 8)
 """Places between the nearest sides at which interpolated states are asked how they close; not the crossing itself."""
-CLOSES = 1e-12
-"""Residual up to which they do: the roundings of a thousand loops add up in it."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +59,8 @@ class Crossing:
     @property
     def window(self) -> float:
         """Distance from the crossing up to which positions are interpolated."""
-        return min(WINDOW, WITHIN * float(self.sides.place[-1] - self.place))
+        # part of the span of the sides within which they are: towards the outermost sides polynomials lose digits
+        return min(WINDOW, 0.4 * float(self.sides.place[-1] - self.place))
 
     def drives(self, places: Array) -> Array:
         """Path values ``(d, n)`` at places beside the crossing."""
@@ -83,7 +75,8 @@ class Crossing:
         f = self.problem.factored(point, which)
         sizes = (f.residual_size(r) for r in (point.residual, np.ones_like(point.residual) * point.rounding))
         miss, rounding = (float(size.max()) for size in sizes)
-        return miss, max(CLOSES, rounding)
+        # residual with which states close: the roundings of a thousand loops add up in it
+        return miss, max(1e-12, rounding)
 
     @property
     def miss(self) -> float:
@@ -148,7 +141,8 @@ def passed(follower: Follower, nodes: Nodes, track: int, place: float) -> Crossi
     mine = nodes.take(nodes.track == track)
     before = follower.with_lead(mine.take(mine.place < place), track)
     mine = Nodes.join([before, mine.take(mine.place > place)])
-    mine = mine.take(np.abs(mine.place - place) > NEAREST)
+    # distance from a crossing below which a node is not used: its sensitivities lose rounding over the square
+    mine = mine.take(np.abs(mine.place - place) > 1e-3)
     off = mine.drive - drive[:, None] - direction[:, None] * (mine.place - place)
     mine = mine.take(np.abs(off).max(axis=0, initial=0.0) < 1e-12)
     if not (mine.place > place).any() or not (mine.place < place).any():
@@ -163,7 +157,8 @@ def passed(follower: Follower, nodes: Nodes, track: int, place: float) -> Crossi
         x = through(problem, picked, base, direction, at)
         found = follower.newton.nodes(x, drives, base.track, base.which, PATH.node)
         nearness = _answer(problem, found.x, drives, base.track, found.which) * np.abs(at - place)
-        regular = nearness.max() <= SCATTER * nearness.min()
+        # factor within which the answer to a residual times the distance is constant where there is no other singular position near
+        regular = nearness.max() <= 3.0 * nearness.min()
         if found.done.all() and (found.correction <= 1e-2 * span).all() and regular:
             return Crossing(
                 problem, track, place, drive, direction, Nodes.closed(found, drives, base.track, at, sure=True)
@@ -174,7 +169,7 @@ def passed(follower: Follower, nodes: Nodes, track: int, place: float) -> Crossi
 def _answer(problem: Problem, x: Array, drive: Array, tracks: Index, which: Index) -> Array:
     """How much states ``(nx, n)`` answer to a random residual: as the condition one over the distance, but no matter of pivots."""
     point = problem.at(x, drive, tracks)
-    b = np.random.default_rng(PROBE_SEED).normal(size=len(point.residual))
+    b = np.random.default_rng(3).normal(size=len(point.residual))
     return largest(problem.factored(point, which).solve(np.repeat(b[:, None, None], x.shape[1], axis=2))[:, 0])
 
 
@@ -182,16 +177,8 @@ _DISTANCES = 4e-3 * 3.0 ** np.arange(4)
 """Distances of the nodes from which the sides are predicted."""
 
 
-NODES = 5
-"""Nodes from which the branch is extrapolated."""
-APART = 0.05
-"""Distance between them."""
-LONGEST_LEAP = 0.2
-"""Distance of a crossing behind the last node up to which it is leapt at."""
 BEHIND = np.array([0.02, 0.05, 0.09])
 """Distances of the nodes behind a crossing."""
-OFF = 1e-2
-"""Correction of a node behind, against its distance from the crossing, from which on it may be on another branch."""
 
 
 def leapt(follower: Follower, nodes: Nodes) -> tuple[Crossing, Nodes] | None:
@@ -207,10 +194,12 @@ def leapt(follower: Follower, nodes: Nodes) -> tuple[Crossing, Nodes] | None:
         return None
     ahead = -inverse[-1] / fall[-1]
     crossing = float(place[-1] + ahead)
-    if not ahead < LONGEST_LEAP:
+    # distance of a crossing behind the last node up to which it is leapt at
+    if not ahead < 0.2:
         return None
     # steps are short where they had to be halved: nodes as far apart as those behind
-    spread = np.unique([int(np.argmin(np.abs(last.place - at))) for at in last.place[-1] - APART * np.arange(NODES)])
+    # the branch is extrapolated from five nodes that are 0.05 apart
+    spread = np.unique([int(np.argmin(np.abs(last.place - at))) for at in last.place[-1] - 0.05 * np.arange(5)])
     behind = _behind(follower, last.take(spread), crossing)
     if behind is None:
         return None
@@ -237,7 +226,8 @@ def _behind(follower: Follower, last: Nodes, crossing: float) -> Nodes | None:
     direction = (drive[:, 0] - base.drive[:, 0]) / (at[0] - base.place[0])
     x = through(problem, last, base, direction, at)
     found = follower.newton.nodes(x, drive, base.track, base.which, PATH.node)
-    if not found.done.all() or (found.correction > OFF * BEHIND).any():
+    # correction of a node behind, against its distance from the crossing, from which on it may be on another branch
+    if not found.done.all() or (found.correction > 1e-2 * BEHIND).any():
         return None
     return Nodes.closed(found, drive, base.track, at, sure=True)
 

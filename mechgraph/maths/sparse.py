@@ -35,9 +35,6 @@ from mechgraph.maths.linear import inverses, rank_of, singular_values
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import RANKS
 
-KEEP_PIVOT = 0.1
-"""Part of the largest candidate that the pivot of the first factorization needs to be taken again."""
-
 
 class Pattern:
     """Places ``(rows, cols)`` of the nonzeros of a square matrix; order of columns and pivots of the first factorization are kept."""
@@ -69,7 +66,8 @@ class Pattern:
                 return SparseFactor(self._matrix(values), None, self._row_place, self._col_place)
             self._known = True
             self._arrange(first.lu.perm_r.astype(np.intp), first.lu.perm_c.astype(np.intp))
-        lu = self._factored(values, "NATURAL", KEEP_PIVOT)
+        # part of the largest candidate that the pivot of the first factorization needs to be taken again
+        lu = self._factored(values, "NATURAL", 0.1)
         return SparseFactor(self._matrix(values), lu, self._row_place, self._col_place)
 
     def _matrix(self, values: Array) -> scipy.sparse.csc_array:
@@ -172,10 +170,6 @@ def _to_places(b: Array, order: Index) -> Array:
     return out
 
 
-WEIGHT = 1e-4
-"""Weight of the norm in ``least_solution``, beside rows of size one."""
-
-
 def least_solution(A: scipy.sparse.csc_array, b: Array) -> Array:
     """The solution ``(n,)`` of ``A x = b`` with independent rows ``A (m, n)``, of least norm where ``n > m``, refined once.
 
@@ -184,7 +178,8 @@ def least_solution(A: scipy.sparse.csc_array, b: Array) -> Array:
     """
     m, n = A.shape
     if m != n:
-        A = scipy.sparse.block_array([[WEIGHT * scipy.sparse.eye_array(n), A.T], [A, None]], format="csc")
+        # weight of the norm in ``least_solution``, beside rows of size one
+        A = scipy.sparse.block_array([[1e-4 * scipy.sparse.eye_array(n), A.T], [A, None]], format="csc")
         b = np.concatenate([np.zeros(n), b])
     if not b.size:
         return b
@@ -195,10 +190,6 @@ def least_solution(A: scipy.sparse.csc_array, b: Array) -> Array:
 
 WHOLE = 400
 """Unknowns up to which a singular value decomposition is a matter of a tenth of a second."""
-REGULAR = 1e-9
-"""Distance from a singular matrix, rows and columns of size one, below which an LU is not trusted."""
-ZERO_ROW = 1e-13
-"""Size of a row, against the largest, that is rounding of zeros."""
 OPEN = 1e-7
 """Part that an unknown has in the solutions without a right side, above which it is not unique; relative residual of a contradiction."""
 
@@ -217,7 +208,8 @@ def unique_solution(A: scipy.sparse.csc_array, b: Array) -> Array:
     ):  # SuperLU itself fails on a matrix without that rank
         places = K.tocoo()
         factor = Pattern(places.row.astype(np.intp), places.col.astype(np.intp), n).factor(places.data)
-        if factor.distance > REGULAR:
+        # distance from a singular matrix, rows and columns of size one, below which an LU is not trusted
+        if factor.distance > 1e-9:
             return np.asarray(factor.solve(b[:, None])[:, 0] / columns)
     U, s, Vt = np.linalg.svd(K.toarray())
     rank = rank_of(s)
@@ -232,16 +224,9 @@ def _unit_rows(A: scipy.sparse.csc_array) -> tuple[Array, scipy.sparse.csc_array
     size = np.zeros(A.shape[0])
     places = A.tocoo()
     np.maximum.at(size, places.row, np.abs(places.data))
-    size[size <= ZERO_ROW * size.max(initial=0.0)] = 1.0
+    # size of a row, against the largest, that is rounding of zeros
+    size[size <= 1e-13 * size.max(initial=0.0)] = 1.0
     return size, scipy.sparse.csc_array(scipy.sparse.diags_array(1.0 / size) @ A)
-
-
-WIDEST, STEPS = 60, 3
-"""Largest block, and number of steps a system, up to which blocks are faster.
-
-Measured by ``tests/benchmarks/bench_large.py --groups``: on chains of N groups blocks and whole systems take the same time for 8 systems
-of 20 steps, 32 of 100, 60 of 400; a dense inverse of 60 rows takes as long as sparse factors.
-"""
 
 
 @dataclass(frozen=True)
@@ -335,7 +320,9 @@ class BlockTriangular:
 
     def pays(self, T: int) -> bool:
         """Whether ``T`` systems are solved in less time by blocks, all together, than one after the other as a whole."""
-        return self.blocks > 0 and max(self.sizes) <= WIDEST and len(self._steps) <= STEPS * T
+        # on chains of N groups both take the same time for 8 systems of 20 steps, 32 of 100, 60 of 400; a dense inverse of 60 rows takes
+        # as long as sparse factors (``tests/benchmarks/bench_large.py --groups``)
+        return self.blocks > 0 and max(self.sizes) <= 60 and len(self._steps) <= 3 * T
 
     def factor(self, values: Array) -> BlockFactor:
         """The systems with values ``(T, entries)``, factored."""
@@ -420,11 +407,8 @@ def _levels(before: Index, after: Index, count: int) -> Index:
 
 
 """Rows or columns up to which singular values are those of the whole matrix (a tenth of a second at most)."""
-LANCZOS_STEPS = 24
-"""Lanczos steps for the smallest singular value of a larger one."""
 LANCZOS_SETTLED = 1e-3
 """Relative change at which these steps end."""
-POWER_SEED = 3
 
 
 class LeastNorm:
@@ -457,7 +441,7 @@ def singular_ratio(K: scipy.sparse.csr_array, rank: int, factored: Callable[[], 
         s = singular_values(K.toarray())
         return float(s[rank - 1] / s[0])
     normal = factored()
-    start = np.random.default_rng(POWER_SEED).normal(size=K.shape[1])
+    start = np.random.default_rng(3).normal(size=K.shape[1])
     largest = _largest(lambda v: K.T @ (K @ v), start)
 
     def inverse(v: Array) -> Array:
@@ -473,7 +457,8 @@ def _largest(apply: Callable[[Array], Array], v: Array) -> float:
     alpha: list[float] = []
     beta: list[float] = []
     value = 0.0
-    for _ in range(LANCZOS_STEPS):
+    # Lanczos steps for the smallest singular value of a larger one
+    for _ in range(24):
         w = apply(basis[-1])
         alpha.append(float(w @ basis[-1]))
         for u in basis:

@@ -402,8 +402,8 @@ MISSED, MISSED_AGAIN = 1e-4, 1e-6
 first member, and at the one that is kept."""
 MOST_FOUND = 1200
 """Assemblies of one member from which on they are not looked for any further."""
-LOOP_ROUNDS, MOST_TRACKED = 60, 60_000
-"""Rounds of loops at a member, and tracks in all, after which they are not either."""
+MOST_TRACKED = 60_000
+"""Tracks in all, after which they are not either."""
 CANDIDATES = 6
 """Members of which the best one is kept."""
 
@@ -538,7 +538,8 @@ class _Group:
     def grow(self, missed: float, rng: np.random.Generator, progress: Callable[[str], None] | None) -> None:
         """Loops until the chance of one having been missed is small."""
         family = self.equations.family
-        for _ in range(LOOP_ROUNDS):
+        # rounds of loops at a member
+        for _ in range(60):
             if (N := self.x.shape[1]) >= self.most or self.chance <= missed or self.followed >= MOST_TRACKED:
                 break
             if progress is not None:

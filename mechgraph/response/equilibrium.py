@@ -408,8 +408,8 @@ def _stability(d: Derivatives, kept: Array) -> bool | None:
     return False if (s.real > slow).any() else True if (s.real < -slow).all() and not d.bent else None
 
 
-MODES_SHOWN, AMPLITUDES_SHOWN = 8, 4
-"""Most motions, and of each the most amplitudes, that are shown."""
+SHOWN = 8
+"""Most motions, or coordinates, that are shown."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -437,9 +437,7 @@ class Linearized(Shown):
         time = self.mechanism.units.get("time", "")
         per = unit_of(self.mechanism.units, (0, 0, -1))
         rows = []
-        for w, ratio, shape in zip(
-            self.frequencies[:MODES_SHOWN], self.damping[:MODES_SHOWN], self.modes[:MODES_SHOWN], strict=False
-        ):
+        for w, ratio, shape in zip(self.frequencies[:SHOWN], self.damping[:SHOWN], self.modes[:SHOWN], strict=False):
             swings = (number(w), number(w / (2 * np.pi))) if np.isfinite(w) else ("none", "")
             told = (number(ratio),) if w != 0.0 else ("free",)
             rows.append((*swings, *told, " ".join(f"{name} {abs(shape[name]):.3g}" for name in self._told(shape))))
@@ -467,7 +465,7 @@ class Linearized(Shown):
             # difference of the rates of two freedoms up to which they move alike, as two hinges on one line do
             if not any(np.abs(row).max() <= 1e-9 * np.abs(self.motions[i]).max() for row in rows):
                 told.append(i)
-        return [names[i] for i in told[:AMPLITUDES_SHOWN]]
+        return [names[i] for i in told[:4]]
 
     @cached_property
     def A(self) -> Array:
