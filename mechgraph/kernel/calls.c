@@ -91,7 +91,7 @@ int mgk_along(const int *I, const double *P, void *memory, int count, int stored
   FOR(i, count) {
     double *own = x + (size_t)i * m.states, *term = out + 6 * (size_t)i, force[3];
     set_drives(&m, own, u + i);
-    const int status = closed(&m, &w, own, w.a.matrix);
+    const int status = closed(&m, &w, own, w.a.matrix, CLOSED);
     if (status) return status;
     term[5] = made_inverse(&m, &w, w.a.matrix);
     if (!(term[5] <= FAIR)) return MGK_SINGULAR;
@@ -126,11 +126,11 @@ static int led(const Model *m, Work *w, double part) {
   Node *a = &w->a, *b = &w->b, *middle = &w->before;
   double *step = w->increment;
   memcpy(middle->x, a->x, m->states * sizeof(double));
-  if (closed(m + 1, w, middle->x, middle->matrix)) return 0;
+  if (closed(m + 1, w, middle->x, middle->matrix, CLOSED)) return 0;
   difference(m, middle->x, a->x, step);
   FOR(c, columns) step[c] *= rest / part;
   advance(m, middle->x, step, b->x);
-  if (closed(m + 2, w, b->x, b->matrix)) return 0;
+  if (closed(m + 2, w, b->x, b->matrix, CLOSED)) return 0;
   b->condition = made_inverse(m, w, b->matrix);
   FOR(i, n) FOR(j, n) {
     double whole = 0.0, bend = 0.0;
@@ -163,7 +163,7 @@ void mgk_lead(const int *I, int count, int numbers, int apart, double part, cons
     double *own = x + (size_t)i * m->states;
     if (apart || !i) {
       memcpy(w.a.x, own, m->states * sizeof(double));
-      w.a.condition = closed(m, &w, w.a.x, w.a.matrix) ? INFINITY : made_inverse(m, &w, w.a.matrix);
+      w.a.condition = closed(m, &w, w.a.x, w.a.matrix, CLOSED) ? INFINITY : made_inverse(m, &w, w.a.matrix);
     }
     whole[i] = led(m, &w, part);
     if (whole[i]) memcpy(own, w.b.x, m->states * sizeof(double));

@@ -20,13 +20,15 @@ typedef double magnitude;
 
 /* Tolerances; those of the package in maths/tolerances.py have the same names there. */
 static const magnitude CLOSED = 2e-14;      /* closure residual that Newton aims at, over the distance from the origin */
+static const magnitude PASSED = 1e-9;       /* the same of a place that is only passed: 4 FAIR PASSED < ALONE / FAIR */
 static const magnitude ACCEPTED = 1e-12;    /* residual that counts as closed where rounding lets it come no nearer */
 static const magnitude CORRECTION = 0.06;   /* largest correction that a prediction may need */
 static const magnitude REUSED = 1e-5;       /* correction below which the factors before it serve for the next one */
 static const magnitude FAIR = 3e3;          /* condition number above which nothing is decided here */
 static const magnitude DEPARTURE = 0.5;     /* largest change of the closure matrix over a step, against its inverse at the end */
 static const magnitude ALONE = 0.05;        /* part of the inverse condition, over rates, up to which another branch is not as near */
-static const magnitude LONGEST = 0.35;      /* longest step */
+static const magnitude LONGEST = 0.7;       /* longest step */
+static const magnitude NEAREST = 0.7;       /* longest step over that on which the closure matrix changes by as much as it is */
 static const magnitude SHORTEST = 2e-3;     /* step below which the careful follower of the package takes over */
 static const magnitude INDEPENDENT = 1e-9;  /* part of the closure rates that drives may leave open */
 static const magnitude DRIVERS_ALONE = 1e-9;/* part below which the reactions of a self-stress count as none */
@@ -50,10 +52,10 @@ typedef struct {
       *inertia, *base, *border, *coefficient, *constant, *load_number;
 } Model;
 
-/* A place on the path: state, rates and accelerations along the way, the closure matrix, its rate along the way and the inverse of its
- * independent rows. */
+/* A place on the path: state, rates and accelerations along the way, the closure matrix, its rate along the way, the inverse C^-1 of its
+ * independent rows and C^-1 C', and how far it changes by as much as it is, of first order. */
 typedef struct {
-  double *x, *rate, *bend, *matrix, *matrix_rate, *inverse, *at, *passive, *twist, *pose, condition;
+  double *x, *rate, *bend, *matrix, *matrix_rate, *inverse, *change, *at, *passive, *twist, *pose, condition, reach;
   int *row;
 } Node;
 
@@ -130,7 +132,7 @@ static size_t lay_out(const Model *m, double *memory, Work *w) {
   FOR(i, 3) {
     nodes[i]->x = taken(&memory, &size, m->states), nodes[i]->rate = taken(&memory, &size, c), nodes[i]->bend = taken(&memory, &size, c);
     nodes[i]->matrix = taken(&memory, &size, r * u), nodes[i]->matrix_rate = taken(&memory, &size, r * u);
-    nodes[i]->inverse = taken(&memory, &size, u * u), nodes[i]->row = (int *)taken(&memory, &size, u);
+    nodes[i]->inverse = taken(&memory, &size, u * u), nodes[i]->change = taken(&memory, &size, u * u), nodes[i]->row = (int *)taken(&memory, &size, u);
     nodes[i]->at = taken(&memory, &size, 1);
     nodes[i]->passive = taken(&memory, &size, q * c), nodes[i]->twist = taken(&memory, &size, 6 * q), nodes[i]->pose = taken(&memory, &size, 12 * q);
   }
@@ -560,13 +562,13 @@ static magnitude completed(const Model *m, Work *w, const double *driven, const 
 }
 
 #ifndef MGK_COMPLEX
-/* Closed by Newton from x, in place: evaluated and factored there afterwards, the matrix kept where there is a place for it. */
-static int closed(const Model *m, Work *w, double *x, double *matrix) {
+/* Closed by Newton from x up to `enough`, in place: evaluated and factored there afterwards, the matrix kept where there is a place for it. */
+static int closed(const Model *m, Work *w, double *x, double *matrix, double enough) {
   double before = INFINITY, sum = 0.0, step = INFINITY;
   FOR(i, ITERATIONS) {
     const double left = evaluate(m, w, x);
     if (!(left < 1.0)) return MGK_STEP;
-    const int done = left <= CLOSED * w->reach || (left >= 0.5 * before && left <= ACCEPTED * w->reach);
+    const int done = left <= enough * w->reach || (left >= 0.5 * before && left <= ACCEPTED * w->reach);
     if (done || !(step < REUSED)) {
       fill(m, w->S, w->middle, NULL, NULL, w->lu);
       add_border(m, w, w->lu);
@@ -1199,12 +1201,16 @@ static void coordinates(const Model *m, Work *w, const double *x, double *out) {
 
 /* Rotation vectors continued up to a place of the step: near whole turns axes swing round within a part of a step. */
 static void continued(const Model *m, Work *w, double at) {
-  const double from = w->told, h = *w->b.at - *w->a.at;
-  int turns = 0;
-  FOR(f, m->factors) turns |= m->kind[f] == MGK_ROTATION;
+  const double from = w->told, whole = 8.0 * atan(1.0);
+  double part = 0.0; /* of the way to a whole turn, over that of the step */
+  FOR(f, m->factors) if (m->kind[f] == MGK_ROTATION) {
+    const int c = m->column[f];
+    const double left = w->angle[f] - whole * floor(w->angle[f] / whole + 0.5);
+    part = fmax(part, fmax(size_of(w->a.rate + c, 3), size_of(w->b.rate + c, 3)) / fmax(fabs(left), 1e-9));
+  }
   w->told = at;
-  if (!turns || !(at > from)) return;
-  const int n = (int)ceil(TOLD * (at - from) / h);
+  if (!(at > from)) return;
+  const int n = (int)ceil(TOLD * fmin(part * (at - from), (at - from) / (*w->b.at - *w->a.at)));
   for (int i = 1; i < n; i++) {
     between(m, w, &w->a, &w->b, from + (at - from) * i / n, w->trial);
     coordinates(m, w, w->trial, w->dq);
@@ -1238,8 +1244,28 @@ static double made_inverse(const Model *m, Work *w, const double *matrix) {
   return largest * inverse;
 }
 
+static double sum_of_sizes(const double *a, const double *b, int n) {
+  double out = 0.0;
+  FOR(i, n) out += fabs(a[i]) * b[i];
+  return out;
+}
+
+/* A bound of the spectral radius of a matrix of the sizes of M (Collatz and Wielandt), independent of the units of rows and columns. */
+static double radius(const double *M, int n, double *v) {
+  double best = INFINITY, *next = v + n;
+  FOR(i, n) v[i] = 1.0;
+  FOR(pass, 4) {
+    double ratio = 0.0, most = 0.0;
+    FOR(i, n) next[i] = sum_of_sizes(M + i * n, v, n), ratio = raised(ratio, next[i] / v[i]), most = raised(most, next[i]);
+    best = fmin(best, ratio);
+    FOR(i, n) v[i] = raised(raised(1e-300, 1e-3 * most), next[i]);
+  }
+  return n ? best : 0.0;
+}
+
 /* What a node is beside its closed state, at which it has just been factored: rates along the path, those of the matrix, the condition. */
 static int made_node(const Model *m, Work *w, Node *node) {
+  const int n = m->unknowns;
   memset(w->still, 0, m->drives * sizeof(double));
   const int status = rates(m, w, w->direction, w->still);
   if (status) return status;
@@ -1256,22 +1282,12 @@ static int made_node(const Model *m, Work *w, Node *node) {
   }
   fill(m, w->G, w->middle, w->S, w->chord_V, node->matrix_rate);
   node->condition = made_inverse(m, w, node->matrix);
-  memcpy(node->inverse, w->inverse, (size_t)m->unknowns * m->unknowns * sizeof(double));
-  memcpy(node->row, w->row, m->unknowns * sizeof(int));
+  memcpy(node->inverse, w->inverse, (size_t)n * n * sizeof(double));
+  memcpy(node->row, w->row, n * sizeof(int));
+  memset(node->change, 0, (size_t)n * n * sizeof(double));
+  FOR(i, n) FOR(r, n) FOR(j, n) node->change[i * n + j] += node->inverse[i * n + r] * node->matrix_rate[node->row[r] * n + j];
+  node->reach = 1.0 / fmax(radius(node->change, n, w->bound), 1e-9);
   return node->condition <= FAIR ? MGK_OK : MGK_SINGULAR;
-}
-
-/* A bound of the spectral radius of a matrix of sizes (Collatz and Wielandt), independent of the units of rows and columns. */
-static double radius(const double *M, int n, double *v) {
-  double best = INFINITY, *next = v + n;
-  FOR(i, n) v[i] = 1.0;
-  FOR(pass, 4) {
-    double ratio = 0.0, most = 0.0;
-    FOR(i, n) next[i] = dot(M + i * n, v, n), ratio = raised(ratio, next[i] / v[i]), most = raised(most, next[i]);
-    best = fmin(best, ratio);
-    FOR(i, n) v[i] = raised(raised(1e-300, 1e-3 * most), next[i]);
-  }
-  return n ? best : 0.0;
 }
 
 /* How far the closure matrix departs from that of a node on its half of a step of length h to another one (h < 0: behind the other): a bound
@@ -1279,18 +1295,18 @@ static double radius(const double *M, int n, double *v) {
 static double departed(const Model *m, Work *w, const Node *here, const Node *there, double h) {
   const int n = m->unknowns;
   const double third = h / 3.0;
-  double *whole = w->bound, *first = whole + n, *last = first + n, *off = last + n;
+  double *whole = w->bound, *last = whole + n, *off = last + n;
   FOR(i, n) {
-    memset(whole, 0, 4 * (size_t)n * sizeof(double));
+    memset(whole, 0, 3 * (size_t)n * sizeof(double));
     FOR(r, n) {
       const int row = here->row[r] * n;
-      const double g = here->inverse[i * n + r], *A = here->matrix + row, *B = there->matrix + row;
-      const double *from_a = here->matrix_rate + row, *from_b = there->matrix_rate + row;
-      FOR(j, n) whole[j] += g * (B[j] - A[j]), first[j] += g * from_a[j], last[j] += g * from_b[j], off[j] += g * w->lu[row + j];
+      const double g = here->inverse[i * n + r], *A = here->matrix + row, *B = there->matrix + row, *far = there->matrix_rate + row;
+      FOR(j, n) whole[j] += g * (B[j] - A[j]), last[j] += g * far[j], off[j] += g * w->lu[row + j];
     }
     FOR(j, n) {
-      const double near = third * first[j], far = whole[j] - third * last[j];
-      w->change[i * n + j] = raised(raised(0.5 * fabs(near), 0.25 * fabs(2.0 * near + far)), 0.125 * fabs(3.0 * (near + far) + whole[j])) + fabs(off[j]);
+      const double near = third * here->change[i * n + j], far = whole[j] - third * last[j];
+      w->change[i * n + j] =
+          raised(raised(0.5 * fabs(near), 0.25 * fabs(2.0 * near + far)), 0.125 * fabs(3.0 * (near + far) + whole[j])) + fabs(off[j]);
     }
   }
   return radius(w->change, n, w->bound);
@@ -1419,7 +1435,7 @@ static int rest_along(const Model *m, Work *w) {
     const double t = g % 2 ? point[g / 2] : -point[g / 2];
     double P[POINTS + 1], gap;
     between(m, w, &w->a, &w->b, *w->a.at + 0.5 * (1.0 + t) * h, w->trial);
-    int status = closed(m, w, w->trial, NULL);
+    int status = closed(m, w, w->trial, NULL, CLOSED);
     if (!status) status = velocities(m, w, w->direction, w->dq, &gap);
     if (status) return status;
     twist_rates(m, w, w->dq);
@@ -1447,7 +1463,7 @@ static int closed_at_rest(const Model *m, Work *w, double *x, double at, double 
   double before = INFINITY;
   FOR(turn, MOST_TURNS) {
     double most = 0.0;
-    int status = closed(m, w, x, matrix);
+    int status = closed(m, w, x, matrix, CLOSED);
     if (!m->passives || *w->b.at <= *w->a.at) return status;
     if (!status) status = passive_motions(m, w);
     if (status) return status;
@@ -1502,6 +1518,7 @@ static int follow(const Model *m, Work *w, Asked *asked, const double *begin, co
   int known = 0, status;
   while (*w->a.at < length) {
     if (++w->steps > MOST_STEPS) return MGK_TOO_FAR;
+    h = fmin(h, NEAREST * w->a.reach);
     const double left = length - *w->a.at, step = h >= left ? left : h > 0.5 * left ? 0.5 * left : h;
     *w->b.at = step == left ? length : *w->a.at + step;
     if (known) {
@@ -1513,7 +1530,7 @@ static int follow(const Model *m, Work *w, Asked *asked, const double *begin, co
     FOR(i, m->drives) drive[i] = step == left ? end[i] : begin[i] + *w->b.at * w->direction[i];
     set_drives(m, w->b.x, drive);
     double grown = 0.5;
-    status = closed(m, w, w->b.x, w->b.matrix);
+    status = closed(m, w, w->b.x, w->b.matrix, PASSED);
     if (!status) status = made_node(m, w, &w->b);
     if (!status && !certified(m, w, &grown)) status = MGK_STEP;
     if (!status && m->passives) status = rest_along(m, w);
@@ -1554,7 +1571,7 @@ static int follow(const Model *m, Work *w, Asked *asked, const double *begin, co
 static int first_node(const Model *m, Work *w, const double *x) {
   memcpy(w->a.x, x, m->states * sizeof(double));
   *w->a.at = w->told = 0.0;
-  int status = closed(m, w, w->a.x, w->a.matrix);
+  int status = closed(m, w, w->a.x, w->a.matrix, CLOSED);
   if (!status) status = made_node(m, w, &w->a);
   if (!status) set_border(m, w, &w->a);
   return status;
@@ -1573,19 +1590,19 @@ static double towards(int n, const double *p, const double *q, double *out) {
 static int along(const Model *m, Work *w, Asked *asked) {
   const int d = m->drives;
   while (asked->done < asked->count) {
-    const double *first = asked->q + at_place(asked, asked->done) * d;
-    double length = towards(d, w->drive, first, w->direction);
-    int until = asked->done + 1, status;
-    if (length <= 1e-14 * fmax(1.0, size_of(w->drive, d))) {
+    const double here = 1e-14 * fmax(1.0, size_of(w->drive, d));
+    double length = 0.0;
+    int until = asked->done, status;
+    while (until < asked->count && (length = towards(d, w->drive, asked->q + at_place(asked, until) * d, w->direction)) <= here) until++;
+    if (length <= here) {
       FOR(i, d) w->direction[i] = i == 0;
       if ((status = first_node(m, w, w->x))) return status;
       *w->b.at = 0.0, w->b.condition = w->a.condition;
       memcpy(w->b.x, w->a.x, m->states * sizeof(double));
-      if ((status = read_off(m, w, asked, 0.0))) return status;
-      asked->done++;
+      for (; asked->done < until; asked->done++) if ((status = read_off(m, w, asked, 0.0))) return status;
       continue;
     }
-    for (; until < asked->count; until++) {
+    for (until++; until < asked->count; until++) {
       const double *last = asked->q + at_place(asked, until - 1) * d, *next = asked->q + at_place(asked, until) * d;
       double ahead = 0.0, square = 0.0;
       FOR(i, d) ahead += (next[i] - last[i]) * w->direction[i], square += (next[i] - last[i]) * (next[i] - last[i]);
@@ -1622,7 +1639,7 @@ int mgk_start(const int *I, const double *P, void *state) {
   if (I[MGK_IS_FORMAT] != MGK_FORMAT) return MGK_FORMAT_ERROR;
   opened(I, P, state, &m, &w);
   begin(&m, &w);
-  const int status = closed(&m, &w, w.x, NULL);
+  const int status = closed(&m, &w, w.x, NULL, CLOSED);
   coordinates(&m, &w, w.x, w.record + m.states);
   return status;
 }

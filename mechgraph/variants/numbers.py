@@ -217,7 +217,7 @@ def _pair_field(m: Mechanism, k: int, rest: str) -> Field | ItemField | str | No
 
 
 def _chain_field(m: Mechanism, name: str, what: str, index: int) -> ChainField | str:
-    numbers = chain_numbers(m)
+    numbers = m.once(chain_numbers)
     if numbers is None:
         return f"{name!r}: mechanism {m.name!r} is no chain with twist, length and offset of every link"
     if index >= numbers.shape[1]:
@@ -387,7 +387,7 @@ def _load_of(load: Load, i: int) -> Load:
 
 def field_values(m: Mechanism, fields: Mapping[str, AnyField]) -> dict[str, float]:
     """Declared values of fields."""
-    numbers, chained = declared(m), chain_numbers(m)
+    numbers, chained = declared(m), m.once(chain_numbers)
     out = {}
     for name, field in fields.items():
         if isinstance(field, Field):
@@ -457,7 +457,7 @@ def _chain_markers(
     m: Mechanism, arrays: Mapping[str, Array], chained: Sequence[tuple[ChainField, Array]], count: int
 ) -> dict[str, Array]:
     """Point, axis and second directions of a chain some of whose numbers vary; other markers stay unchanged."""
-    start = chain_numbers(m)
+    start = m.once(chain_numbers)
     assert start is not None
     numbers = np.repeat(start[:, :, None], count, axis=2)
     for field, row in chained:
