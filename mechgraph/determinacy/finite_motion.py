@@ -4,7 +4,8 @@ Finite mobility: the nullity at regular positions reached by a motion, confirmed
 A position is regular where the nearby closed positions form a manifold whose dimension is the nullity n of the closure Jacobian.
 That is confirmed by actual motion: after a random step in the null space the rows that are independent here close all loops, so
 that the others depend on them there too and the rank is constant. Where that fails at every step size, the position is a change point
-or shaky; random steps reach nearby positions, where the test is repeated. If none of these is regular, each direction v of the null
+or shaky; steps along what goes on to second order (below) and random ones reach nearby positions, where the test is repeated: branches
+of several dimensions may meet, of which random steps alone find one now and then. If none of these is regular, each direction v of the null
 space N is tried alone, and what is left of it once the loops are closed by the smallest change is compared with it:
 
     kept = N^T (x' - x) / h,   x' closed;
@@ -28,7 +29,8 @@ Source: Connelly and Servatius, Higher-order rigidity: what is the proper defini
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -116,8 +118,29 @@ class _Closed:
     def steps(self, rng: np.random.Generator) -> Iterator[tuple[Array, Array]]:
         """States to which random steps lead, and the increments from here; those that do not close or come back left out."""
         # random steps away from a position that is not regular
-        for _ in range(6):
-            x = self.moved(self.random(rng), TRIAL_STEPS[0])
+        yield from self._away(self.random(rng) for _ in range(6))
+
+    def along_branches(self) -> Iterator[tuple[Array, Array]]:
+        """The same for steps along what goes on to second order: from each set of such motions, by their dimension, the largest first."""
+        n = self.N.shape[1]
+        if n > BRANCHING_MOTIONS:
+            return
+        rng = np.random.default_rng(STEPS_SEED)
+        stress = self.closure.random_stress(rng, min(self.closure.count - self.closure.rank, n + 1))
+        motions = self.closure.reduced.scale[:, None] * self.N
+        curvature = _Curvature(self.system, self.x, motions, stress, np.zeros((0, n)))
+        # random starts; every set attracts a part of them
+        first = _unit(rng.normal(size=(n, 24)))
+        a, error = closest_zeros(
+            curvature.at, _CurvaturePoint.descent, lambda a, step: _unit(a + step), first, tolerance=BRANCH_RESIDUAL
+        )
+        a = a[:, error < 1e3 * BRANCH_RESIDUAL]
+        fixed = np.linalg.matrix_rank(curvature.at(a).derivatives, tol=SAME) if a.size else np.zeros(0)
+        yield from self._away(a[:, np.argmax(fixed == rank)] for rank in np.unique(fixed))
+
+    def _away(self, directions: Iterable[Array]) -> Iterator[tuple[Array, Array]]:
+        for v in directions:
+            x = self.moved(v, TRIAL_STEPS[0])
             if x is not None and np.abs(self.change(x)).max() > MOVED * TRIAL_STEPS[0]:
                 yield x, self.change(x)
 
@@ -233,12 +256,14 @@ def _near_by(start: _Closed, rng: np.random.Generator) -> FiniteMotion:
     """The mobility about a position that is not regular: the largest of those at positions reached from it."""
     best = FiniteMotion(0, start.closure.rank)
     rank = best.rank_nearby
-    for x, change in start.steps(rng):
+    for x, change in itertools.chain(start.along_branches(), start.steps(rng)):
         length, there = float(np.abs(change).max()), start.reached(x)
         rank = max(rank, there.closure.rank)
-        if not there.N.shape[1]:
-            continue
-        dimension = there.N.shape[1] if there.regular(there.random(rng)) else there.dimension()
+        dimension = there.N.shape[1]
+        if dimension and not there.regular(there.random(rng)):
+            # this near to where branches meet a step may cross to another one: only where nothing else is known
+            near = length < 2 * TRIAL_STEPS[1]
+            dimension = 0 if near and best.mobility else there.dimension()
         if dimension > best.mobility:
             v = there.N.T @ (change / there.closure.reduced.scale)
             best = FiniteMotion(min(dimension, start.N.shape[1]), rank, (there, v), length)
@@ -293,14 +318,27 @@ class _CurvaturePoint:
     def __init__(self, curvature: _Curvature, a: Array) -> None:
         self.curvature, self.x, self.residual = curvature, a, curvature.residual(a)
 
-    def steps(self) -> Array:
-        """Steps of least norm to a zero; differences are exact, as the residual is quadratic."""
+    @cached_property
+    def derivatives(self) -> Array:
+        """``(T, m, n)`` in the multiples; differences are exact, as the residual is quadratic."""
         n, T = self.x.shape
         shifted = np.repeat(self.x, 2 * n, axis=1).reshape(n, T, 2, n)
         shifted += np.stack([np.eye(n), -np.eye(n)], axis=1)[:, None]
         r = self.curvature.residual(shifted.reshape(n, -1)).reshape(-1, T, 2, n)
-        J = 0.5 * (r[:, :, 0] - r[:, :, 1])
-        return -np.einsum("tnm,mt->nt", np.linalg.pinv(J.swapaxes(0, 1)), self.residual)
+        return np.asarray(0.5 * (r[:, :, 0] - r[:, :, 1]).swapaxes(0, 1))
+
+    def descent(self) -> Array:
+        """Steps down the sum of squares: those of Newton's method lead quadratic forms to where all vanish twice, past simple zeros."""
+        J = self.derivatives
+        return -np.einsum("tmn,mt->nt", J, self.residual) / np.maximum((J * J).sum(axis=(1, 2)), 1e-300)
+
+    def steps(self) -> Array:
+        """Steps of least norm to a zero."""
+        return -np.einsum("tnm,mt->nt", np.linalg.pinv(self.derivatives), self.residual)
+
+
+def _unit(a: Array) -> Array:
+    return np.asarray(a / np.linalg.norm(a, axis=0))
 
 
 def branches(
