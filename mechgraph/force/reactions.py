@@ -222,7 +222,7 @@ def newton_euler(problem: ForceProblem) -> Wrenches:
 
     Redundant systems through independent rows and columns.
     """
-    return _by_equations(problem, "minimal", _by_choice if problem.solver.complete else _by_sparse)
+    return _by_equations(problem, "minimal", _by_choice if problem.solver.dense else _by_sparse)
 
 
 def printed(problem: ForceProblem) -> Wrenches:

@@ -105,7 +105,7 @@ def own_scale(here: Configuration, t: int) -> tuple[Array, Array] | None:
 class DenseFactored:
     """Inverses of the independent rows and columns, all positions of a form together."""
 
-    complete = True
+    dense = complete = True
     groups = 0
 
     def __init__(self, forms: list[Form], fixed: Index, J: Array, which: Index) -> None:

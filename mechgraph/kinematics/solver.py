@@ -34,10 +34,11 @@ Part = tuple[LoopSystem, Index, Factored]
 class SparseFactored:
     """Factors of every position in its bordering, all positions of a bordering together."""
 
-    complete = False
+    dense = False
 
     def __init__(self, solver: SparseSolver, here: Configuration, which: Index, parts: list[Part]) -> None:
         self.solver, self.here, self.which, self._parts = solver, here, which, parts
+        self.complete = max((form.redundant for form, _, _ in parts), default=0) <= PROBES
         self.groups = max((form.groups.blocks for form, _, f in parts if isinstance(f, BlockFactor)), default=0)
 
     def _joined(self, values: list[Array], rows: int, width: int = 0) -> Array:
@@ -90,10 +91,10 @@ class SparseFactored:
         return self._joined(found, self.here.system.n_freedoms)
 
     def self_stresses(self, every: bool = False) -> Array:
-        """Random ones, of size one in the measure of every loop, as many as there are if ``every``; none where there is no redundancy."""
+        """Random ones, of size one in the measure of every loop, as many as there are where these are few or ``every`` is asked for."""
         rows, found = self.here.system.n_rows, []
         for form, at, factors in self._parts:
-            count = form.redundant if every else PROBES if form.redundant else 0
+            count = form.redundant if every or self.complete else PROBES if form.redundant else 0
             some = ClosureRows.of(self.here, at)
             found.append(
                 form.random_stress(factors, some, np.random.default_rng(SEED), count)
@@ -283,6 +284,8 @@ class FactoredClosure(Protocol):
     """The closure equations at a batch of positions, factored. ``m`` rows, ``F`` freedoms, ``T`` positions."""
 
     which: Index
+    dense: bool
+    """Whether matrices are dense."""
     complete: bool
     """Whether ``self_stresses`` is a basis of all self-stresses; otherwise it holds random ones that represent them."""
     groups: int
