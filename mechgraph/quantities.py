@@ -392,9 +392,14 @@ def door(function: Callable[P, R]) -> Callable[P, R]:
     def entered(*args: P.args, **named: P.kwargs) -> R:
         signature, wanted = known()
         try:
-            bound = signature.bind(*args, **named).arguments
+            given = signature.bind(*args, **named)
         except TypeError as error:
             raise DeclarationError(_called(function, args), [_call_fault(error, named, signature)]) from None
+        bound = given.arguments
+        for name in [name for name, value in bound.items() if isinstance(value, Iterator)]:
+            if (one := wanted[name]) is not None and one.fits(bound[name]):
+                bound[name] = tuple(bound[name])
+                args, named = given.args, given.kwargs  # type: ignore[assignment]
         faults = [
             wrong(value, SPOKEN.get(name, name), one.words)
             for name, value in bound.items()
@@ -403,9 +408,9 @@ def door(function: Callable[P, R]) -> Callable[P, R]:
         if faults:
             raise DeclarationError(_called(function, args), faults)
         asked = next((carried(value) for value in bound.values() if isinstance(value, Remembers)), ASKED.get())
-        if (given := bound.get("tolerances")) is not None:
-            asked = given.asked
-            args, named = _asked_with(given, args), dict(zip(named, _asked_with(given, named.values()), strict=True))  # type: ignore[assignment]
+        if (own := bound.get("tolerances")) is not None:
+            asked = own.asked
+            args, named = _asked_with(own, args), dict(zip(named, _asked_with(own, named.values()), strict=True))  # type: ignore[assignment]
         token = ASKED.set(asked)  # not by ``under``: warnings count the frames up to the caller
         try:
             with np.errstate(**FLOATING):
@@ -589,7 +594,7 @@ def _tuple(inner: tuple[Any, ...]) -> Wanted:
 
 
 def _items(one: Wanted | None, kept: bool) -> Wanted:
-    """Several values; what is read only once is not looked into."""
+    """Several values; of what is read only once the door looks at what it read."""
 
     def fits(value: Any) -> bool:
         faults: list[str] = []

@@ -7,6 +7,7 @@ reproduction.
 from __future__ import annotations
 
 import contextlib
+import copy
 import datetime
 import decimal
 import functools
@@ -316,6 +317,7 @@ def attack_call(seed: int, folder: Path) -> None:
     for _ in range(rng.choice([1, 1, 2])):
         i = rng.randrange(len(given) + len(named))
         wrong = rng.choice(WRONG)
+        wrong = copy.copy(wrong) if isinstance(wrong, Iterator) else wrong  # what is read once is left for later inputs
         if rng.random() < 0.25:
             wrong = rng.choice([[wrong], (wrong, wrong, wrong), {"A": wrong}, [wrong, 1.0], np.array([0, 1, 2, 3.0])])
         if callable(wrong) and [*[""] * len(given), *named][i] == "progress":
