@@ -21,7 +21,7 @@ import types
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import astuple, dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
@@ -43,6 +43,26 @@ def plain(value: Any) -> Any:
     if is_dataclass(value) and not isinstance(value, type):
         return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def read_off(hint: Any, value: Any, **more: Any) -> Any:
+    """Plain data of what a type describes: of a record the attributes of the value that have the names of its fields, and ``more``."""
+    origin, inner = get_origin(hint), get_args(hint)
+    if origin is Annotated:
+        return read_off(inner[0], value)
+    if origin in (Union, types.UnionType):
+        return None if value is None else read_off(inner[0], value)
+    if origin is not None and issubclass(origin, Mapping):
+        return {key: read_off(inner[1], of) for key, of in value.items()}
+    if origin is tuple and inner[-1] is Ellipsis:
+        return [read_off(inner[0], of) for of in value]
+    if is_dataclass(hint) and isinstance(hint, type):
+        hints = get_type_hints(hint, include_extras=True)
+        names = [field.name for field in fields(hint)]
+        return {n: plain(more[n]) if n in more else read_off(hints[n], getattr(value, n)) for n in names}
+    if is_dataclass(value) and not isinstance(value, type):  # a row of numbers
+        value = astuple(value)
+    return plain(value.item() if hasattr(value, "item") else value)
 
 
 def json_text(value: Any) -> str:

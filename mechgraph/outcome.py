@@ -82,9 +82,6 @@ class Call(Protocol):
 
 SystemAt = Callable[[Index], System]
 
-CONTRADICTION = 1e-6
-"""Relative part of the closure rates that drivers may leave open before they count as contradicting each other."""
-
 
 class Outcome:
     """Positions found, turned into a trajectory block by block.
@@ -271,7 +268,8 @@ class FollowedPositions(Outcome):
         if len(line.lead) < len(line.columns):
             given = line.values("position", self.batch), self._velocity, self._acceleration
             moved.contradiction = disagreement(moved, line.columns, *(values[:, places] for values in given))
-        self.contradicting[places] = moved.contradiction > CONTRADICTION
+        # relative part of the closure rates that drivers may leave open before they count as contradicting each other
+        self.contradicting[places] = moved.contradiction > 1e-6
         return BlockMotion(places, moved)
 
     def _rates(self, here: Configuration, f: FactoredClosure, places: Index) -> Rates:

@@ -33,47 +33,22 @@ BASE_UNITS = ("length", "mass", "time")
 """The base units that a mechanism may declare."""
 
 Dimension = tuple[int, int, int]
-PURE: Dimension = (0, 0, 0)
-LENGTH: Dimension = (1, 0, 0)
-MASS: Dimension = (0, 1, 0)
-TIME: Dimension = (0, 0, 1)
-ACCELERATION: Dimension = (1, 0, -2)
-FORCE: Dimension = (1, 1, -2)
-MOMENT: Dimension = (2, 1, -2)
-ENERGY: Dimension = (2, 1, -2)
-POWER: Dimension = (2, 1, -3)
-INERTIA: Dimension = (2, 1, 0)
-PRESSURE: Dimension = (-1, 1, -2)
-FORCE_PER_LENGTH: Dimension = (0, 1, -2)
-FORCE_PER_VELOCITY: Dimension = (0, 1, -1)
-MOMENT_PER_RATE: Dimension = (2, 1, -1)
+PURE, LENGTH, MASS, TIME = (0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)
+ACCELERATION, FORCE, MOMENT, ENERGY, POWER = (1, 0, -2), (1, 1, -2), (2, 1, -2), (2, 1, -2), (2, 1, -3)
+INERTIA, PRESSURE, FORCE_PER_LENGTH = (2, 1, 0), (-1, 1, -2), (0, 1, -2)
+FORCE_PER_VELOCITY, MOMENT_PER_RATE = (0, 1, -1), (2, 1, -1)
 
 KNOWN: dict[str, dict[str, float]] = {
     "length": {
-        "m": 1.0,
-        "dm": 0.1,
-        "cm": 0.01,
-        "mm": 1e-3,
-        "um": 1e-6,
-        "µm": 1e-6,
-        "km": 1e3,
-        "ft": 0.3048,
-        "in": 0.0254,
+        "m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "km": 1e3, "ft": 0.3048, "in": 0.0254,
         "yd": 0.9144,
     },
     "mass": {
-        "kg": 1.0,
-        "g": 1e-3,
-        "mg": 1e-6,
-        "t": 1e3,
-        "tonne": 1e3,
-        "Mg": 1e3,
-        "lb": 0.45359237,
-        "oz": 0.45359237 / 16,
+        "kg": 1.0, "g": 1e-3, "mg": 1e-6, "t": 1e3, "tonne": 1e3, "Mg": 1e3, "lb": 0.45359237, "oz": 0.45359237 / 16,
         "slug": 0.45359237 * 9.80665 / 0.3048,
     },
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0, "h": 3600.0},
-}
+}  # fmt: skip
 """Units of a base in terms of m, kg, s."""
 EARTH, EARTHLY = 9.80665, 0.005
 """Acceleration of gravity on earth in m/s^2, and by what part of it it varies and is rounded."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import mechgraph as mg
@@ -13,7 +13,7 @@ from mechgraph.determinacy.families import Families
 from mechgraph.determinacy.findings import Rounding
 from mechgraph.determinacy.report import KEYS, AdviceData, schemas
 from mechgraph.equations.terms import written
-from mechgraph.files import VERSION, Json, json_text, object_schema, patch, plain, schema_of
+from mechgraph.files import VERSION, Json, json_text, object_schema, patch, plain, read_off, schema_of
 from mechgraph.model.toml import to_data
 from mechgraph.modes.result import AssembliesData, BranchesData
 from mechgraph.response.course import ResponseData
@@ -247,7 +247,7 @@ def equations_data(f: mg.Formulation, s: mg.Solution | None) -> EquationsData:
     )
 
 
-def loads_data(body: mg.FreeBody, at: Any, written: str | None) -> LoadsData:
+def loads_data(body: mg.FreeBody, at: Any, written: str | None) -> Json:
     """What acts on a link at positions."""
     flat = {one.name: (one.wrench.reshape(-1, 6), one.unique.reshape(-1, 6)) for one in body.acting}
 
@@ -255,33 +255,21 @@ def loads_data(body: mg.FreeBody, at: Any, written: str | None) -> LoadsData:
         values, unique = (part[position].tolist() for part in flat[name])
         return WrenchData(tuple(values[:3]), tuple(values[3:]), tuple(unique))
 
-    return LoadsData(
-        body.mechanism.name,
-        body.link.name,
-        dict(body.mechanism.units),
-        body.balance,
-        tuple(ActingData(one.name, one.kind, one.about, one.point, one.distributed) for one in body.acting),
-        tuple(CaseData(*case, {name: wrench(name, case.position) for name in flat}) for case in body.cases(at)),
-        written,
+    cases = [CaseData(*case, {name: wrench(name, case.position) for name in flat}) for case in body.cases(at)]
+    m, link = body.mechanism, body.link.name
+    found: Json = read_off(
+        LoadsData, body, mechanism=m.name, link=link, units=dict(m.units), cases=cases, written=written
     )
+    return found
 
 
-def _with_properties(kind: type, value: Any) -> Any:
-    return kind(**{field.name: getattr(value, field.name) for field in fields(kind)})
-
-
-def structure_data(s: mg.Structure) -> StructureData:
+def structure_data(s: mg.Structure) -> Json:
     """Chain, families and groups of a mechanism."""
-    return StructureData(
-        s.report.mechanism.name,
-        s.identity.name if s.identity else None,
-        s.identity.inversions if s.identity else (),
-        s.identity.drivers if s.identity else (),
-        s.families,
-        _with_properties(CountsData, s.families),
-        _with_properties(GroupsData, s.groups),
-        s.report.groups_by_driver,
-    )
+    chain = (s.identity.name, s.identity.inversions, s.identity.drivers) if s.identity else (None, (), ())
+    named = dict(zip(("chain", "inversions", "alike"), chain, strict=True)) | {"mechanism": s.report.mechanism.name}
+    counts = read_off(CountsData, s.families)
+    found: Json = read_off(StructureData, s, **named, counts=counts, by_driver=s.report.groups_by_driver)
+    return found
 
 
 def write_json(command: str, data: Any, **more: Any) -> None:

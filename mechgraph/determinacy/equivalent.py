@@ -34,8 +34,6 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.quantities import door, wrong
 
-FLAT = 1e-8
-"""Curvature (times L) below which a side of a contact is straight."""
 ONE_POINT = 1e-8
 """Distance (over L) below which two points are one, and misfit of the circle up to which there is one."""
 SPATIAL = (
@@ -130,7 +128,8 @@ def _in_place_of_pair(parts: _Parts, rows: LinkRows, k: int, remove: bool) -> li
     P, n, forms = _second_order(parts, rows, k)
     t = np.cross(parts.normal, n)
     bww, bwu, buu = forms
-    if abs(buu) > FLAT:
+    # curvature (times L) below which a side of a contact is straight
+    if abs(buu) > 1e-8:
         length = -1.0 / buu
         s = length * (1.0 - bwu) / 2.0
         if abs(length * (bww - s) + s * s) > ONE_POINT * max(1.0, length * length):

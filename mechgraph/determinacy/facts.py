@@ -20,7 +20,7 @@ from mechgraph.determinacy.findings import (
     LIMIT,
     Advice,
     Finding,
-    LoopFact,
+    LoopData,
     PassiveFinding,
     completing,
     driving_advice,
@@ -211,7 +211,7 @@ class Facts(GraphFacts):
         return generic(self.mechanism, self.graph, self.asked)
 
     @cached_property
-    def loop_facts(self) -> tuple[LoopFact, ...]:
+    def loop_facts(self) -> tuple[LoopData, ...]:
         """Every loop taken alone: its chain, freedoms, rank and excess."""
         position = self.geometry.freedoms.position if self.geometry else None
         return findings.loop_facts(self.mechanism, self.loops, position)

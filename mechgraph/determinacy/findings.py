@@ -52,32 +52,17 @@ NAMED = 8
 """Most names that a sentence lists."""
 
 LINES = {
-    "R": "pin",
-    "P": "slide",
-    "H": "screw",
-    "C": "shaft",
-    "U": "first pin",
-    "E": "normal of the plane",
-    "Sc": "groove",
-    "Sg": "groove",
-    "Cp": "normal of the plane",
-    "Sp": "normal of the plane",
-}
+    "R": "pin", "P": "slide", "H": "screw", "C": "shaft", "U": "first pin", "E": "normal of the plane",
+    "Sc": "groove", "Sg": "groove", "Cp": "normal of the plane", "Sp": "normal of the plane",
+}  # fmt: skip
 """What z of the marker is, by pair type; "axis" for the others that have one."""
 
 PARTS = {
-    "C": "floating bearing",
-    "S": "ball joint or self-aligning bearing",
-    "Sg": "floating self-aligning bearing",
-    "U": "universal joint",
-    "E": "plane contact",
-    "Cp": "cylinder on a plane",
-    "Sp": "ball on a plane",
-    "Sc": "pinned ball in a slotted cylinder",
-    ("P", "C"): "round guide that lets it turn",
-    ("P", "Sg"): "ball in a groove",
-    ("P", "E"): "flat guide",
-}
+    "C": "floating bearing", "S": "ball joint or self-aligning bearing",
+    "Sg": "floating self-aligning bearing", "U": "universal joint", "E": "plane contact",
+    "Cp": "cylinder on a plane", "Sp": "ball on a plane", "Sc": "pinned ball in a slotted cylinder",
+    ("P", "C"): "round guide that lets it turn", ("P", "Sg"): "ball in a groove", ("P", "E"): "flat guide",
+}  # fmt: skip
 """What a new pair is as a part that can be bought or made, by its type or by the old and the new one; else its name in the pair table."""
 
 
@@ -136,8 +121,6 @@ def exchange(old: str, new: PairType) -> str:
 
 LARGEST_TOL = 1e-2
 """Largest tolerance that is tried."""
-CLOSE = 1e-3
-"""Change of a pair up to which numbers of any number of digits are taken for rounded: of random mechanisms hardly one comes so near."""
 LIMIT = 20.0
 """Seconds that the search for near-special geometry may take unless another limit is given."""
 MOST_PAIRS = 300
@@ -226,7 +209,9 @@ def plausible(m: Mechanism, L: float) -> float:
             sizes = L, math.hypot(*place.axis), math.hypot(*place.second)
             vectors = zip((place.point, place.axis, place.second), sizes, strict=True)
             units += [0.5 * 10.0 ** -max(map(_decimals, vector)) / size for vector, size in vectors]
-    return max(CLOSE, SAFE * max((unit for unit in units if unit <= LARGEST_TOL), default=0.0))
+    # change of a pair up to which numbers of any number of digits are taken for rounded: of random mechanisms hardly
+    # one comes so near
+    return max(1e-3, SAFE * max((unit for unit in units if unit <= LARGEST_TOL), default=0.0))
 
 
 def _decimals(value: float) -> int:
@@ -311,9 +296,10 @@ class PassiveFinding(Finding):
 
 
 @dataclass(frozen=True)
-class LoopFact:
-    """One loop: its chain of links and pairs, freedoms, rank and excess of its own six equations."""
+class LoopData:
+    """One loop taken alone: ``steps`` (pair, sign), ``chain`` of links and pairs, freedoms, rank and excess of its six equations."""
 
+    steps: tuple[tuple[str, int], ...]
     chain: str
     pairs: tuple[str, ...]
     freedoms: int
@@ -323,7 +309,7 @@ class LoopFact:
 
 def loop_facts(
     m: Mechanism, loops: tuple[tuple[tuple[str, int], ...], ...], position: Position | None
-) -> tuple[LoopFact, ...]:
+) -> tuple[LoopData, ...]:
     """The facts of every loop taken alone; ranks where there is geometry."""
     ends = {p.name: (p.a, p.b) for p in m.pairs}
     freedom_count = {p.name: p.type.f for p in m.pairs}
@@ -338,7 +324,7 @@ def loop_facts(
             rank = rank_of(singular_values(position.rows.S[:, columns]))
         pairs = tuple(name for name, _ in loop)
         freedoms = sum(freedom_count[p] for p in pairs)
-        out.append(LoopFact(chain, pairs, freedoms, rank, None if rank is None else 6 - rank))
+        out.append(LoopData(loop, chain, pairs, freedoms, rank, None if rank is None else 6 - rank))
     return tuple(out)
 
 

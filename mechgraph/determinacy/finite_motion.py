@@ -288,10 +288,6 @@ def _corrected(system: System, x: Array, rows: ReducedRows) -> Array | None:
 
 BRANCH_RESIDUAL = 1e-9
 """Residual of a branch."""
-MOST_BRANCHES = 16
-"""Most branches that are told apart."""
-BRANCHING_MOTIONS = 24
-"""Motions up to which branches are sought: of more, far more branches than are told apart meet, or all of a continuum."""
 SAME = 1e-3
 """Difference of rates up to which two branches are one: rates of branches that touch are found to the square root of rounding."""
 
@@ -357,7 +353,9 @@ def branches(
         idle, _ = np.linalg.qr(np.stack([p.rates for p in passive], axis=1))
         U, s, _ = np.linalg.svd(N - idle @ (idle.T @ N), full_matrices=False)
         N = U[:, s > 0.5]
-    if found.rank == found.count or N.shape[1] > BRANCHING_MOTIONS:
+    # motions up to which branches are sought: of more, far more branches than are told apart meet, or all of a
+    # continuum
+    if found.rank == found.count or N.shape[1] > 24:
         return ()
     # of these starts
     rng = np.random.default_rng(5)
@@ -369,7 +367,8 @@ def branches(
         # a random rate of one gives every direction its size
         beside = _ways(_Curvature(system, x, resting, stress, rng.normal(size=(1, resting.shape[1]))), rng)
         ways += [way / way[np.argmax(np.abs(way))] + 0.0 for way in beside]
-    if not 1 < len(ways) <= MOST_BRANCHES:
+    # most branches that are told apart
+    if not 1 < len(ways) <= 16:
         return ()
     unit = np.where(system.is_length, system.par.L, 1.0)
     names = system.m.freedom_names()

@@ -9,7 +9,7 @@ The structure as the textbooks tell it: chain, mobility table, families, counts,
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any, NamedTuple
 
@@ -18,17 +18,16 @@ from mechgraph.determinacy.budget import Budget, SearchEnded
 from mechgraph.determinacy.decomposition import Decomposition, joints_at
 from mechgraph.determinacy.facts import Facts, Geometry
 from mechgraph.determinacy.families import COLUMNS, Families
-from mechgraph.determinacy.findings import LIMIT, Rounding, component_words, plural, rounding
+from mechgraph.determinacy.findings import LIMIT, LoopData, Rounding, component_words, plural, rounding
 from mechgraph.determinacy.finite_motion import branches_text
 from mechgraph.determinacy.mobility import FreeMotion, free_motion
 from mechgraph.determinacy.pair_changes import LARGEST_FOR_SETS
 from mechgraph.determinacy.sentences import assumed, here_only, kind_line, loop_names, mobility_line, reasons, verdict
 from mechgraph.determinacy.snapping import EXACT, meant
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table, to_markdown, to_text
-from mechgraph.equations.terms import Ledger
 from mechgraph.errors import AssemblyError, DeadPointError, DeclarationError, IndeterminateError, MechgraphError, listed
-from mechgraph.files import Json, json_text, members, plain, schema_of
-from mechgraph.graph.atlas import Identity, MultipleJoint, identify
+from mechgraph.files import Json, json_text, members, plain, read_off, schema_of
+from mechgraph.graph.atlas import Identity, identify
 from mechgraph.graph.linkgraph import link_graph
 from mechgraph.kernel import build
 from mechgraph.kinematics.assembly import assembled, assembled_at, named_columns
@@ -284,18 +283,6 @@ KEYS = tuple(key for section in SECTIONS for key in section.keys)
 
 
 @dataclass(frozen=True)
-class LoopData:
-    """One loop taken alone: ``steps`` (pair, sign), ``chain`` of links and pairs, freedoms, rank and excess of its six equations."""
-
-    steps: tuple[tuple[str, int], ...]
-    chain: str
-    pairs: tuple[str, ...]
-    freedoms: int
-    rank: int | None
-    excess: int | None
-
-
-@dataclass(frozen=True)
 class LedgerData:
     """Unknowns and equations in one bookkeeping; ``by_kind``: count, unknowns and equations of pair symbols, couplings, drivers, links."""
 
@@ -338,16 +325,6 @@ class DirectionData:
     in_space: tuple[float, ...]
 
 
-def _like(record: type, value: Any, **more: Any) -> Any:
-    """A record with the attributes of a value."""
-    return record(**{f.name: getattr(value, f.name) for f in fields(record) if f.name not in more}, **more)
-
-
-def _ledger(book: Ledger) -> LedgerData:
-    kinds = {kind: (row.count, row.unknowns, row.equations) for kind, row in book.by_kind.items()}
-    return LedgerData(book.unknowns, book.equations, book.balance, kinds)
-
-
 class _Fact(NamedTuple):
     """A fact whose plain data are not those of the attribute of its name: their type, what they are, and how they are made."""
 
@@ -363,20 +340,18 @@ OTHER: dict[str, _Fact] = {
     "loops": _Fact(
         tuple[LoopData, ...],
         "Independent loops.",
-        lambda r: [_like(LoopData, fact, steps=loop) for loop, fact in zip(r.loops, r.loop_facts, strict=True)],
+        lambda r: r.loop_facts,
     ),
     "ledger": _Fact(
         Mapping[str, LedgerData],
         "Unknowns against equations in both bookkeepings.",
-        lambda r: {name: _ledger(r.ledger(name)) for name in ("lee", "minimal")},
+        lambda r: {name: r.ledger(name) for name in ("lee", "minimal")},
     ),
-    "kind": _Fact(KindData, "The kind of the mechanism.", lambda r: _like(KindData, r.kind)),
+    "kind": _Fact(KindData, "The kind of the mechanism.", lambda r: r.kind),
     "loop_kinds": _Fact(
         tuple[str, ...], "The kind of every loop by its pairs.", lambda r: [kind.name for kind in r.loop_kinds]
     ),
-    "advice": _Fact(
-        tuple[AdviceData, ...], "What would help, the best first.", lambda r: [_like(AdviceData, a) for a in r.advice]
-    ),
+    "advice": _Fact(tuple[AdviceData, ...], "What would help, the best first.", lambda r: r.advice),
     "self_stress_count": _Fact(
         int | None,
         "Number of self-stresses with the drivers in place.",
@@ -385,7 +360,7 @@ OTHER: dict[str, _Fact] = {
     "unique_directions": _Fact(
         tuple[DirectionData, ...],
         "Directions in which forces or moments are unique though their components are not.",
-        lambda r: [_like(DirectionData, d) for d in r.reactions.unique_directions] if r.reactions else [],
+        lambda r: r.reactions.unique_directions if r.reactions else (),
     ),
     "combinations": _Fact(
         tuple[tuple[int, str], ...],
@@ -402,7 +377,7 @@ OTHER: dict[str, _Fact] = {
 
 def to_dict(r: Facts, keys: Iterable[str]) -> Json:
     """Facts as plain data."""
-    return {key: plain(OTHER[key].of(r) if key in OTHER else getattr(r, key)) for key in keys}
+    return {k: read_off(OTHER[k].type, OTHER[k].of(r)) if k in OTHER else plain(getattr(r, k)) for k in keys}
 
 
 def schemas(keys: Iterable[str], defs: Json) -> Json:
@@ -763,21 +738,13 @@ class Structure(Shown):
                         ", ".join(joint.pairs),
                         str(joint.order),
                         on,
-                        "yes" if self._declared(joint, on) else "",
-                        self._split(joint, on),
+                        "yes" if all(on in self.groups.ends[name] for name in joint.pairs) else "",
+                        identify(self.report.mechanism, joints=(joint,)).split(joint, on).name,
                     )
                     for joint in self.multiple_joints
                     for on in joint.links
                 ]
                 yield Table(("joint", "order", "pairs on", "declared", "chain"), tuple(rows), align="lrlll")
-
-    def _declared(self, joint: MultipleJoint, on: str) -> bool:
-        """Whether the pairs of a joint are declared on a link."""
-        return all(on in self.groups.ends[name] for name in joint.pairs)
-
-    def _split(self, joint: MultipleJoint, on: str) -> str:
-        """The name of the chain with the joint split on a link, other joints as declared."""
-        return identify(self.report.mechanism, joints=(joint,)).split(joint, on).name
 
     def _families(self) -> Iterator[Block]:
         f = self.families

@@ -384,10 +384,6 @@ def count_line(r: Facts) -> str:
     return f"{line}: {r.redundancy} of {r.equation_count} closure equations {verb} redundant ({parts})."
 
 
-LINES = 25
-"""Most lines of text on 80 columns."""
-CHANGES = 4
-"""Most changes of pairs that are advised here."""
 HOW_MUCH = (
     "The rest depends on fits, stiffness and temperature; a rigid-body model cannot predict preload from misalignment."
 )
@@ -402,7 +398,8 @@ def document(r: Facts, first: tuple[Paragraph, ...] = ()) -> Document:
         blocks: list[Block] = [*first, Paragraph(verdict(r)), *_note(r), Bullets(items), Paragraph(MORE)]
         page = Document(f"Determinacy of {r.mechanism.name}", tuple(blocks))
         longest = max(parts.values(), key=len)
-        if len(to_text(page).splitlines()) <= LINES or len(longest) < 2:
+        # most lines of text on 80 columns
+        if len(to_text(page).splitlines()) <= 25 or len(longest) < 2:
             return page
         longest.pop()
 
@@ -420,7 +417,8 @@ def _to_do(r: Facts) -> Iterator[str]:
     for p in bearing:
         what = "couple" if p.turns else "force"
         yield f"hold {p.name} or balance the load on it: a {what} of {p.size} moves it, and no part takes that"
-    yield from alternatives(r.advice)[:CHANGES]
+    # most changes of pairs that are advised here
+    yield from alternatives(r.advice)[:4]
     if r.determinate and not r.near and not bearing:
         yield "none needed: equilibrium determines every force"
 

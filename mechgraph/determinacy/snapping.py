@@ -45,8 +45,6 @@ from mechgraph.pairs.pair_type import PairType
 
 COMPLEX_STEP = 1e-30
 """Step of the complex-step derivatives: exact, as the residuals are analytic."""
-LONG = 10.0
-"""Lengths of fewer tolerances than this are not compared."""
 
 
 @dataclass(frozen=True)
@@ -218,7 +216,8 @@ class Relations:
                     like = self.features[i].is_line == self.features[j].is_line and self.owner[i] != self.owner[j]
                     if like and (not self.features[i].is_line or self._angles[0][i, j] <= width):
                         length = float(self._apart(i, np.array([j]), width)[0][0])
-                        if length > LONG * width:
+                        # lengths of fewer tolerances than this are not compared
+                        if length > 10.0 * width:
                             found.append((length, link, i, j))
         found.sort(key=lambda item: item[0])
         for shorter, longer in pairwise(found):
@@ -435,18 +434,12 @@ def _alike(one: Marker, other: Marker) -> bool:
 
 SLACK = 1.001
 """A tolerance is met up to this factor: it may be the printed size of the change itself."""
-MANY = 0.7
-"""Part of the worst miss from which relations that do not hold together are dropped at a time: the least likely to be meant."""
-ROUNDS = 25
-"""Most linearizations; each leaves a part of the size of the change."""
 NEARER, FARTHER = 0.12, 0.3
 """Steps between the positions along a motion: at first, and once the loops close at those."""
 POSITIONS = 5
 """Positions along a motion each way."""
 MOST_ROWS = 60
 """Closure rows up to which motions are followed: dense decompositions. Larger mechanisms are left to the relations."""
-FAR = 4.0
-"""Tolerances beyond which a change on the way is given up: the first linearizations overshoot."""
 
 
 def least_change(placed: PlacedPairs, tol: float) -> tuple[Array, tuple[Relation, ...], tuple[Relation, ...], bool]:
@@ -493,7 +486,9 @@ def _meeting(
         open_ = np.array([np.abs(row[0]).max() for row in found.rows(near, change)])
         misses = np.array([r.miss for r in near])
         weight = np.where(open_ > EXACT, misses, 0.0) if open_.max() > EXACT else _weights(found, near, size, tol)
-        out = weight >= MANY * weight.max()
+        # part of the worst miss from which relations that do not hold together are dropped at a time: the least likely
+        # to be meant
+        out = weight >= 0.7 * weight.max()
         dropped += [r for r, gone in zip(near, out, strict=True) if gone]
         near = tuple(r for r, gone in zip(near, out, strict=True) if not gone)
 
@@ -533,7 +528,8 @@ def _solved(
     """
     change = np.zeros((6, placed.frames.shape[2])) if begin is None else begin
     best, least = change, np.full(1, np.inf)
-    for _ in range(ROUNDS):
+    # most linearizations; each leaves a part of the size of the change
+    for _ in range(25):
         r, A = rows_at(change)
         placed.budget.spend(3e-3 + 3e-4 * len(r))  # measured, as the others
         if not r.size or np.abs(r).max() < np.abs(least).max():
@@ -572,7 +568,8 @@ def _moving(
         states = _followed(placed.changed(change), placed.x, rank, step, 100.0 * tol if step == NEARER else 10.0 * tol)
         if states is None:
             return None
-        change, rest = _solved(placed, partial(_rows_along, placed, found, relations, states, rank), change, FAR * tol)
+        # tolerances beyond which a change on the way is given up: the first linearizations overshoot
+        change, rest = _solved(placed, partial(_rows_along, placed, found, relations, states, rank), change, 4.0 * tol)
         # hundredth of the residual with which positions near the start, which tell little from each other, lead on to farther
         # ones
         if rest.max() > (1e-10 if step == NEARER else EXACT) * 100 or np.max(placed.moved(change)) > SLACK * tol:

@@ -186,8 +186,6 @@ REFUSED = {
 
 
 FIRST_LINES = ("OndselSolver", "FreeCADMbD", "freeCAD: 3D CAD with Motion Simulation  by  askoh.com")
-NOT_A_ROTATION = 1e-3
-"""Largest entry of ``R^T R - 1`` of a rotation matrix of few digits; it is made orthogonal."""
 IN_LINE = "InLineForceTorque"
 """The force that is read."""
 CONNECTIONS = ("Joints", "Motions", "Limits", "ForceTorques")
@@ -294,7 +292,8 @@ class AsmtReader:
         error = float(np.abs(R.T @ R - np.eye(3)).max())
         if not R.any():  # a fault already
             R = np.eye(3)
-        elif error > NOT_A_ROTATION or np.linalg.det(R) < 0:
+        # largest entry of ``R^T R - 1`` of a rotation matrix of few digits; it is made orthogonal
+        elif error > 1e-3 or np.linalg.det(R) < 0:
             self.faults.append(f"line {node.line}: {where}: RotationMatrix is no rotation (R^T R - 1 = {error:.2g})")
             R = np.eye(3)
         u, _, vt = np.linalg.svd(R)

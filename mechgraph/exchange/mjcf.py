@@ -104,12 +104,9 @@ def _of_zaxis(e: XmlElement, c: Compiler) -> Array:
 
 
 ORIENTATIONS: dict[str, Callable[[XmlElement, Compiler], Array]] = {
-    "quat": _of_quat,
-    "axisangle": _of_axisangle,
-    "euler": _of_euler,
-    "xyaxes": _of_xyaxes,
+    "quat": _of_quat, "axisangle": _of_axisangle, "euler": _of_euler, "xyaxes": _of_xyaxes,
     "zaxis": _of_zaxis,
-}
+}  # fmt: skip
 """Attributes that say an orientation."""
 
 

@@ -242,12 +242,9 @@ FUNCTIONS: dict[str, Derivatives] = {
 """Functions of a formula with their first and second derivatives."""
 FUNCTIONS |= {short: FUNCTIONS[long] for short, long in (("asin", "arcsin"), ("acos", "arccos"), ("atan", "arctan"))}
 OPERATIONS: dict[type[ast.operator], Callable[[Jet, Jet], Jet]] = {
-    ast.Add: Jet.__add__,
-    ast.Sub: Jet.__sub__,
-    ast.Mult: Jet.__mul__,
-    ast.Div: Jet.__truediv__,
+    ast.Add: Jet.__add__, ast.Sub: Jet.__sub__, ast.Mult: Jet.__mul__, ast.Div: Jet.__truediv__,
     ast.Pow: Jet.__pow__,
-}
+}  # fmt: skip
 
 
 NONE: Mapping[str, str] = {}

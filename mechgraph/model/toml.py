@@ -298,13 +298,9 @@ def _with_six(reader: _Reader, fields: dict[str, Any], where: str) -> None:
 NESTED = ("response",)
 """Tables whose arrays of tables hold objects."""
 READ_FIRST = {
-    "motion": _with_sweep,
-    "pair": _with_type,
-    "pair_type": _with_parts,
-    "bookkeeping": _with_lists,
-    "freedom": _with_six,
-    "component": _with_six,
-}
+    "motion": _with_sweep, "pair": _with_type, "pair_type": _with_parts, "bookkeeping": _with_lists,
+    "freedom": _with_six, "component": _with_six,
+}  # fmt: skip
 """What is done to the fields of a table before its object is made; without effect where the table is at fault."""
 
 

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from mechgraph.document import Block, Document, Heading, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import vector_fault
-from mechgraph.files import plain
+from mechgraph.files import read_off
 from mechgraph.maths.se3 import Array
 from mechgraph.quantities import ENERGY, FORCE, MOMENT, POWER, TIME, door, unit_of
 from mechgraph.result.solution import Solution
@@ -299,26 +299,8 @@ class OverTime(Shown):
         """
         if self.duration.shape:
             raise DeclarationError("figures as data", [f"{self.duration.size} cases: solve them one by one"])
-
-        def data(figures: Mapping[str, Figures]) -> dict[str, FiguresData]:
-            numbers = ("least", "greatest", "mean", "rms", "error")
-            return {
-                name: FiguresData(one.unit, float(one.peak), int(one.at), *(float(getattr(one, n)) for n in numbers))
-                for name, one in figures.items()
-            }
-
-        made = OverTimeData(
-            float(self.duration),
-            bool(self.closed),
-            float(self.revolutions),
-            data(self.efforts),
-            data(self.powers),
-            data(self.shaking),
-            {name: float(work) for name, work in self.work.items()},
-            float(self.kinetic_change),
-            float(self.balance),
-        )
-        return dict(plain(made))
+        found: dict[str, Any] = read_off(OverTimeData, self)
+        return found
 
     def document(self) -> Document:
         """Efforts and powers of the drivers, shaking, and the work, over the cycle; of several cases the number alone."""

@@ -172,12 +172,8 @@ def _loads(s: Trajectory) -> Iterator[Extra]:
 
 Include = Literal["points", "links", "centers", "loads", "contacts"]
 MORE: dict[str, Callable[[Trajectory], Iterator[Extra]]] = {
-    "points": _points,
-    "links": _links,
-    "centers": _centers,
-    "loads": _loads,
-    "contacts": contact_columns,
-}
+    "points": _points, "links": _links, "centers": _centers, "loads": _loads, "contacts": contact_columns,
+}  # fmt: skip
 """What a table may have beside the pairs, on request."""
 
 

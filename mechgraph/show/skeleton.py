@@ -49,14 +49,9 @@ LINES = {"axis": (0.9, (0, (8, 2, 1.5, 2))), "tie": (0.9, (0, (2, 2))), "spring"
          "drive": (1.8, "-"), "reaction": (2.4, "-"), "foot": (0.8, "-")}  # fmt: skip
 """Width and style of the lines of parts by their role."""
 SOLID = {
-    "body": BODY,
-    "dark": "#52606d",
-    "spring": BODY,
-    "load": LOAD,
-    "drive": INK,
-    "reaction": REACTION,
+    "body": BODY, "dark": "#52606d", "spring": BODY, "load": LOAD, "drive": INK, "reaction": REACTION,
     "foot": "#d5dbe1",
-}
+}  # fmt: skip
 """Colors of the polygons of parts by their role; others have that of their link."""
 LINE_COLOUR = {"axis": INK, "spring": "#3e4c59", "load": LOAD, "drive": INK, "reaction": REACTION, "foot": MUTED}
 ABOVE = {"plate": 2.0, "foot": 2.1, "guide": 3.0, "spring": 5.0, "load": 6.0, "drive": 6.0, "reaction": 6.5}

@@ -20,7 +20,7 @@ from mechgraph.maths.tolerances import MOTIONS
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.pairs.factors import Component
-from mechgraph.quantities import unit_of
+from mechgraph.quantities import FORCE, LENGTH, MOMENT, TIME, unit_of
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import SHOWN_AS_ZERO, driver_value, with_unit
 from mechgraph.show.canvas import axis_label, colours
@@ -156,8 +156,6 @@ def segments(shape: Shape) -> list[int]:
     rims = [(*face, face[0]) for face in shape.faces[: shape.rims]]
     return [int(i) for line in (*shape.lines, *rims) for k in range(len(line) - 1) for i in line[k : k + 2]]
 
-
-FORCE, MOMENT, LENGTH, TIME = (1, 1, -2), (2, 1, -2), (1, 0, 0), (0, 0, 1)
 
 Data = dict[str, Any]
 
@@ -435,7 +433,7 @@ class _PageView:
         self.start = scene_at(self.m, place_of_states(g.system, g.x[:, None]), np.zeros(1, dtype=np.intp))
         self.scene = scene(self._thinned()) if self.s is not None else self.start
         self.figure = Figure(self.scene, self.start.frames)
-        self.figures = [self.figure.data(self._rows())]
+        self.figures = [self.figure.data(_rows_of(self.m, self.report))]
 
     def _thinned(self) -> Solution:
         """The solution, or as many of its positions as are shown."""
@@ -553,9 +551,6 @@ class _PageView:
                 "verdict": plain(after.verdict),
             }
             yield self.item("Advice", advice.brief, self.report.verdict, marked=marked, after=rows)
-
-    def _rows(self) -> dict[str, list[list[str]]]:
-        return _rows_of(self.m, self.report)
 
 
 def _rows_of(m: Mechanism, report: DeterminacyReport) -> dict[str, list[list[str]]]:

@@ -184,11 +184,6 @@ def _picture(draw: Callable[[], Any]) -> str:
 Q = (0.00135, 0.5, 0.99865)
 
 
-def study_document(study: Study) -> Document:
-    """What the study tells of itself; and outputs where the mechanism itself has them greatest, with quantiles and sensitivities."""
-    return Document("", (*study.document().blocks, *_blocks(study)))
-
-
 def _blocks(study: Study) -> Iterator[Block]:
     rows, slopes = [], []
     for name in study.outputs:
@@ -357,7 +352,7 @@ def _results(s: Solution | None, study: Study | None) -> Iterator[tuple[str, Doc
     if s is not None:
         yield "Results", Document("", s.document(asked=True).blocks), []
     if study is not None:
-        yield "Study", study_document(study), pictures_of_study(study)
+        yield "Study", Document("", (*study.document().blocks, *_blocks(study))), pictures_of_study(study)
 
 
 def _html(document: Document) -> str:
