@@ -395,7 +395,7 @@ class Format:
 
 
 def format_of(path: str | os.PathLike[str], formats: Sequence[Format]) -> Format:
-    """The format that the suffix of a path says, whose packages are there; the first where there is no suffix (a pipe, a device).
+    """The format of a path's file extension, whose packages are there; the first where there is none (a pipe, a device).
 
     Raises
     ------
@@ -409,7 +409,11 @@ def format_of(path: str | os.PathLike[str], formats: Sequence[Format]) -> Format
         if not suffix or suffix in one.suffixes:
             one.available()
             return one
-    raise FileError(path, f"the suffix says how a file is written; known: {formats_text(formats)}")
+    raise FileError(path, f"unknown file extension {suffix!r}; known: {formats_text(formats)}")
+
+
+PAGES = (Format("page", (".html", ".htm"), write_whole),)
+"""What a report is written as."""
 
 
 def formats_text(formats: Sequence[Format]) -> str:

@@ -128,6 +128,13 @@ def test_files_as_the_suffix_says(tmp_path: Path) -> None:
         assert ".csv (CSV), .nc (NetCDF), .parquet (Parquet)" in bad(
             command, "7r", *(["--for", "1s"] * (command == "respond")), "--out", tmp_path / "x.xlsx"
         )
+    assert "unknown file extension '.zzz'; known: .toml (TOML), .xml" in bad(
+        "save", "rcsr", "--out", tmp_path / "m.zzz"
+    )
+    assert "unknown file extension '.pdf'; known: .html" in bad("report", "rcsr", "--out", tmp_path / "m.pdf")
+    with pytest.raises(mg.FileError, match=r"known: \.html"):
+        mg.write_report(mg.load("rcsr"), path=tmp_path / "m.pdf")
+    assert not {*tmp_path.glob("m.*")}
     assert "Wrote" in run("equations", "rcsr", "--blocks", "--out", tmp_path / "e.tex").stdout
     assert (tmp_path / "e.tex").read_text().startswith(r"\documentclass")
     assert "leave out" in bad("equations", "rcsr", "--csv", "--out", tmp_path / "e.csv")
@@ -136,6 +143,25 @@ def test_files_as_the_suffix_says(tmp_path: Path) -> None:
     assert mg.load(tmp_path / "m.toml") == mg.load("rcsr")
     assert len(json.loads((tmp_path / "m.json").read_text())["nodes"]) == 4
     assert "file of the mechanism" in bad("save", tmp_path / "m.toml", "--out", tmp_path / "m.toml")
+
+
+def test_messages_name_the_options_of_the_command(tmp_path: Path) -> None:
+    at = ("--drive", "O1=0:360:30deg")
+    assert "Pass --on-reach flag to keep the reachable" in run("loads", "rcsr", "link2", *at).stderr
+    said = run("equations", "rcsr", "--at", "O1=350deg").stderr
+    assert "not reachable" in said
+    assert "on_reach" not in said.replace("-", "_")
+    assert "--redundant minimum_norm" in run("loads", "four-bar", "coupler", "--out", tmp_path / "x.inp").stderr
+
+
+def test_a_page_lacks_nothing_silently(tmp_path: Path) -> None:
+    """What could not be solved is said, and how a mechanism without a stored motion is set in motion."""
+    page = tmp_path / "page.html"
+    told = run("report", "rcsr", "-o", page, "--drive", "O1=0:360:30deg")
+    assert (told.exit_code, "10 positions of 12 not solved: status 'out of reach'." in told.stdout) == (0, True)
+    mg.save(mg.load("four-bar").replace(drives=["A"]), tmp_path / "m.toml")
+    assert "for motion and forces add --drive A=0:360:5deg." in run("report", tmp_path / "m.toml", "-o", page).stdout
+    assert run("report", "four-bar", "-o", page).stdout.endswith(" MB.\n")
 
 
 def test_figures_over_time() -> None:

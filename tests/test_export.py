@@ -180,7 +180,7 @@ WRITTEN = [
     (("mm", "kg", "s"), "mN", "mN mm", "mN/mm", "mass='t'"),
     (("cm", "g", "s"), "dyn", "dyn cm", "dyn/cm", "length='m'"),
     (("ft", "slug", "s"), "lbf", "lbf ft", "lbf/ft", ""),
-    (("ell", "kg", "s"), "kg ell/s^2", "kg ell^2/s^2", "kg/s^2", ""),
+    (("yd", "kg", "s"), "kg yd/s^2", "kg yd^2/s^2", "kg/s^2", ""),
 ]
 
 

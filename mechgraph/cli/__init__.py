@@ -27,7 +27,12 @@ class Program(TyperGroup):
 
     def invoke(self, context: Any) -> Any:
         """Run a command, before the errors that are left are taken for those of the command line itself."""
-        with outcome(), warned():
+
+        def options() -> list[str]:
+            command = self.commands.get(context.invoked_subcommand or "")
+            return [one.name or "" for one in command.params] if command else []
+
+        with outcome(options), warned():
             return super().invoke(context)
 
 

@@ -44,11 +44,9 @@ def save(
     mechanism: opt.Named,
     out: Annotated[
         Path,
-        opt.option("--out", f"The file; {opt.SELECTS} .toml, {formats_text(WRITERS)}; others are TOML.", "FILE"),
+        opt.file_option("The file; ", WRITERS),
     ],
-    advice: Annotated[
-        int | None, opt.option("--advice", "Apply recommendation NUMBER (from 0) of 'check --json'.", "NUMBER")
-    ] = None,
+    advice: Annotated[int | None, opt.option("--advice", "Apply advice NUMBER of 'check' (from 0).", "NUMBER")] = None,
     json: opt.AsJson = False,
 ) -> None:
     """Write a mechanism as another file: TOML, which holds all of it, or what other programs read.
@@ -57,7 +55,7 @@ def save(
 
     Exit status: 0 done; 1 it cannot be assembled, where the file holds it at its start; 2 wrong usage or bad input.
     """
-    opt.refuse_own_file(out, mechanism)
+    opt.check_out(out, mechanism, WRITERS)
     m = opt.loaded(mechanism)
     if advice is not None:
         known = mg.check(m).advice
@@ -195,7 +193,9 @@ def equations(
     if json and (latex or blocks or coefficients or csv or out):
         opt.refuse("equations", "--json prints all; leave out --latex, --blocks, --coefficients, --csv and --out")
     if out and (latex or coefficients or csv or at):
-        opt.refuse("equations", "--out writes what its suffix says; leave out --latex, --coefficients, --csv and --at")
+        opt.refuse(
+            "equations", "--out selects the format by its extension; leave out --latex, --coefficients, --csv and --at"
+        )
     opt.check_out(out, mechanism, WRITINGS)
     m = opt.loaded(mechanism)
     s = solved_at(m, at) if at else None

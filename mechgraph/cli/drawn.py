@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +16,8 @@ import mechgraph as mg
 from mechgraph import show as pictures
 from mechgraph.cli import options as opt
 from mechgraph.cli import records
-from mechgraph.files import format_of, formats_text
+from mechgraph.errors import counted
+from mechgraph.files import PAGES
 from mechgraph.show.skeleton import FORMATS as FILMS
 from mechgraph.show.skeleton import PICTURES
 
@@ -26,7 +28,7 @@ class _PictureOptions:
 
     of: tuple[str, ...]
     over: str | None
-    position: int
+    position: int | None
     forces: bool
     moment: bool
 
@@ -89,7 +91,9 @@ def plot(
     over: Annotated[
         str | None, opt.option("--over", "Abscissa: a freedom, t, or position. Default: the first driver.", "FREEDOM")
     ] = None,
-    position: Annotated[int, opt.option("--position", "Number of the position that a skeleton shows.")] = 0,
+    position: Annotated[
+        int | None, opt.option("--position", "Number of the position that a skeleton shows. Default: the first solved.")
+    ] = None,
     frames: Annotated[
         int | None,
         typer.Option("--frames", min=1, help="Frames of an animation. Default: one per position, at most 72."),
@@ -116,8 +120,7 @@ def plot(
     film = what == "skeleton" and (
         frames is not None or target.suffix.lower() in (s for one in FILMS[:2] for s in one.suffixes)
     )
-    opt.refuse_own_file(target, mechanism)
-    format_of(target, FILMS if film else PICTURES)
+    opt.check_out(target, mechanism, FILMS if film else PICTURES)
     asked = _PictureOptions(tuple(of or ()), over, position, forces, moment)
     still = what == "skeleton" and not (film or drive or any(d.motion is not None for d in m.drives))
     moves = kind.moves and not still
@@ -164,7 +167,7 @@ def report(
 
     Example: mechgraph report four-bar -o four-bar.html
     """
-    opt.refuse_own_file(out, mechanism)
+    opt.check_out(out, mechanism, PAGES)
     m = opt.loaded(mechanism)
     motions = opt.drives_of(m, drive or ())
     stored = bool(m.drives) and all(d.motion is not None for d in m.drives)
@@ -178,12 +181,29 @@ def report(
             except opt.NO_ANSWERS as error:
                 failure, s = error, getattr(error, "solution", None)
         mg.write_report(m, s, path=out)
-    size = f": {out.stat().st_size / 1e6:.2f} MB"
-    records.tell_file("report", records.FileData(m.name, str(out)), json, size)
+    more = f": {out.stat().st_size / 1e6:.2f} MB{_hint(m, s, failure)}"
+    records.tell_file("report", records.FileData(m.name, str(out)), json, more)
     if failure is not None:
         raise failure
     if s is not None and not (np.asarray(s.status) == "ok").any():
         raise typer.Exit(opt.NO_ANSWER)
+
+
+def _hint(m: mg.Mechanism, s: mg.Solution | None, failure: Exception | None) -> str:
+    """What a page lacks, and the option that would show it."""
+    if failure is not None:
+        return ""
+    if s is not None:
+        status = np.asarray(s.status)
+        lost = Counter(str(one) for one in status[status != "ok"])
+        return "".join(
+            f". {counted(n, 'position')} of {status.size} not solved: status '{why}'" for why, n in lost.items()
+        )
+    report = mg.check(m)
+    if not report.mobility:
+        return ""
+    still = [d.freedom for d in m.drives if d.motion is None] or list(report.suggested_drives)
+    return f". It shows the start position; for motion and forces add {opt.drive_example(m, still)}" if still else ""
 
 
 Picture = Annotated[Path | None, opt.file_option("Also plot them; ", PICTURES)]
@@ -198,7 +218,7 @@ def assemblies(mechanism: opt.Named, at: opt.At = None, out: Picture = None, jso
 
     Exit status: 0 done; 1 where there is no real assembly; 2 wrong usage or bad input.
     """
-    _check_picture(out, mechanism)
+    opt.check_out(out, mechanism, PICTURES)
     m = opt.loaded(mechanism)
     at_start = {m.full_name(d.freedom): m.start.get(m.full_name(d.freedom), 0.0) for d in m.drives}
     values = {m.full_name(name): value for name, value in (opt.values_of(m, at) or {}).items()}
@@ -228,7 +248,7 @@ def branches(
 
     Exit status: 0 done; 1 where there is no branch; 2 wrong usage or bad input.
     """
-    _check_picture(out, mechanism)
+    opt.check_out(out, mechanism, PICTURES)
     m = opt.loaded(mechanism)
     name = driver if driver is not None else next((d.freedom for d in m.drives), "")
     with opt.working(f"branches of {m.name}"):
@@ -237,13 +257,6 @@ def branches(
     _tell("branches", found, figure, out, json)
     if not len(found):
         raise typer.Exit(opt.NO_ANSWER)
-
-
-def _check_picture(out: Path | None, mechanism: str) -> None:
-    """Refuse a picture that could not be written, before anything is computed."""
-    if out is not None:
-        opt.refuse_own_file(out, mechanism)
-        format_of(out, PICTURES)
 
 
 def _tell(command: str, found: Any, figure: Any, out: Path | None, json: bool) -> None:

@@ -178,9 +178,13 @@ def motions_of(m: Mechanism, texts: Sequence[str]) -> dict[str, Motion]:
     declared = {m.full_name(drive.freedom): drive.motion for drive in m.drives}
     still = [name for name, motion in declared.items() if motion is None and name not in given]
     if still and (not given or given & set(declared)):
-        example = "0:360:5deg" if m.turns(still[0]) else "0:0.1:0.01"
-        refuse(f"drive {still[0]!r}", f"has no motion; give one, e.g. --drive {still[0]}={example}")
+        refuse(f"drive {still[0]!r}", f"has no motion; give one, e.g. {drive_example(m, still[:1])}")
     return out
+
+
+def drive_example(m: Mechanism, names: Sequence[str]) -> str:
+    """Options that set drivers in motion."""
+    return " ".join(f"--drive {name}={'0:360:5deg' if m.turns(name) else '0:0.1:0.01'}" for name in names)
 
 
 def parse_at(m: Mechanism, text: str, option: str = "--at") -> tuple[str, float]:
@@ -307,18 +311,35 @@ def _reached(error: mg.MechgraphError) -> str:
         return ""
     m = error.solution.whole
     at = ", ".join(driver_value(m, name, value) for name, value in error.value.items())
-    return f"\n  reached {at}; --on-reach flag solves the positions that can be reached"
+    return f"\n  reached {at}"
+
+
+LEFT_OUT = re.compile(r"(?:,? or(?: pass)?|\. Pass) on_reach='flag'[^.\n]*")
+"""What a message says of an argument that not every command has as an option."""
+ARGUMENT = re.compile(r"\b(on_reach|redundant|tol|limit)=('?)([\w.+-]*)\2")
+
+
+def spelled(message: str, options: Sequence[str]) -> str:
+    """A message with options, as they are typed, in place of the arguments of a call."""
+    if "on_reach" not in options:
+        message = LEFT_OUT.sub("", message)
+
+    def typed(found: re.Match[str]) -> str:
+        name = f"--{found[1].replace('_', '-')}"
+        return f"{name} {found[3]}".rstrip() if found[1] in options else found[0]
+
+    return ARGUMENT.sub(typed, message)
 
 
 @contextmanager
-def outcome() -> Iterator[None]:
-    """Every error as a message and an exit status."""
+def outcome(options: Callable[[], Sequence[str]] = tuple) -> Iterator[None]:
+    """Every error as a message and an exit status; ``options`` are those of the command, by the names of their arguments."""
     try:
         yield
     except NO_ANSWERS as error:
-        fail(str(error) + _reached(error), NO_ANSWER)
+        fail(spelled(str(error), options()) + _reached(error), NO_ANSWER)
     except mg.MechgraphError as error:
-        fail(str(error), BAD_INPUT)
+        fail(spelled(str(error), options()), BAD_INPUT)
     except MemoryError:
         fail("out of memory; request fewer positions", BAD_INPUT)
     except KeyboardInterrupt:

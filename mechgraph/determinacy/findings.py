@@ -584,16 +584,27 @@ def consequence(effect: Effect) -> str:
 
 
 def alternatives(advice: Iterable[Advice]) -> list[str]:
-    """Advice in brief, single changes of one kind with the same effect together: ``... (R -> S) at A or B: redundancy 3 -> 1``."""
+    """Advice in brief, single changes of one kind and effect together: ``2-3: ... at A or B: redundancy 3 -> 1``."""
     first: dict[tuple[Any, ...], Effect] = {}
     others: dict[tuple[Any, ...], list[str]] = {}
-    for e in (a.effect for a in advice):
+    numbers: dict[tuple[Any, ...], list[int]] = {}
+    for number, e in enumerate(a.effect for a in advice):
         if e is not None:
             key = (tuple(sorted(change[1:] for change in e.changes)), consequence(e))
             if key in first and len(e.changes) == 1:
                 others.setdefault(key, []).append(e.changes[0][0])
+            if key not in first or len(e.changes) == 1:
+                numbers.setdefault(key, []).append(number)
             first.setdefault(key, e)
-    return [f"{exchanges(e, others.get(key, ()))}: {consequence(e)}" for key, e in first.items()]
+    return [
+        f"{_ranged(numbers[key])}: {exchanges(e, others.get(key, ()))}: {consequence(e)}" for key, e in first.items()
+    ]
+
+
+def _ranged(numbers: Sequence[int]) -> str:
+    """Rising numbers: ``2-4`` where none is left out, else ``2, 4``."""
+    whole = 1 < len(numbers) == numbers[-1] - numbers[0] + 1
+    return f"{numbers[0]}-{numbers[-1]}" if whole else ", ".join(map(str, numbers))
 
 
 def _turned(pair: Pair, angle: float) -> Pair:

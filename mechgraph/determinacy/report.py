@@ -194,7 +194,7 @@ def _combined(r: Facts) -> Iterator[Block]:
 
 
 def _advice(r: Facts) -> Iterator[Block]:
-    yield from _listed(a.text for a in r.advice)
+    yield from _listed(f"{number}: {a.text}" for number, a in enumerate(r.advice))
     if r.sets_not_sought:
         yield Paragraph(f"Smaller sets of changes were not sought: redundancy above {LARGEST_FOR_SETS}.")
     new = sorted({kind for e in r.effects for _, _, kind in e.changes if kind in TABLE})

@@ -410,7 +410,7 @@ def _note(r: Facts) -> list[Paragraph]:
 
 def _to_do(r: Facts) -> Iterator[str]:
     """What to change, the drivers first; for a determinate mechanism nothing."""
-    yield from (a.text for a in r.advice if a.effect is None)
+    yield from (f"{number}: {a.text}" for number, a in enumerate(r.advice) if a.effect is None)
     if r.contradicting_drives and r.mobility and not r.suggested_drives:
         yield "the declared drivers are dependent; remove one"
     bearing = [p for p in r.passive if p.load_bearing]

@@ -15,12 +15,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mechgraph.errors import ContentError, DeclarationError, FileError, MechgraphWarning, visible
+from mechgraph.errors import ContentError, DeclarationError, MechgraphWarning, visible
 from mechgraph.exchange.asmt import AsmtReader, Assembly
 from mechgraph.exchange.asmt_mechanism import mechanism_of
 from mechgraph.exchange.mjcf import read_mjcf, save_mjcf
 from mechgraph.exchange.urdf import read_urdf
-from mechgraph.files import Format, text_of, write_whole
+from mechgraph.files import Format, format_of, text_of, write_whole
 from mechgraph.graph.linkgraph import link_graph
 from mechgraph.model import toml
 from mechgraph.model.mechanism import Mechanism
@@ -151,19 +151,20 @@ def load(name: str | os.PathLike[str]) -> Mechanism:
 
 
 WRITERS = (
+    Format("TOML", (".toml",), toml.save),
     Format("MJCF", (".xml", ".mjcf"), save_mjcf),
     Format("GraphML", (".graphml",), save_graphml),
     Format("node-link JSON", (".json",), save_node_link),
 )
-"""What a mechanism can be written as beside TOML, which all other suffixes are."""
+"""What a mechanism can be written as."""
 
 
 @door
 def save(m: Mechanism, path: str | os.PathLike[str]) -> None:
     """Write a mechanism to a file, atomically; the extension selects the format.
 
-    TOML holds the whole mechanism: ``load`` returns an equal one. ``.xml`` and ``.mjcf`` hold it at its start. ``.graphml`` and
-    ``.json`` (node-link) hold the graph: links as nodes, pairs as edges.
+    ``.toml`` holds the whole mechanism: ``load`` returns an equal one. ``.xml`` and ``.mjcf`` hold it at its start. ``.graphml``
+    and ``.json`` (node-link) hold the graph: links as nodes, pairs as edges.
 
     Parameters
     ----------
@@ -175,7 +176,7 @@ def save(m: Mechanism, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     FileError
-        The format cannot hold the mechanism (functions as loads), or the file cannot be written.
+        Unknown file extension; the format cannot hold the mechanism (functions as loads); or the file cannot be written.
 
     Examples
     --------
@@ -187,10 +188,4 @@ def save(m: Mechanism, path: str | os.PathLike[str]) -> None:
     ...     print(mg.load(path) == mg.load("rcsr"))
     True
     """
-    suffix = Path(os.fsdecode(path)).suffix.lower() if isinstance(path, str | os.PathLike) else ""
-    writers = {known: one.write for one in WRITERS for known in one.suffixes}
-    if suffix in READERS and suffix not in writers:
-        raise FileError(
-            path, f"files of this kind ({suffix}) are read, not written; write .toml or {', '.join(writers)}"
-        )
-    writers.get(suffix, toml.save)(m, path)
+    format_of(path, WRITERS).write(m, path)

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from mechgraph.errors import DeclarationError
+from mechgraph.errors import DeclarationError, counted
 from mechgraph.files import Format, format_of, optional, whole_file, writable
 from mechgraph.maths.se3 import Array
 from mechgraph.model.mechanism import Mechanism
@@ -61,7 +61,7 @@ ABOVE = {"plate": 2.0, "foot": 2.1, "guide": 3.0, "spring": 5.0, "load": 6.0, "d
 @door
 def draw_skeleton(
     s: Solution | Mechanism,
-    position: int = 0,
+    position: int | None = None,
     *,
     ax: Axes = None,
     ghosts: int = 5,
@@ -82,8 +82,8 @@ def draw_skeleton(
     ----------
     s : Solution or Mechanism
         A solution or response; or a mechanism with geometry, drawn where its loops are closed.
-    position : int
-        Flat index of the position drawn in full.
+    position : int, optional
+        Flat index of the position drawn in full. Default: the first that was solved.
     ax : Axes, optional
         Axes of matplotlib in two or three dimensions. Default: new ones, ``ax.figure.savefig(...)``.
     ghosts : int
@@ -126,11 +126,13 @@ def draw_skeleton(
         f"highlight: there is no pair {name!r}; pairs: {', '.join(names)}" for name in chosen if name not in names
     ]
     faults += trace_faults(found, traces)
-    if not -size <= position < size or position % size not in found.positions:
+    if not len(found.positions):
+        faults.append(f"none of {counted(size, 'position')} was solved")
+    elif position is not None and (not -size <= position < size or position % size not in found.positions):
         faults.append(f"position {position} was not solved, or is none of {size}")
     if faults:
         raise DeclarationError(f"skeleton of {m.name!r}", faults)
-    t = int(np.searchsorted(found.positions, position % size))
+    t = 0 if position is None else int(np.searchsorted(found.positions, position % size))
     painter = painter_for(found, ax, view)
     drawing = Drawing(found, painter, colours(m, chosen))
     others = np.unique(np.linspace(0, len(found.positions) - 1, ghosts + 1).astype(int)) if ghosts else ()

@@ -23,7 +23,7 @@ from mechgraph.determinacy.report import DeterminacyReport, check
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Table, to_html
 from mechgraph.equations.build import formulate
 from mechgraph.errors import DeclarationError, FileError, MechgraphWarning, MissingExtraError, visible
-from mechgraph.files import write_whole
+from mechgraph.files import PAGES, format_of, write_whole
 from mechgraph.kinetostatics import solve
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.toml import written
@@ -239,7 +239,7 @@ def write_report(
     DeclarationError
         Solution or study belong to another mechanism.
     FileError
-        The file cannot be written.
+        The file extension is not that of a page, or the file cannot be written.
     MissingExtraError
         Without jinja2 or matplotlib.
 
@@ -252,6 +252,7 @@ def write_report(
     ...     print([file.name for file in pathlib.Path(folder).iterdir()])
     ['page.html']
     """
+    format_of(path, PAGES)
     write_whole(path, [report_page(m, solution, study)])
 
 
