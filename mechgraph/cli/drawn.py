@@ -17,7 +17,7 @@ from mechgraph import show as pictures
 from mechgraph.cli import options as opt
 from mechgraph.cli import records
 from mechgraph.errors import counted
-from mechgraph.files import PAGES
+from mechgraph.files import PAGES, formats_text
 from mechgraph.show.skeleton import FORMATS as FILMS
 from mechgraph.show.skeleton import PICTURES
 

@@ -51,6 +51,8 @@ from mechgraph.maths.tolerances import RANKS
 from mechgraph.maths.track import Paths
 from mechgraph.maths.tracker import Follower
 
+BRANCHING_MOTIONS = 24
+"""Motions up to which branches are sought: of more, far more branches than are told apart meet, or all of a continuum."""
 TRIAL_STEPS = (0.05, 0.0125, 0.003)
 """Lengths of trial steps (radians, or lengths / L): the first ones tell a motion that returns, the last ones tolerate curvature."""
 STROKE = 0.35
@@ -353,9 +355,7 @@ def branches(
         idle, _ = np.linalg.qr(np.stack([p.rates for p in passive], axis=1))
         U, s, _ = np.linalg.svd(N - idle @ (idle.T @ N), full_matrices=False)
         N = U[:, s > 0.5]
-    # motions up to which branches are sought: of more, far more branches than are told apart meet, or all of a
-    # continuum
-    if found.rank == found.count or N.shape[1] > 24:
+    if found.rank == found.count or N.shape[1] > BRANCHING_MOTIONS:
         return ()
     # of these starts
     rng = np.random.default_rng(5)
