@@ -51,18 +51,16 @@ from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.model.response_setup import Event, ResponseSetup, Stop
 from mechgraph.model.toml import library_names as library
-from mechgraph.modes.assemblies import assemblies
+from mechgraph.modes.assemblies import Assemblies, AssembliesOver, assemblies
 from mechgraph.modes.branches import Branches, branches
-from mechgraph.modes.result import Assemblies, AssembliesOver
 from mechgraph.pairs.contact_types import Hertz
 from mechgraph.pairs.curves import Curve
 from mechgraph.pairs.factors import Bookkeeping, Component, Freedom
 from mechgraph.pairs.pair_type import PairType, pair_types
 from mechgraph.pairs.surfaces import Surface
 from mechgraph.quantities import with_clear_calls
-from mechgraph.response.course import Response
 from mechgraph.response.equilibrium import equilibrium, linearize
-from mechgraph.response.respond import respond
+from mechgraph.response.respond import Response, respond
 from mechgraph.result.free_body import FreeBody, free_body
 from mechgraph.result.over_time import OverTime, over_time
 from mechgraph.result.solution import Solution

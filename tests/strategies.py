@@ -10,7 +10,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 import mechgraph as mg
-from mechgraph.pairs.arc_length import Travel
+from mechgraph.pairs.curves import Travel
 
 SEEDS = st.integers(0, 2**32 - 1)
 

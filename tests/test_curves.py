@@ -11,7 +11,7 @@ from identities.test_engines import assert_engines_agree
 from numpy.testing import assert_allclose
 
 import mechgraph as mg
-from mechgraph.pairs.arc_length import Travel
+from mechgraph.pairs.curves import Travel
 from mechgraph.pairs.given import CURVES
 from mechgraph.show.shapes import symbol
 

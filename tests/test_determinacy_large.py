@@ -25,10 +25,9 @@ from mechgraph.determinacy.mobility import free_motion, random_rows
 from mechgraph.determinacy.uniqueness import uniqueness
 from mechgraph.graph.linkgraph import link_graph
 from mechgraph.kinematics.assembly import assembled
-from mechgraph.kinematics.loop_rows import ClosureRows, ReducedRows
-from mechgraph.kinematics.rank import ClosureRank, closure_rank, rank_of_rows
+from mechgraph.kinematics.solver import ClosureRank, closure_rank, rank_of_rows
 from mechgraph.kinematics.sparse_system import Elimination
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.state import ClosureRows, Configuration, ReducedRows
 from mechgraph.maths.tolerances import RANKS
 
 ENGINES = ("dense", "sparse")

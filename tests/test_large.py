@@ -17,12 +17,11 @@ from strategies import body, motions, solvable
 
 import mechgraph as mg
 from mechgraph.graph.linkgraph import link_graph
-from mechgraph.kinematics import batches
+from mechgraph.kinematics import layout
 from mechgraph.kinematics.assembly import assembled, scaled_start
-from mechgraph.kinematics.batches import Numbers, Tree
-from mechgraph.kinematics.loop_rows import ClosureRows
+from mechgraph.kinematics.layout import Numbers, Tree
 from mechgraph.kinematics.sparse_system import LoopSystem
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.state import ClosureRows, Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.sparse import SparseFactors
 from mechgraph.model.parameters import parameters
@@ -283,7 +282,7 @@ def test_deep_trees_by_pointer_doubling(monkeypatch: pytest.MonkeyPatch) -> None
     x = system.state_of(rng.uniform(-1, 1, (system.n_freedoms, 2)))
     terms, loads = rng.normal(size=(6, P, 2)), rng.normal(size=(6, n, 2))
     shallow, poses = Tree(link_graph(m)), Configuration(system, x).poses
-    monkeypatch.setattr(batches, "DEEP", 0)
+    monkeypatch.setattr(layout, "DEEP", 0)
     deep = Tree(link_graph(m))
     assert deep.deep
     assert not shallow.deep

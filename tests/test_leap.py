@@ -8,8 +8,7 @@ from mechgraph.kernel import build
 from mechgraph.kinematics.assembly import assembled_at
 from mechgraph.response.along_path import POINTS, Arc, Way, _coarse
 from mechgraph.response.charts import Prescribed, Task
-from mechgraph.response.kernel_rates import KernelPath
-from mechgraph.response.motion_equations import Loads
+from mechgraph.response.motion_equations import KernelPath, Loads
 
 Z = np.eye(3)[2]
 

@@ -15,8 +15,7 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import indexed
 from mechgraph.maths.se3 import quaternion_matrix, rotation_exp
 from mechgraph.modes.assemblies import Finder, Question
-from mechgraph.modes.continua import searched
-from mechgraph.modes.family import Member
+from mechgraph.modes.family import Member, searched
 from mechgraph.modes.form import _ball, _two_turns, rods_of
 from mechgraph.modes.homotopy import Equations, Leg
 from mechgraph.modes.start_sets import bound, distinct

@@ -36,7 +36,7 @@ from mechgraph.errors import DeclarationError
 from mechgraph.force.block import hold_names
 from mechgraph.graph.linkgraph import GraphParts, LinkGraph, parts_of
 from mechgraph.kinematics.assembly import at_position
-from mechgraph.kinematics.rank import EngineName
+from mechgraph.kinematics.solver import EngineName
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import independent_rows
 from mechgraph.maths.se3 import Array, Index

@@ -35,7 +35,7 @@ import numpy as np
 
 from mechgraph.determinacy.finite_motion import FiniteMotion
 from mechgraph.determinacy.mobility import Freedoms, Position, freedoms_at
-from mechgraph.kinematics.rank import ClosureRank
+from mechgraph.kinematics.solver import ClosureRank
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import Array, Index, skew

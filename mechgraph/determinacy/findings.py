@@ -34,8 +34,8 @@ from mechgraph.errors import MechgraphError
 from mechgraph.files import patch
 from mechgraph.force.block import hold_at_rest, hold_names, is_idle
 from mechgraph.kinematics.assembly import closed_start
-from mechgraph.kinematics.rank import EngineName
 from mechgraph.kinematics.rates import PassiveMotion
+from mechgraph.kinematics.solver import EngineName
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import independent_rows, rank_of, singular_values

@@ -37,12 +37,10 @@ from functools import cached_property
 import numpy as np
 
 from mechgraph.kinematics.assembly import CLOSED, CLOSURE_GOAL, close
-from mechgraph.kinematics.loop_rows import ClosureRows, ReducedRows
 from mechgraph.kinematics.motion_path import DriverPath
-from mechgraph.kinematics.rank import ClosureRank, EngineName, rank_of_rows
 from mechgraph.kinematics.rates import PassiveMotion
-from mechgraph.kinematics.solver import closure_solver, engine_for
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.solver import ClosureRank, EngineName, closure_solver, engine_for, rank_of_rows
+from mechgraph.kinematics.state import ClosureRows, Configuration, ReducedRows
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import independent_rows
 from mechgraph.maths.newton import closest_zeros

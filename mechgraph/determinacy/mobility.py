@@ -35,10 +35,9 @@ from mechgraph.graph.linkgraph import (
     labels_of_bipartite,
     members,
 )
-from mechgraph.kinematics.loop_rows import ClosureRows
-from mechgraph.kinematics.rank import ClosureRank, EngineName, rank_of_rows
 from mechgraph.kinematics.rates import PassiveMotion
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.solver import ClosureRank, EngineName, rank_of_rows
+from mechgraph.kinematics.state import ClosureRows, Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import complement, independent_rows, rank_of, singular_values
 from mechgraph.maths.se3 import Array, Index, compose, null_space, pose_exp, rotation_exp

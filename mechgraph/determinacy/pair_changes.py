@@ -30,8 +30,7 @@ from mechgraph.determinacy.budget import Budget
 from mechgraph.determinacy.mobility import Freedoms, PlacedPair, Position, free_motion, freedoms_at
 from mechgraph.determinacy.uniqueness import pair_states
 from mechgraph.kinematics.assembly import assembled, at_position, named_columns
-from mechgraph.kinematics.rank import EngineName
-from mechgraph.kinematics.solver import PROBES
+from mechgraph.kinematics.solver import PROBES, EngineName
 from mechgraph.maths.se3 import Array, Index, null_space
 from mechgraph.maths.tolerances import MOTIONS, STRESSES
 from mechgraph.model.mechanism import Mechanism

@@ -27,8 +27,7 @@ from numpy.typing import NDArray
 
 from mechgraph.force.reactions import PairFrames, at_pair_points
 from mechgraph.graph.linkgraph import labels_of_bipartite
-from mechgraph.kinematics.rank import ClosureRank, EngineName, closure_rank
-from mechgraph.kinematics.solver import PROBES, SEED
+from mechgraph.kinematics.solver import PROBES, SEED, ClosureRank, EngineName, closure_rank
 from mechgraph.kinematics.state import Configuration, ContactLines
 from mechgraph.maths.se3 import Array, Index, null_space
 from mechgraph.maths.tolerances import STRESSES

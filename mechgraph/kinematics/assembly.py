@@ -16,12 +16,10 @@ from typing import Any
 import numpy as np
 
 from mechgraph.errors import AssemblyError, DeclarationError, listed
-from mechgraph.kinematics.loop_rows import ClosureRows, ReducedRows, lengths_of
 from mechgraph.kinematics.motion_path import FARTHEST, DriverPath, Request, Status, far_faults
-from mechgraph.kinematics.rank import closure_rank
 from mechgraph.kinematics.reach import BEYOND_END, beyond, follow
-from mechgraph.kinematics.solver import closure_solver, engine_for
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.solver import closure_rank, closure_solver, engine_for
+from mechgraph.kinematics.state import ClosureRows, Configuration, ReducedRows, lengths_of
 from mechgraph.kinematics.system import System, indexed
 from mechgraph.maths.linear import compact, complement
 from mechgraph.maths.newton import closest_zeros, least_norm_steps

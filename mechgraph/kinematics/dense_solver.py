@@ -10,8 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from mechgraph.kinematics.loop_rows import lengths_of
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.state import Configuration, lengths_of
 from mechgraph.maths.linear import (
     RANK_TOLERANCE,
     Choice,

@@ -38,8 +38,7 @@ import numpy as np
 import scipy
 
 from mechgraph.graph.linkgraph import labels_of_bipartite, members
-from mechgraph.kinematics.loop_rows import ClosureRows, ReducedRows
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.state import ClosureRows, Configuration, ReducedRows
 from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.sparse import BlockFactor, BlockTriangular, Factors, Pattern, SparseFactor, SparseFactors
 from mechgraph.maths.tolerances import MOTIONS, RANKS

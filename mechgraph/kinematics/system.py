@@ -23,8 +23,7 @@ import scipy
 from numpy.typing import NDArray
 
 from mechgraph.graph.linkgraph import LinkGraph, link_graph
-from mechgraph.kinematics.batches import FACTORS_AT_ONCE, Numbers
-from mechgraph.kinematics.layout import Places
+from mechgraph.kinematics.layout import FACTORS_AT_ONCE, Numbers, Places
 from mechgraph.maths.linear import Place, compact
 from mechgraph.maths.se3 import Array, Index, turn_between, turn_tangent, turned
 from mechgraph.memo import graph_cached
@@ -90,7 +89,7 @@ class Rows(PositionRows, Protocol):
     """Rows that serve accelerations, forces and the sparse engine as well."""
 
     def sparse_jacobian(self, t: int) -> scipy.sparse.csr_array | None:
-        """``J (n, F)`` at one position, entries at the same places at all of them; None for loops (see ``kinematics.loop_rows``)."""
+        """``J (n, F)`` at one position, entries at the same places at all of them; None for loops (see ``kinematics.state``)."""
 
     def bias(self, here: Evaluated, pairs: Array) -> Array:
         """Velocity part ``(n, T)`` of ``d^2 phi/dt^2 = J q'' + bias``, from that of the relative accelerations of ``pairs (6, P, T)``."""
@@ -130,7 +129,7 @@ class LoopRows:
         return here.loop_jacobian
 
     def sparse_jacobian(self, t: int) -> None:
-        """None: ``kinematics.loop_rows`` makes it."""
+        """None: ``kinematics.state`` makes it."""
 
     def rates(self, here: Evaluated, dq: Array) -> Array:
         """``sum_k C_lk S_k q'_k``."""

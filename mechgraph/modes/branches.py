@@ -30,18 +30,19 @@ from mechgraph.maths.singular_point import passed
 from mechgraph.maths.tolerances import MODES
 from mechgraph.maths.tracker import End
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.modes.assemblies import Finder, Question
-from mechgraph.modes.family import Array, Family
-from mechgraph.modes.result import (
+from mechgraph.modes.assemblies import (
     Bifurcation,
     BranchData,
     BranchesData,
+    Finder,
     Fold,
+    Question,
     in_degrees,
     unit_of,
     values_text,
     weakest,
 )
+from mechgraph.modes.family import Array, Family
 from mechgraph.quantities import Index as Seed
 from mechgraph.quantities import at_least, door, is_numeric, wrong
 

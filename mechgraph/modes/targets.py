@@ -33,8 +33,7 @@ from mechgraph.maths.se3 import Index, compose, identity
 from mechgraph.maths.tolerances import MODES
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Pair
-from mechgraph.modes.continua import Nearby, irregular, least_value
-from mechgraph.modes.family import Array, Family, Member
+from mechgraph.modes.family import Array, Family, Member, Nearby, irregular, least_value
 from mechgraph.modes.form import RodFamily, RodPoints, RodStep, RodSystem, behind, sets_of
 from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, Equations, Leg, follow, rounding
 from mechgraph.modes.start_sets import StartSet, distinct

@@ -3,6 +3,15 @@
     x(u), u in (begin, end): position in the frame of the link that bears the curve, with three derivatives by the parameter u.
 
 Arc length, direction and frame are found from these (``arc_length``). Arguments may be complex, as in all kernels.
+
+A curve by its arc length: the parameter there, tangent, curvature, and the frame that travels along it.
+
+With arc length s, tangent t = dx/ds and the third axis k of the frame (y = k x t), the frame turns by
+
+    w = t x t' + r t,     r = 0 (minimizing),   r = (d . t) (t' . y) / |d - (d . t) t| (guided by d),
+
+a prime for d/ds. Source: Bishop, There is more than one way to frame a curve, Amer. Math. Monthly 82, 1975 (minimizing frames).
+Parameter and turn of a minimizing frame are integrals, kept as polynomials (Hermite) between points that are close enough.
 """
 
 from __future__ import annotations
@@ -15,6 +24,7 @@ from functools import cached_property
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
+import scipy
 
 from mechgraph.fields import (
     DIRECTION,
@@ -28,10 +38,12 @@ from mechgraph.fields import (
     axes_of,
     filled_second,
     parallel_faults,
+    second_direction,
 )
-from mechgraph.maths.se3 import Array
+from mechgraph.maths.se3 import Array, cross
+from mechgraph.maths.tolerances import SHAPES
 from mechgraph.memo import Once
-from mechgraph.quantities import LENGTH
+from mechgraph.quantities import LENGTH, shown
 
 
 @dataclass(frozen=True)
@@ -430,3 +442,341 @@ class Involute(Centred):
         if not found and not self.angles[0] > 0:
             found.append(f"{where}angles = {self.angles}: the involute has a cusp at angle 0; begin above it")
         return found
+
+
+COMPLEX_STEP = 1e-30
+"""Imaginary step of a derivative."""
+GAUSS_NODES, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(6)
+"""Rule of an integral over an interval that is short enough for a polynomial of degree 7."""
+
+
+@dataclass(frozen=True)
+class CurvePlace:
+    """A curve at arc lengths ``(...)``: position, tangent and its rates by the arc length ``(3, ...)``, axes y and k, rates of turning."""
+
+    x: Array
+    t: Array
+    dt: Array
+    y: Array
+    k: Array
+    w: Array
+    dw: Array
+
+    @property
+    def real(self) -> CurvePlace:
+        """Without imaginary parts."""
+        parts = (self.x, self.t, self.dt, self.y, self.k, self.w, self.dw)
+        return CurvePlace(*(np.asarray(part.real) for part in parts))
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+class Travel:
+    """Arc length and frames of a curve without faults."""
+
+    def __init__(self, curve: Curve) -> None:
+        self.curve = curve
+        self.speed = curve.speed
+        self._origin = curve.ends[0] if np.isfinite(curve.ends[0]) else 0.0
+        if self.speed is not None:
+            s = self.speed * (curve.grid - self._origin)
+        else:
+            s, self._parameter = _by_arc_length(curve)
+        self.s = s
+        self.begin, self.end = (float(s[0]), float(s[-1])) if np.isfinite(curve.ends[0]) else (-np.inf, np.inf)
+        self.length = float(s[-1] - s[0])
+        self.is_closed = curve.is_closed
+        self.guide, self.is_plane = self._guide()
+        self.minimizing = curve.frame == "minimizing"
+        self.closing = 0.0
+        self._turn: Pieces | None = None
+        if self.minimizing and not self.is_plane:
+            self._find_turn()
+
+    def _guide(self) -> tuple[Array, bool]:
+        """The direction near which the third axis of the frame stays, and whether the curve lies in a plane at right angles to it."""
+        t = self._rates(self._parameter_at(self.s))[1]
+
+        def across(normal: Array) -> bool:
+            return bool(np.abs(normal @ t).max() < SHAPES.even)
+
+        self.is_straight = bool(np.abs(t - t[:, :1]).max() < SHAPES.even)
+        given = self.curve.guide if self.curve.frame == "guided" else None
+        if given is not None:
+            d = np.asarray(given, dtype=float) / np.linalg.norm(given)
+            return d, across(d)
+        if self.is_straight:
+            return np.cross(t[:, 0], second_direction(tuple(t[:, 0].tolist()))), True
+        axis = self.curve.normal
+        if axis is not None and (self.curve.frame == "guided" or across(axis)):
+            return axis, across(axis)
+        normal = np.linalg.svd(t @ t.T)[0][:, 2]
+        if across(normal) or self.curve.frame == "guided":
+            return _right_handed(normal, self.curve.at(self.curve.grid)[0]), across(normal)
+        return far_from(t), False
+
+    # --- by arc length -----------------------------------------------------------------------------------------------
+
+    def _parameter_at(self, s: Array) -> Array:
+        """The parameter at arc lengths; beyond the ends of an open curve at the speed that it has there."""
+        if self.speed is not None:
+            return np.asarray(self._origin + s / self.speed)
+        inside = (
+            s.real - self._rounds(s.real) * self.length if self.is_closed else np.clip(s.real, self.begin, self.end)
+        )
+        u = self._parameter.at(inside)[0]
+        beyond = s - s.real if self.is_closed else s - inside
+        return np.asarray(u + beyond * _parameter_rates(self.curve.at(u))[0]) if np.any(beyond) else u
+
+    def _rounds(self, s: Array) -> Array:
+        return np.floor((s - self.s[0]) / self.length)
+
+    def _rates(self, u: Array) -> tuple[Array, Array, Array, Array]:
+        """Position and its first three derivatives by the arc length, ``(3, ...)`` each."""
+        x = self.curve.at(u)
+        if self.speed is not None:
+            return x[0], x[1] / self.speed, x[2] / self.speed**2, x[3] / self.speed**3
+        u1, u2, u3 = _parameter_rates(x)
+        square = u1 * u1
+        return x[0], x[1] * u1, x[2] * square + x[1] * u2, x[3] * (square * u1) + 3 * x[2] * (u1 * u2) + x[1] * u3
+
+    def guided(self, s: Array) -> tuple[Array, ...]:
+        """``x, t, t', t'', y, k, r, r'`` of the frame guided by the direction."""
+        x, t, dt, ddt = self._rates(self._parameter_at(s))
+        d = self.guide.reshape(3, *(1,) * s.ndim)
+        c, dc = _dot(d, t), _dot(d, dt)
+        m = np.sqrt(1.0 - c * c)
+        k = (d - c * t) / m
+        y = cross(k, t)
+        bend = _dot(dt, y)
+        r = c * bend / m
+        dr = (dc * bend + c * (_dot(ddt, y) + r * _dot(dt, k))) / m + c * c * dc * bend / m**3
+        return x, t, dt, ddt, y, k, r, dr
+
+    def at(self, s: Array) -> CurvePlace:
+        """Position and frame at arc lengths ``(...)``, real or complex."""
+        if self.is_plane:
+            u = self._parameter_at(s)
+            known: CurvePlace | None = self.curve.place_at(u)
+            if known is not None:
+                return known
+            x, t, dt, ddt = self._rates(u)
+            k = np.broadcast_to(self.guide.reshape(3, *(1,) * s.ndim), t.shape)
+            y = cross(k, t)
+            # t' = c y with the curvature c towards y
+            return CurvePlace(x, t, dt, y, k, _dot(dt, y) * k, _dot(ddt, y) * k)
+        x, t, dt, ddt, y, k, r, dr = self.guided(s)
+        w, dw = cross(t, dt), cross(t, ddt)
+        if not self.minimizing:
+            w, dw = w + r * t, dw + dr * t + r * dt
+        if self._turn is not None:
+            # endless curves repeat what the grid holds, two turns of a helix
+            again = self.is_closed or np.isinf(self.begin)
+            rounds = self._rounds(s.real) if again else np.zeros(s.shape)
+            a = self._turn.at(s.real - rounds * self.length)[0] + rounds * self._gain - (s - s.real) * r
+            y, k = np.cos(a) * y + np.sin(a) * k, np.cos(a) * k - np.sin(a) * y
+        return CurvePlace(x, t, dt, y, k, w, dw)
+
+    def _find_turn(self) -> None:
+        """The angle by which the minimizing frame is turned about the tangent against the guided one: ``a' = -r``."""
+
+        def rate(s: Array) -> Array:
+            return -self.guided(s)[6]
+
+        def rates(s: Array) -> tuple[Array, ...]:
+            *_, r, dr = self.guided(s)
+            return -r, -dr, -self._turn_rate(s, dr)
+
+        def strays(begin: Array, end: Array) -> Array:
+            half, whole = _integrals(rate, begin, 0.5 * (begin + end)), _integrals(rate, begin, end)
+            made = hermite(end - begin, [0 * whole, *rates(begin)], [whole, *rates(end)])
+            return np.asarray(np.abs(_value(made, 0.5 * (end - begin)) - half) > 1e-15 * math.tau)
+
+        s = _refined(self.s, strays)
+        a = np.concatenate([[0.0], np.cumsum(_integrals(rate, s[:-1], s[1:]))])
+        self._turn = Pieces.meeting(s, [a, *rates(s)], orders=1)
+        self._gain = float(a[-1])
+        self.closing = self._gain if self.is_closed else 0.0
+
+    def _turn_rate(self, s: Array, dr: Array) -> Array:
+        """``r''``, of which the fourth derivative of the curve is part: by a complex step, or a spline where that is not known."""
+        if self.curve.orders <= ORDERS:
+            spline: Any = scipy.interpolate.make_interp_spline(s, dr, 5)
+            return np.asarray(spline(s, 1))
+        ahead: Array = s + 1j * COMPLEX_STEP  # type: ignore[assignment]
+        return np.asarray(self.guided(ahead)[7].imag / COMPLEX_STEP)
+
+    # --- facts -------------------------------------------------------------------------------------------------------
+
+    def curvature(self, s: Array) -> Array:
+        """Curvature ``|t'|``; of a plane curve with the sign of ``t' . y``, positive where it bends towards y."""
+        here = self.at(s)
+        return _dot(here.dt, here.y) if self.is_plane else np.asarray(np.sqrt(_dot(here.dt, here.dt)))
+
+    def nearest(self, p: Array) -> tuple[float, float]:
+        """Arc length of the point of the curve that is nearest to ``p (3,)``, and its distance."""
+        s: Any = self._first(p)
+        # steps of Newton's method to the nearest point, at most
+        for _ in range(40):
+            x, t, dt, _ = self._rates(self._parameter_at(np.array([s])))
+            off = (x - p[:, None])[:, 0]
+            slope = 1.0 + off @ dt[:, 0]
+            step = float(off @ t[:, 0]) / (slope if slope > 0.1 else 1.0)
+            s = s - step if self.is_closed else min(max(s - step, self.begin), self.end)
+            if np.abs(step) < 1e-15 * self.length:
+                break
+        if self.is_closed:
+            s -= float(self._rounds(np.array(s))) * self.length
+        x = self._rates(self._parameter_at(np.array([s])))[0][:, 0]
+        return float(s), float(np.linalg.norm(x - p))
+
+    def _first(self, p: Array) -> float:
+        """A guess of the nearest arc length; of an endless curve by its advance."""
+        s = self.s
+        if np.isinf(self.begin):
+            x = self._rates(self._parameter_at(s))[0]
+            chord = x[:, -1] - x[:, 0]
+            s = s + (p - x.mean(axis=1)) @ chord / (chord @ chord) * self.length
+        x = self._rates(self._parameter_at(s))[0]
+        return float(s[np.argmin(np.linalg.norm(x - p[:, None], axis=0))])
+
+
+def _parameter_rates(x: Array) -> tuple[Array, Array, Array]:
+    """Three derivatives of the parameter by the arc length, from position and derivatives ``(4, 3, ...)`` by the parameter."""
+    u1 = 1.0 / np.sqrt(_dot(x[1], x[1]))
+    square = u1 * u1
+    a, b = _dot(x[1], x[2]) * square, (_dot(x[2], x[2]) + _dot(x[1], x[3])) * square
+    return u1, -a * square, (4 * a * a - b) * square * u1
+
+
+def _integrals(f: Callable[[Array], Array], begin: Array, end: Array) -> Array:
+    """Integrals over intervals, by Gauss's rule."""
+    half = (end - begin) / 2
+    return np.asarray((f(begin[:, None] + half[:, None] * (1 + GAUSS_NODES)) @ GAUSS_WEIGHTS) * half)
+
+
+def _refined(grid: Array, strays: Callable[[Array, Array], Array]) -> Array:
+    """The grid with intervals halved, up to eight times, as long as ``strays(begin, end)`` says so of them."""
+    begin, end, cuts = grid[:-1], grid[1:], [grid]
+    for _ in range(8):
+        bad = strays(begin, end)
+        begin, end = begin[bad], end[bad]
+        cuts.append(middle := 0.5 * (begin + end))
+        begin, end = np.concatenate([begin, middle]), np.concatenate([middle, end])
+        if not begin.size:
+            break
+    return np.sort(np.concatenate(cuts))
+
+
+def _value(coefficients: Array, x: Array) -> Array:
+    """Values ``(n,)`` of polynomials ``(degree + 1, n)``, lowest power first, each at its own ``x (n,)``."""
+    return np.asarray(np.polynomial.polynomial.polyval(x, coefficients, tensor=False))
+
+
+def _by_arc_length(curve: Curve) -> tuple[Array, Pieces]:
+    """Arc lengths on a grid, and the parameter by the arc length: intervals in which that is not exact in the middle are halved."""
+
+    def speed(u: Array) -> Array:
+        x = curve.at(u)[1]
+        return np.asarray(np.sqrt(_dot(x, x)))
+
+    def strays(begin: Array, end: Array) -> Array:
+        middle = 0.5 * (begin + end)
+        half = _integrals(speed, begin, middle)
+        rates = [_parameter_rates(curve.at(u)) for u in (begin, end)]
+        made = hermite(half + _integrals(speed, middle, end), [0 * half, *rates[0]], [end - begin, *rates[1]])
+        return np.asarray(np.abs(_value(made, half) - (middle - begin)) > most)
+
+    most = 1e-15 * (curve.grid[-1] - curve.grid[0])  # rounding
+    u = _refined(curve.grid, strays)
+    s = np.concatenate([[0.0], np.cumsum(_integrals(speed, u[:-1], u[1:]))])
+    return s, Pieces.meeting(s, [u, *_parameter_rates(curve.at(u))], orders=1)
+
+
+def _right_handed(normal: Array, x: Array) -> Array:
+    """The normal about which points ``(3, n)`` are passed in the positive sense."""
+    about = np.cross(x[:, :-1] - x[:, :1], np.diff(x), axis=0).sum(axis=1) @ normal
+    if abs(about) < 1e-9 * np.ptp(x, axis=1).max() ** 2:
+        about = normal[np.argmax(np.abs(normal))]
+    return normal if about > 0 else -normal
+
+
+def far_from(t: Array) -> Array:
+    """The direction that keeps farthest from all directions ``(3, n)`` and their opposites, of 200 on a spiral over the sphere."""
+    i = np.arange(200) + 0.5
+    z, angle = 1 - i / 200, np.pi * (1 + np.sqrt(5.0)) * i
+    tried = np.stack([np.sqrt(1 - z * z) * np.cos(angle), np.sqrt(1 - z * z) * np.sin(angle), z])
+    return np.asarray(tried[:, np.argmin(np.abs(tried.T @ t).max(axis=1))])
+
+
+def shape_faults(curve: Curve, where: str) -> list[str]:
+    """Places where a curve cannot be followed: cusps, gaps of one that must be closed, a guide along the tangent."""
+    x, name = curve.at(curve.grid), where.removesuffix(".")
+    v = np.sqrt(_dot(x[1], x[1]))
+    turns = _dot(x[1][:, 1:], x[1][:, :-1]) <= 0
+    slow = np.flatnonzero((v < SHAPES.standstill * v.max()) | np.append(turns, False))
+    if slow.size:
+        return [
+            f"{name} has a cusp at {point_text(x[0][:, slow[0]])} (parameter {curve.grid[slow[0]]:.6g}); end it before that"
+        ]
+    if curve.roller:
+        found = roller_faults(curve, curve.roller, "undercut: ", where)
+        if found:
+            return found
+    if not curve.is_closed:
+        return _guide_faults(curve, x[1] / v, x[0], where)
+    gap, turn = np.linalg.norm(x[0][:, -1] - x[0][:, 0]), np.linalg.norm(x[1][:, -1] / v[-1] - x[1][:, 0] / v[0])
+    if gap > SHAPES.met * np.ptp(x[0], axis=1).max() or turn > SHAPES.met:
+        return [
+            f"{name} is not closed: its ends are {gap:.3g} apart, their tangents differ by {turn:.3g} rad; let it end where it begins, "
+            "or declare it open"
+        ]
+    return _guide_faults(curve, x[1] / v, x[0], where)
+
+
+def outside(curve: Curve) -> float:
+    """1 where the normal y of a closed plane curve points outwards, -1 where it points inwards."""
+    travel = curve.once(Travel)
+    here = travel.at(travel.s)
+    about = _dot(
+        cross(here.x[:, :-1] - here.x[:, :1], np.diff(here.x)),
+        np.broadcast_to(travel.guide[:, None], here.x[:, 1:].shape),
+    )
+    return -1.0 if about.sum() > 0 else 1.0
+
+
+def roller_faults(curve: Curve, radius: float, what: str, where: str, side: float | None = None) -> list[str]:
+    """Where a roller is larger than the radius of curvature of the path of its center (``side`` None: that path is ``curve``, on the
+    outside of the shape) or of the curve on which it runs, with its center on the side of the normal y (1) or the other (-1).
+    """
+    travel = curve.once(Travel)
+    towards = -outside(curve) if side is None else side
+    bend = towards * travel.curvature(travel.s)
+    worst = int(np.argmax(bend))
+    if radius * bend[worst] < 1 - SHAPES.standstill:
+        return []
+    return [
+        f"{where}{what}the roller of radius {radius:.6g} is larger than the radius of curvature {1 / bend[worst]:.6g} at "
+        f"{point_text(travel.at(travel.s[worst : worst + 1]).x[:, 0])}; make it smaller, or the curve rounder"
+    ]
+
+
+def _guide_faults(curve: Curve, t: Array, x: Array, where: str) -> list[str]:
+    if curve.frame != "guided" or curve.guide is None:
+        return []
+    d = np.asarray(curve.guide) / np.linalg.norm(curve.guide)
+    along = np.abs(d @ t)
+    worst = int(np.argmax(along))
+    if along[worst] < 1 - SHAPES.met:
+        return []
+    return [
+        f"{where}guide = {shown(curve.guide)}: is the direction of the curve at {point_text(x[:, worst])}; give another, or "
+        "frame='minimizing'"
+    ]
+
+
+def point_text(x: Array) -> str:
+    """A point ``(3,)`` in a message."""
+    return "(" + ", ".join(f"{v:.6g}" for v in x) + ")"

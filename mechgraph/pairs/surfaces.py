@@ -31,8 +31,7 @@ from mechgraph.fields import (
 )
 from mechgraph.fields import TABLE as NESTED
 from mechgraph.maths.se3 import Array, cross
-from mechgraph.pairs.arc_length import far_from
-from mechgraph.pairs.curves import Circle, Curve, Line, remade_from
+from mechgraph.pairs.curves import Circle, Curve, Line, far_from, remade_from
 from mechgraph.pairs.given import asked, between, slope_faults
 from mechgraph.quantities import LENGTH, PURE, shown, wrong
 

@@ -13,8 +13,7 @@ import numpy as np
 
 from mechgraph.errors import ShapeError
 from mechgraph.maths.se3 import Array, cross
-from mechgraph.pairs.arc_length import COMPLEX_STEP, CurvePlace, Travel
-from mechgraph.pairs.curves import ORDERS, Curve, turned
+from mechgraph.pairs.curves import COMPLEX_STEP, ORDERS, Curve, CurvePlace, Travel, turned
 from mechgraph.pairs.factors import UNIT_TWISTS, Factor, Freedom, PoseStack, Stack, entries
 from mechgraph.pairs.surfaces import Surface
 

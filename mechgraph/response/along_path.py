@@ -46,8 +46,7 @@ from mechgraph.by_kernel import COMPILED
 from mechgraph.errors import DeclarationError
 from mechgraph.force.loads import NOT_FINITE, Site, user_poses, user_twists
 from mechgraph.kinematics.motion_path import DriverPath
-from mechgraph.kinematics.rank import closure_rank
-from mechgraph.kinematics.solver import FactoredClosure, closure_solver
+from mechgraph.kinematics.solver import FactoredClosure, closure_rank, closure_solver
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Array, Index, cross, rotate
@@ -57,8 +56,7 @@ from mechgraph.maths.track import Interpolation, Nodes, Paths
 from mechgraph.maths.tracker import End, Follower
 from mechgraph.model.loads import Load
 from mechgraph.response.charts import Task
-from mechgraph.response.kernel_rates import KernelPath
-from mechgraph.response.motion_equations import ClosedChart, Loads, Stopped, along_one
+from mechgraph.response.motion_equations import ClosedChart, KernelPath, Loads, Stopped, along_one
 
 OF_LOADS = 4
 """Tabulated terms of the loads that depend on the place, and on rates linearly: see ``along_one``."""

@@ -36,10 +36,11 @@ from mechgraph.maths.tolerances import RESPONSE
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
-from mechgraph.response.kernel_rates import EvaluatedRates, KernelRates
 from mechgraph.response.motion_equations import (
     Chart,
     ClosedChart,
+    EvaluatedRates,
+    KernelRates,
     Loads,
     Moved,
     Stopped,

@@ -11,13 +11,13 @@ import numpy as np
 from mechgraph.determinacy.facts import nearly_singular
 from mechgraph.errors import DeclarationError
 from mechgraph.kinematics.assembly import scaled_system
-from mechgraph.kinematics.rank import closure_rank
+from mechgraph.kinematics.solver import closure_rank
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import indexed
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import RANKS
 from mechgraph.quantities import door, shown, unit_of
-from mechgraph.response.course import Response
+from mechgraph.response.respond import Response
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import MaterialPoint
 from mechgraph.show.canvas import HATCH, INK, MUTED, PALETTE, REACTION, Axes, axis_label, new_axes, plain, said

@@ -16,8 +16,8 @@ from mechgraph.graph.chains import Chain
 from mechgraph.graph.linkgraph import link_graph
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.modes.assemblies import Assemblies
 from mechgraph.modes.branches import Branch, Branches
-from mechgraph.modes.result import Assemblies
 from mechgraph.quantities import Count, door, unit_of, wrong
 from mechgraph.show.canvas import (
     FAINT,

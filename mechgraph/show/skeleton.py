@@ -17,7 +17,7 @@ from mechgraph.files import Format, format_of, optional, whole_file, writable
 from mechgraph.maths.se3 import Array
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import Positive, door, shown, unit_of, wrong
-from mechgraph.response.course import Response
+from mechgraph.response.respond import Response
 from mechgraph.result.solution import Solution
 from mechgraph.show.canvas import (
     DRAWN,

@@ -21,7 +21,7 @@ import numpy as np
 import mechgraph as mg
 from mechgraph.kinematics.state import Configuration
 from mechgraph.modes.assemblies import Question
-from mechgraph.modes.continua import searched
+from mechgraph.modes.family import searched
 from mechgraph.modes.start_sets import NOT_PASSED
 
 FREEDOMS = {"R": 1, "P": 1, "C": 2, "U": 2, "S": 3, "Sp": 5, "Sg": 4, "Sc": 3, "E": 3}

@@ -11,7 +11,7 @@ from sweep_assemblies import TOGETHER, outside, prints, topology
 import mechgraph as mg
 from mechgraph.kinematics.state import Configuration
 from mechgraph.modes.assemblies import Question
-from mechgraph.modes.continua import searched
+from mechgraph.modes.family import searched
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ import strategies
 from numpy.testing import assert_allclose
 
 import mechgraph as mg
-from mechgraph.kinematics import batches
+from mechgraph.kinematics import layout
 from mechgraph.kinematics.assembly import close, scaled_system
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System, indexed
@@ -312,7 +312,7 @@ def test_a_factor_with_a_moving_twist(factor, after):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_batch_is_the_evaluation_of_each(seed, monkeypatch):
-    """Small batches are multiplied by ``matmul``, large ones by ``einsum``; deep mechanisms are walked by doubling."""
+    """Deep mechanisms are walked by doubling."""
     system, x = closed(strategies.closed_mechanism(seed), seed, 0.02)
     rng = np.random.default_rng(seed)
     dq = rng.uniform(-0.1, 0.1, (system.n_freedoms, 70))
@@ -324,7 +324,7 @@ def test_a_batch_is_the_evaluation_of_each(seed, monkeypatch):
         return [np.array(part) for part in (*parts, *(X for frames in here.frames for X in frames))]
 
     whole = everything(Configuration(system, states), dq)
-    monkeypatch.setattr(batches, "DEEP", 0)
+    monkeypatch.setattr(layout, "DEEP", 0)
     doubled = everything(Configuration(system, states), dq)
     monkeypatch.undo()
     for t in (0, 17, 69):
