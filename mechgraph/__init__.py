@@ -39,12 +39,11 @@ from mechgraph.graph.atlas import (
     system_groups,
 )
 from mechgraph.graph.chains import Chain
-from mechgraph.kinetostatics import assemble, kinematics, solve
+from mechgraph.kinetostatics import Transmission, assemble, kinematics, solve, transmission
 from mechgraph.maths import inertia
 from mechgraph.maths.tolerances import Tolerances
 from mechgraph.model.chain import chain
-from mechgraph.model.couplings import Coupling
-from mechgraph.model.gears import Belt, BevelGears, Rack, SpurGears, WormGear
+from mechgraph.model.couplings import Belt, BevelGears, Coupling, Rack, SpurGears, WormGear
 from mechgraph.model.loads import Damper, Effort, ForceLaw, ForceTable, Gravity, Spring, TorsionSpring, Wrench
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Drive, Motion
@@ -64,7 +63,6 @@ from mechgraph.response.respond import Response, respond
 from mechgraph.result.free_body import FreeBody, free_body
 from mechgraph.result.over_time import OverTime, over_time
 from mechgraph.result.solution import Solution
-from mechgraph.transmission import Transmission, transmission
 from mechgraph.variants.study import Study, study
 
 if TYPE_CHECKING:

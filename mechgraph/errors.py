@@ -1,4 +1,4 @@
-"""The errors of mechgraph, one family; and Ctrl-C while the command line starts.
+"""The errors of mechgraph, one family; what a search may spend; and Ctrl-C while the command line starts.
 
 Ctrl-C while the command line starts, which is mostly the loading of numpy: a message and a status, no traceback.
 Imported before everything else. An exception would not do: what is being loaded may turn it into another one.
@@ -11,8 +11,8 @@ import os
 import re
 import signal
 import sys
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -448,3 +448,44 @@ def _is_program() -> bool:
 
 if _is_program() and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
     signal.signal(signal.SIGINT, _stop)
+
+
+Item = TypeVar("Item")
+
+
+class SearchEnded(MechgraphError):
+    """A search was given up."""
+
+
+class Budget:
+    """Seconds that a search may take on one quiet core; every step of it says what it takes by the sizes of its arrays (measured)."""
+
+    TOOK_TOO_LONG = "the search took longer than it may"
+
+    def __init__(self, seconds: float) -> None:
+        self.left = seconds
+
+    @property
+    def ended(self) -> bool:
+        """Whether more was spent than there was."""
+        return self.left < 0.0
+
+    def spend(self, seconds: float) -> None:
+        """Count a step.
+
+        Raises
+        ------
+        SearchEnded
+            where nothing is left.
+        """
+        self.left -= seconds
+        if self.ended:
+            raise SearchEnded(self.TOOK_TOO_LONG)
+
+    def of(self, items: Iterable[Item], seconds: float) -> Iterator[Item]:
+        """The items, each of which costs as much, as far as there is something left."""
+        for item in items:
+            self.left -= seconds
+            if self.ended:
+                return
+            yield item

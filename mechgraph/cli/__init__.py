@@ -9,8 +9,21 @@ import typer
 from typer.core import TyperGroup
 
 import mechgraph
-from mechgraph.cli.commands import check, compile_, equations, list_library, loads, respond, save, solve, structure
-from mechgraph.cli.drawn import assemblies, branches, plot, report
+from mechgraph.cli.commands import (
+    assemblies,
+    branches,
+    check,
+    compile_,
+    equations,
+    list_library,
+    loads,
+    plot,
+    report,
+    respond,
+    save,
+    solve,
+    structure,
+)
 from mechgraph.cli.options import DONE, EXIT_STATUS, outcome, warned, write
 
 

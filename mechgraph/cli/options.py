@@ -28,8 +28,7 @@ from rich.text import Text
 import mechgraph as mg
 from mechgraph.document import Document, to_text
 from mechgraph.errors import INTERRUPTED, MechgraphError, MechgraphWarning, did_you_mean, near_names, shortened, visible
-from mechgraph.exchange.comparison import compare
-from mechgraph.exchange.files import READERS
+from mechgraph.exchange.files import READERS, compare
 from mechgraph.files import Format, format_of, formats_text, writable
 from mechgraph.kinematics.prescribed import coordinate
 from mechgraph.model.mechanism import Mechanism

@@ -14,12 +14,12 @@ from mechgraph.determinacy.findings import Rounding
 from mechgraph.determinacy.report import KEYS, AdviceData, schemas
 from mechgraph.equations.terms import written
 from mechgraph.files import VERSION, Json, json_text, object_schema, patch, plain, read_off, schema_of
+from mechgraph.kinetostatics import TransmissionData
 from mechgraph.model.toml import to_data
 from mechgraph.modes.assemblies import AssembliesData, BranchesData
 from mechgraph.response.respond import ResponseData
 from mechgraph.result.over_time import OverTimeData
 from mechgraph.result.summary import SolutionData
-from mechgraph.transmission import TransmissionData
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.determinacy import findings
-from mechgraph.determinacy.budget import Budget
 from mechgraph.determinacy.decomposition import Decomposition, decomposition
 from mechgraph.determinacy.families import Families, MotionKind, families, kind_of, kind_of_mechanism
 from mechgraph.determinacy.findings import (
@@ -32,7 +31,7 @@ from mechgraph.determinacy.pair_changes import LARGEST_FOR_SETS, Effect, advice
 from mechgraph.determinacy.uniqueness import SelfStress, Uniqueness, uniqueness
 from mechgraph.equations.build import BOOKKEEPINGS, BookkeepingName, formulate
 from mechgraph.equations.terms import Ledger, LedgerRow
-from mechgraph.errors import DeclarationError
+from mechgraph.errors import Budget, DeclarationError
 from mechgraph.force.block import hold_names
 from mechgraph.graph.linkgraph import GraphParts, LinkGraph, parts_of
 from mechgraph.kinematics.assembly import at_position

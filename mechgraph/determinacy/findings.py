@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.determinacy.budget import Budget, SearchEnded
 from mechgraph.determinacy.families import kind_of
 from mechgraph.determinacy.mobility import Freedoms, Position, drive_order, single_freedoms
 from mechgraph.determinacy.pair_changes import (
@@ -30,7 +29,7 @@ from mechgraph.determinacy.pair_changes import (
     with_spline,
 )
 from mechgraph.determinacy.snapping import EXACT, SnappedMechanism, candidates, snapped
-from mechgraph.errors import MechgraphError
+from mechgraph.errors import Budget, MechgraphError, SearchEnded
 from mechgraph.files import patch
 from mechgraph.force.block import hold_at_rest, hold_names, is_idle
 from mechgraph.kinematics.assembly import closed_start

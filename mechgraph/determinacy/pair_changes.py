@@ -26,9 +26,9 @@ from itertools import islice, product
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.determinacy.budget import Budget
 from mechgraph.determinacy.mobility import Freedoms, PlacedPair, Position, free_motion, freedoms_at
 from mechgraph.determinacy.uniqueness import pair_states
+from mechgraph.errors import Budget
 from mechgraph.kinematics.assembly import assembled, at_position, named_columns
 from mechgraph.kinematics.solver import PROBES, EngineName
 from mechgraph.maths.se3 import Array, Index, null_space

@@ -14,7 +14,6 @@ from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 from mechgraph.determinacy import sentences
-from mechgraph.determinacy.budget import Budget, SearchEnded
 from mechgraph.determinacy.decomposition import Decomposition, joints_at
 from mechgraph.determinacy.facts import Facts, Geometry
 from mechgraph.determinacy.families import COLUMNS, Families
@@ -25,7 +24,16 @@ from mechgraph.determinacy.pair_changes import LARGEST_FOR_SETS
 from mechgraph.determinacy.sentences import assumed, here_only, kind_line, loop_names, mobility_line, reasons, verdict
 from mechgraph.determinacy.snapping import EXACT, meant
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table, to_markdown, to_text
-from mechgraph.errors import AssemblyError, DeadPointError, DeclarationError, IndeterminateError, MechgraphError, listed
+from mechgraph.errors import (
+    AssemblyError,
+    Budget,
+    DeadPointError,
+    DeclarationError,
+    IndeterminateError,
+    MechgraphError,
+    SearchEnded,
+    listed,
+)
 from mechgraph.files import Json, json_text, members, plain, read_off, schema_of
 from mechgraph.graph.atlas import Identity, identify
 from mechgraph.graph.linkgraph import link_graph

@@ -29,9 +29,8 @@ from typing import Any, TypeAlias
 import numpy as np
 import scipy
 
-from mechgraph.determinacy.budget import Budget, SearchEnded
 from mechgraph.document import Document, Paragraph, Shown, Table
-from mechgraph.errors import DeclarationError
+from mechgraph.errors import Budget, DeclarationError, SearchEnded
 from mechgraph.fields import tolerance_fault
 from mechgraph.kinematics.assembly import closed_start
 from mechgraph.kinematics.state import Configuration

@@ -18,8 +18,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from mechgraph.document import Document, Equation, Paragraph, Shown, Table, latex_words
-from mechgraph.document.tree import plain
+from mechgraph.document import Document, Equation, Paragraph, Shown, Table, latex_words, plain
 from mechgraph.errors import DeclarationError, counted
 from mechgraph.files import cell, csv_of
 from mechgraph.maths.se3 import Array

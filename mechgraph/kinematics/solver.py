@@ -5,7 +5,8 @@
 A *form* is what is decided once and serves many positions: which rows are independent and which columns are held (dense), or the
 borders that make the matrix square (sparse). Positions name their form by its number.
 
-Rank, motions and self-stresses at one position. Both engines start from the reduced rows ``K`` of all loops (``kinematics.state``), so that a self-stress of a single loop is the same in both:
+Rank, motions and self-stresses at one position. Both engines start from the reduced rows ``K`` of all loops (``kinematics.state``),
+so that a self-stress of a single loop is the same in both:
 
     rank J = rank K,   J q = 0  <=>  K (q / scale) = 0,   J^T x = 0  <=>  x = local self-stresses + those with K^T y = 0.
 

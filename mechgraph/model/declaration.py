@@ -34,8 +34,7 @@ from mechgraph.fields import (
 from mechgraph.maths.inertia import physical
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import SHAPES
-from mechgraph.model.couplings import BaseCoupling
-from mechgraph.model.gears import rim_faults
+from mechgraph.model.couplings import BaseCoupling, rim_faults
 from mechgraph.model.loads import LOADS, Load
 from mechgraph.model.motion import Drive
 from mechgraph.model.pair import NO_POINTS, Link, Marker, Pair, largest_cosine

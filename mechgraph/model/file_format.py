@@ -14,7 +14,7 @@ from typing import Any
 from urllib.parse import quote
 
 from mechgraph.fields import FLAG, INTEGER, NUMBERS, OTHER, SIX, TABLE, TABLES, TEXT, FieldFormat, Formatted, Schema
-from mechgraph.model.gears import COUPLINGS
+from mechgraph.model.couplings import COUPLINGS
 from mechgraph.model.loads import LOADS, ForceTable
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Drive, Motion

@@ -12,8 +12,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from mechgraph.determinacy.report import check
-from mechgraph.document import Bullets, Document, Heading, Paragraph, Shown, Table
-from mechgraph.document.tree import plain
+from mechgraph.document import Bullets, Document, Heading, Paragraph, Shown, Table, plain
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import NAMED_POINT
 from mechgraph.files import Format, cell, csv_of, format_of, write_whole

@@ -9,8 +9,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.document.render import Shown
-from mechgraph.document.tree import Document, Table
+from mechgraph.document import Document, Shown, Table
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import CHECKS, PATH
 from mechgraph.model.couplings import BaseCoupling

@@ -11,7 +11,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import scipy
 
-from mechgraph.document.tree import plain
+from mechgraph.document import plain
 from mechgraph.errors import DeclarationError
 from mechgraph.force.loads import user_poses
 from mechgraph.kinematics.assembly import assembled

@@ -13,7 +13,7 @@ from mechgraph.determinacy.facts import Geometry
 from mechgraph.determinacy.findings import component_words
 from mechgraph.determinacy.report import DeterminacyReport, check
 from mechgraph.determinacy.uniqueness import SelfStress
-from mechgraph.document.tree import plain
+from mechgraph.document import plain
 from mechgraph.kinematics.assembly import CLOSED, close
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import MOTIONS
