@@ -67,18 +67,22 @@ class Once:
 
     def once(self, make: Callable[[Any], Made]) -> Made:
         """``make(self)``, made once and kept."""
-        if make not in self._kept:
-            self._kept[make] = under(carried(self), make, self)
-        made: Made = self._kept[make]
+        kept = self._kept_of_graph if "of_graph" in vars(make) else self._kept
+        if make not in kept:
+            kept[make] = under(carried(self), make, self)
+        made: Made = kept[make]
         return made
 
     def take_graph_of(self, other: Once) -> None:
-        """Take over what was made of the graph of another thing, of which the graph is the same."""
-        known = list(other._kept.items())  # another thread may add to it meanwhile
-        self._kept.update({make: made for make, made in known if "of_graph" in vars(make)})
+        """Share what is made of the graph with another thing, of which the graph is the same."""
+        vars(self)["_kept_of_graph"] = other._kept_of_graph
 
     @cached_property
     def _kept(self) -> dict[Callable[..., Any], Any]:
+        return {}
+
+    @cached_property
+    def _kept_of_graph(self) -> dict[Callable[..., Any], Any]:
         return {}
 
 

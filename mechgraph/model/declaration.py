@@ -31,9 +31,10 @@ from mechgraph.fields import (
     sound_tol,
     tolerance_fault,
 )
-from mechgraph.maths.inertia import physical
+from mechgraph.maths.inertia import physical, symmetric
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import SHAPES
+from mechgraph.memo import Once, of_graph
 from mechgraph.model.couplings import BaseCoupling, rim_faults
 from mechgraph.model.loads import LOADS, Load
 from mechgraph.model.motion import Drive
@@ -51,7 +52,7 @@ START = {
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class Parts(Formatted):
+class Parts(Formatted, Once):
     """The fields of a mechanism (see ``Mechanism``), and its links, pairs, couplings and freedoms by name.
 
     Nothing is checked here: what is looked up may still be what a user declared wrongly.
@@ -338,7 +339,7 @@ def _end_faults(m: Parts, names: Sequence[str]) -> list[str]:
     if not isinstance(m.frame, str) or m.frame not in known:
         faults.append(f"frame: {unknown('link', m.frame, names)}")
     elif all_known and len(names) == len(m.links):
-        faults += _connection_faults(m)
+        faults += m.once(_connection_faults)
     return faults
 
 
@@ -385,7 +386,7 @@ def _links_are_sound(links: Sequence[Link]) -> bool:
         return False
     A = np.moveaxis(tensors, 0, -1)
     meant = np.array([link.unphysical for link in solid], dtype=bool)
-    return bool(((A.swapaxes(0, 1) == A).all(axis=(0, 1)) & physical(A) | meant).all())
+    return bool((symmetric(A) & physical(0.5 * (A + A.swapaxes(0, 1))) | meant).all())
 
 
 def _pairs_are_sound(pairs: Sequence[Pair], tol: float) -> bool:
@@ -430,6 +431,7 @@ def item_faults(m: Parts) -> list[str]:
     return _kind_faults(m) or _reference_faults(m)
 
 
+@of_graph
 def _connection_faults(m: Parts) -> list[str]:
     place, n = m.link_index, len(m.links)
     graph = scipy.sparse.coo_array((np.ones(len(m.pairs), dtype=bool), m.pair_ends), shape=(n, n))

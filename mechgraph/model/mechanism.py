@@ -19,7 +19,7 @@ from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Sho
 from mechgraph.errors import DeclarationError, MechgraphWarning, counted, unknown
 from mechgraph.fields import plain, same_fields
 from mechgraph.maths.tolerances import Tolerances
-from mechgraph.memo import Once, carried, under
+from mechgraph.memo import carried, under
 from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.declaration import Parts, declaration_faults, flat_start, item_faults, mapping_faults
 from mechgraph.model.loads import Gravity, Load
@@ -161,7 +161,7 @@ def _vector(value: Any) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Mechanism(Parts, Once, Shown):
+class Mechanism(Parts, Shown):
     """Declare a mechanism: a graph with links as nodes and kinematic pairs as edges.
 
     Parameters
@@ -256,7 +256,7 @@ class Mechanism(Parts, Once, Shown):
         if not faults:
             faults = declaration_faults(self)
             if faults and self._take_quantities():
-                self._set(_kept={})  # what was found of pairs with quantities
+                self._set(_kept={}, _kept_of_graph={})  # what was found of pairs with quantities
                 faults = declaration_faults(self)
         self._finish(start, faults + mapping_faults(units=units, start=start, expected=expected))
         self._set(couplings=tuple(c.placed(self) for c in self.couplings))
@@ -369,9 +369,9 @@ class Mechanism(Parts, Once, Shown):
                 f"mechanism {self.name!r}", [f"replace: {unknown('field', k, self.formats)}" for k in sorted(strange)]
             )
         if not set(changes) <= {"drives", "loads", "start"}:
-            changed = under(carried(self), Mechanism, **{**self._arguments(), **changes})
-            if changed.has_graph_of(self):
-                changed.take_graph_of(self)
+            changed = under(carried(self), Mechanism.__new__, Mechanism)
+            changed._set(_changed_from=self)
+            under(carried(self), changed.__init__, **{**self._arguments(), **changes})  # type: ignore[misc]
             return changed
         # links, pairs and couplings stay, and with them what is kept of the graph: only what refers to them is checked again
         out = under(carried(self), Mechanism.__new__, Mechanism)
@@ -379,7 +379,7 @@ class Mechanism(Parts, Once, Shown):
         wrong_kinds: list[str] = []
         fields["drives"] = _as_drives(items_of(changes.get("drives", self.drives), "drives", wrong_kinds))
         fields["loads"] = items_of(changes.get("loads", self.loads), "loads", wrong_kinds)
-        out._set(**fields, _kept=self._kept)
+        out._set(**fields, _kept=self._kept, _kept_of_graph=self._kept_of_graph)
         vars(out).update(
             (k, v) for k, v in vars(self).items() if isinstance(getattr(Mechanism, k, None), cached_property)
         )
@@ -429,6 +429,11 @@ class Mechanism(Parts, Once, Shown):
             out.take_graph_of(self)
             known[asked] = out
         return known[asked]
+
+    @cached_property
+    def _kept_of_graph(self) -> dict[Callable[..., Any], Any]:
+        other = vars(self).pop("_changed_from", None)
+        return other._kept_of_graph if other is not None and self.has_graph_of(other) else {}
 
     def has_graph_of(self, other: Mechanism) -> bool:
         """Whether links and pairs have the names, ends and types of those of another mechanism, in the same order."""

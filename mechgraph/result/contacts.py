@@ -153,7 +153,7 @@ class ContactGeometry:
 
     def _where_known(self, of: Callable[[Array], Array], coordinates: int | slice) -> Array:
         """A function of some coordinates of the pair ``(n, ...)``, NaN where the position was not solved: no shape is asked there."""
-        x = np.moveaxis(self._values.coordinates(self._index)[0], -1, 0)
+        x = np.moveaxis(self._values.coordinates(self._index, 0), -1, 0)
         known = np.isfinite(x).all(axis=0)
         found = of(x[coordinates][..., known])
         out = np.full((len(found), *known.shape), np.nan)
@@ -458,7 +458,7 @@ class ContactResult(ContactGeometry, Shown):
     def rolling(self) -> Array:
         """Mean velocity ``(..., 3)`` with which the contact travels over both elements, as it draws oil in; global directions."""
         k = self._frame
-        rates = self._values.coordinates(self._index)[1][..., None, :k]
+        rates = self._values.coordinates(self._index, 1)[..., None, :k]
         V = (self._values.screws(self._index)[..., :k] * rates).sum(axis=-1)
         return V[..., 3:] + np.cross(V[..., :3], self.point) - 0.5 * self.sliding
 

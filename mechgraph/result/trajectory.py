@@ -271,7 +271,7 @@ class Trajectory:
 
     def _out(self, values: Array) -> Array:
         """``(..., T)`` -> batch first ``(*batch, ...)``; read-only."""
-        rows = np.array(np.moveaxis(values, -1, 0), order="C")
+        rows = values.transpose(-1, *range(values.ndim - 1)).copy()
         out = rows.reshape((*self.batch, *rows.shape[1:]))
         out.setflags(write=False)
         return out
@@ -335,16 +335,13 @@ class Trajectory:
         """Named outcomes, one a position."""
         return self._status.reshape(self.batch)
 
-    def coordinates(self, pair: int) -> tuple[Array, Array, Array]:
-        """Coordinates, rates and accelerations of the freedoms of a pair, ``(..., f)``."""
+    def coordinates(self, pair: int, rank: int) -> Array:
+        """Coordinates (rank 0), rates (1) or accelerations (2) of the freedoms of a pair, ``(..., f)``."""
         columns = self._columns(pair)
+        if rank == 0:
+            return self._out(np.where(self._solved, self._coordinates[columns], np.nan))
         unit = np.where(self._system.is_length[columns], self._L, 1.0)[:, None]
-        position = np.where(self._solved, self._coordinates[columns], np.nan)
-        return (
-            self._out(position),
-            self._out(unit * self._of("dq")[columns]),
-            self._out(unit * self._of("ddq")[columns]),
-        )
+        return self._out(unit * self._of(("dq", "ddq")[rank - 1])[columns])
 
     def frame_origin(self, pair: int, k: int) -> Array:
         """Origin of frame k of a pair, global, ``(..., 3)``."""

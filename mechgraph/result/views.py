@@ -49,7 +49,7 @@ class PositionLabels:
     def coordinates(self, name: str) -> tuple[Array, Array]:
         """Coordinate and rate of a freedom, one value a position."""
         k, j = self.values.whole.freedom(name)
-        position, velocity, _ = self.values.coordinates(k)
+        position, velocity = (self.values.coordinates(k, rank) for rank in (0, 1))
         return self.flat(position[..., j]), self.flat(velocity[..., j])
 
     def flat(self, values: Any) -> Array:
@@ -110,7 +110,7 @@ def pair_document(values: Trajectory, k: int) -> Document:
 
 
 def _pair_rows(values: Trajectory, pair: Pair, k: int) -> Iterator[Row]:
-    units, coordinates = values.mechanism.units, values.coordinates(k)
+    units, coordinates = values.mechanism.units, [values.coordinates(k, rank) for rank in range(3)]
     for j, freedom in enumerate(pair.type.freedoms):
         turns = freedom.turns
         for order, (what, of) in enumerate(zip(("", " velocity", " acceleration"), coordinates, strict=True)):
@@ -206,17 +206,17 @@ class PairResult(Shown):
     @property
     def position(self) -> Array:
         """Coordinates ``(..., f)`` in the order of the pair table; angles unwrapped, of a rotation the rotation vector."""
-        return self._values.coordinates(self._index)[0]
+        return self._values.coordinates(self._index, 0)
 
     @property
     def velocity(self) -> Array:
         """Rates ``(..., f)``; of a rotation the angular velocity in frame k before it."""
-        return self._values.coordinates(self._index)[1]
+        return self._values.coordinates(self._index, 1)
 
     @property
     def acceleration(self) -> Array:
         """Rates of the rates ``(..., f)``."""
-        return self._values.coordinates(self._index)[2]
+        return self._values.coordinates(self._index, 2)
 
     @property
     def reaction(self) -> Array:
