@@ -258,7 +258,9 @@ class Pipeline:
         if not closed.size:
             return
         some = here.part(closed)
-        strays = PassiveMotions(some, self.passive, f.part(closed, some).motions()).strays > MOTIONS.nearby
+        error = 10.0 * f.condition[closed] * (some.closure + np.finfo(float).eps)
+        motions = PassiveMotions(some, self.passive, f.part(closed, some).motions())
+        strays = motions.strays > np.maximum(MOTIONS.still, error)
         moves: list[bool] = np.any(strays, axis=1).tolist()
         if any(moves):
             first = closed[int(np.argmax(np.any(strays, axis=0)))]

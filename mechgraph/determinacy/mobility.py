@@ -531,8 +531,10 @@ def _lasting(
     if reached is None:
         return here
     there = Position.at(Configuration(position.declared.system, reached[:, None]))
-    left = rank_of_rows(there.rows, columns, closure.engine, RANKS.nearby).motions
-    return lasting(here, passive_motions(there, left, columns, RANKS.nearby), position, columns)
+    near, exact = (rank_of_rows(there.rows, columns, closure.engine, limit) for limit in (RANKS.nearby, None))
+    # a position that closing met as far as rounding lets it is known as well as the declared one
+    common = MOTIONS.still if exact.rank == near.rank else RANKS.nearby
+    return lasting(here, passive_motions(there, near.motions, columns, common), position, columns)
 
 
 def _complement(m: Mechanism, left: Array, passive: Sequence[PassiveMotion]) -> list[FreeMotion]:

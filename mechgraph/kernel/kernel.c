@@ -33,7 +33,7 @@ static const magnitude SHORTEST = 2e-3;     /* step below which the careful foll
 static const magnitude INDEPENDENT = 1e-9;  /* part of the closure rates that drives may leave open */
 static const magnitude DRIVERS_ALONE = 1e-9;/* part below which the reactions of a self-stress count as none */
 static const magnitude UNIQUE = 1e-7;       /* part of a self-stress in a component above which it is not unique */
-static const magnitude NEARBY = 1e-5;       /* part of a passive motion above which it moves other links */
+static const magnitude STILL = 1e-8;        /* part of a passive motion above which it moves other links */
 static const magnitude UNTURNED = 1e-13;    /* angle that is rounding */
 static const magnitude MISSING = 1e-9;      /* angle, or length / L, that may be missing to rest */
 static const magnitude OFF_TABLE = 1e-9;     /* part of a table's length up to which a place beyond its end is on it by rounding */
@@ -684,7 +684,7 @@ static int passive_motions(const Model *m, Work *w) {
     move(m, w, rate, NULL);
     memcpy(twist, w->V + 6 * first_of(m, i), 6 * sizeof(double));
     for (int l = m->passive_first[i]; l < m->passive_first[i + 1]; l++) FOR(r, 6) w->V[6 * m->passive_link[l] + r] -= twist[r];
-    if (!(size_of(w->V, 6 * m->links) <= NEARBY * size_of(twist, 6))) return MGK_NOT_PASSIVE;
+    if (!(size_of(w->V, 6 * m->links) <= STILL * size_of(twist, 6))) return MGK_NOT_PASSIVE;
     const double *axis = along_axis(m, w->twist, i), length = sqrt(dot(axis, axis, 3));
     const double scale = REAL_PART(dot(rate, w->border + i * c, c)) < 0.0 ? -1.0 / length : 1.0 / length;
     FOR(a, c) rate[a] *= scale;

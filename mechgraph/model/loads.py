@@ -143,7 +143,7 @@ class Load(Described, ABC):
                 found.append(unknown("link", value, names.link_index))
             elif about.kind is FREEDOM_NAME:
                 found.append(names.freedom_fault(value, single=about.single))
-            elif about.of and (link := getattr(self, about.of)) in names.link_index:
+            elif about.of and isinstance(link := getattr(self, about.of), str) and link in names.link_index:
                 found.append(None if value in names.link(link).points else names.link(link).point_fault(value))
         values = self.value_faults("")
         found += values

@@ -6,6 +6,7 @@ import machines
 import mechanisms as known
 import numpy as np
 import pytest
+from attack import integer_mechanism
 from mechanisms import X, Y, Z
 
 import mechgraph as mg
@@ -62,6 +63,18 @@ def test_a_path_on_which_something_stops_being_passive_is_refused_there(monkeypa
     ):
         mg.kinematics(m, {"O4": [0.0, -0.2]}, engine=engine)
     assert mg.kinematics(m, {"O4": [0.0]}, engine=engine).status.tolist() == ["ok"]
+
+
+@pytest.mark.parametrize("lasting", [True, False])
+def test_what_strays_with_the_cube_of_the_way_is_no_passive_motion(monkeypatch, lasting: bool) -> None:
+    """A spin that moves other links by 7e-9 of itself 0.01 from the start, by 8e-6 at 0.1: forces were wrong by as much."""
+    if lasting:
+        monkeypatch.setattr(mobility, "_lasting", lambda here, *_: here)
+    m = integer_mechanism(5002295).replace(drives=["J2.Tx"])
+    words = "moves other links at" if lasting else "passive in this position only"
+    for engine in ENGINES:
+        with pytest.raises(mg.IndeterminateError, match=words):
+            mg.solve(m, {"J2.Tx": [0.0, 0.1]}, engine=engine)
 
 
 def test_the_compiled_kernel_hands_it_over(monkeypatch, compiled: None) -> None:
