@@ -569,7 +569,10 @@ def rank_of_rows(
     tolerance: float | None = None,
     proved: float | None = None,
 ) -> ClosureRank:
-    """The same for rows given as such; pivots of a bordered system above ``proved`` decide by themselves."""
+    """The same for rows given as such; a bordered system decides that is farther than ``tolerance`` from a singular one.
+
+    Farther than ``RANKS.distance`` too where pivots are not above ``proved``.
+    """
     fixed = np.zeros(0, dtype=np.intp) if fixed is None else fixed
     tolerance = RANKS.position if tolerance is None else tolerance
     proved = RANKS.proved if proved is None else proved
@@ -578,7 +581,7 @@ def rank_of_rows(
         reduced = ReducedRows(rows, fixed, dense=True)
         return ClosureRank(reduced, _Dense(reduced, tolerance), tolerance)
     bordered = LoopSystem(rows, fixed)
-    if bordered.smallest > proved or bordered.first.distance > max(RANKS.distance, tolerance):
+    if bordered.first.distance > max(0.0 if bordered.smallest > proved else RANKS.distance, tolerance):
         return ClosureRank(bordered, _Bordered(bordered), tolerance)
     reduced = ReducedRows(rows, fixed)
     return ClosureRank(reduced, _Eliminated(reduced, tolerance), tolerance)

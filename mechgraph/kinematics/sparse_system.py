@@ -19,11 +19,11 @@ or column, placed at the loop where it lies. What results,
     B = [ U^T J   R ]        B [q; s] = [U^T b; 0],      B^T [x; m] = [tau; c],
         [   G     0 ]
 
-is square. Where its pivots are all well away from zero the rank of J is proved: the bordering cannot make up for a rank below that
-of the matching. Where geometry makes the rank lower, or the borders do not meet what it leaves, they are bases of the self-stresses that
-connect loops and of the motions there, which an elimination finds. Then q solves the rates, x gives the loop wrenches, a random ``c`` a
-random self-stress. Many positions are factored group by group where that is faster: the blocks of B in block triangular form are the
-structural groups with these drivers.
+is square. Where it is well away from a singular matrix the rank of J is proved: the bordering cannot make up for a rank below that of the
+matching; pivots alone do not say so (0.001 at a singular value of 5e-8 has been met). Where geometry makes the rank lower, or the borders
+do not meet what it leaves, they are bases of the self-stresses that connect loops and of the motions there, which an elimination finds.
+Then q solves the rates, x gives the loop wrenches, a random ``c`` a random self-stress. Many positions are factored group by group where
+that is faster: the blocks of B in block triangular form are the structural groups with these drivers.
 Sources: Duff, Erisman and Reid, Direct Methods for Sparse Matrices, 2017, chapters 5 and 6 (matching, structural rank); Govaerts, Numerical
 Methods for Bifurcations of Dynamical Equilibria, 2000, chapter 3 (bordered systems).
 """

@@ -36,9 +36,11 @@ class RankTolerances:
         float,
         "The same at positions reached by a motion: closing a double root to 1e-13 leaves 3e-7 of the way that returns.",
     ] = 1e-6
-    proved: Annotated[float, "Pivot of a bordered system above which it proves the rank without another test."] = 1e-3
+    proved: Annotated[
+        float, "Pivot of a bordered system above which its distance to a singular one need not be above ``distance``."
+    ] = 1e-3
     distance: Annotated[
-        float, "Distance to a singular matrix above which the bordered system decides the rank, whatever its pivots."
+        float, "Distance to a singular matrix above which the bordered system decides the rank whatever its pivots."
     ] = 1e-8
     near: Annotated[
         float,

@@ -97,6 +97,12 @@ def test_branches_of_several_dimensions_are_all_looked_at() -> None:
     assert [mg.check(m, engine=engine).finite_mobility for engine in ("dense", "sparse")] == [2, 2]
 
 
+def test_pivots_alone_prove_no_rank() -> None:
+    """A singular value of 5e-8 under pivots of 0.001: at a position reached by a motion it is that of a rank below."""
+    m = integer_mechanism(5002643)
+    assert [mg.check(m, engine=engine).finite_mobility for engine in ("dense", "sparse")] == [1, 1]
+
+
 def test_a_trial_step_does_not_cross_to_another_branch() -> None:
     """Two branches of mobility 1 meet; a position 0.004 beside it, where the rank is a matter of rounding, had both within a step."""
     m = integer_mechanism(5000087)
