@@ -73,7 +73,7 @@ typedef struct {
   double *null, *stress, *stress_effort, *row_value, *column_value, *trial, *increment, *there, *change, *bound, *record, *direction, *line_begin, *asked, *kept;
   /* passive motions: unit rates, twists with their rates, velocity parts, links at rest in them; along a step, what is missing to rest */
   double *passive, *twist, *twist_rate, *own_bias, *moving_bias, *moving, *raw, *apart, *trial_rate, *trial_acceleration, *still, *series;
-  magnitude single, told;
+  magnitude single, told, *speed;
   size_t n_kept;
   Node a, b, before;
   long steps, evaluations, factorizations;
@@ -127,6 +127,7 @@ static size_t lay_out(const Model *m, double *memory, Work *w) {
   TAKE(tau, c), TAKE(coupled, c), TAKE(multiplier, m->couplings), TAKE(null, s * r), TAKE(stress, 6 * p * s), TAKE(stress_effort, c * s);
   TAKE(row_value, r), TAKE(column_value, c), TAKE(trial, m->states), TAKE(increment, c), TAKE(there, 2 * c), TAKE(change, u * u), TAKE(bound, 4 * u);
   TAKE(passive, q * c), TAKE(twist, 6 * q), TAKE(twist_rate, 6 * q), TAKE(own_bias, 6 * p * q), TAKE(moving_bias, q ? 6 * p : 0), TAKE(moving, 6 * q);
+  w->speed = (magnitude *)taken(&memory, &size, n);
   TAKE(raw, 6 * q * q + q), TAKE(apart, 2 * q * q), TAKE(trial_rate, q ? c : 0), TAKE(trial_acceleration, q ? c : 0), TAKE(still, m->drives), TAKE(series, POINTS * q);
   Node *nodes[3] = {&w->a, &w->b, &w->before};
   FOR(i, 3) {
@@ -197,11 +198,13 @@ static void point_of(const double *X, const double *v, double *out) {
   FOR(i, 3) out[i] += X[4 * i + 3];
 }
 
+static void row_product(const double *restrict a, const double *restrict B, double *restrict out) {
+  FOR(j, 4) out[j] = a[0] * B[j] + a[1] * B[4 + j] + a[2] * B[8 + j];
+  out[3] += a[3];
+}
+
 static void product(const double *A, const double *B, double *out) {
-  FOR(i, 3) {
-    FOR(j, 4) out[4 * i + j] = A[4 * i] * B[j] + A[4 * i + 1] * B[4 + j] + A[4 * i + 2] * B[8 + j];
-    out[4 * i + 3] += A[4 * i + 3];
-  }
+  row_product(A, B, out), row_product(A + 4, B, out + 4), row_product(A + 8, B, out + 8);
 }
 
 static void product_back(const double *A, const double *B, double *out) { /* A B^-1 */
@@ -419,14 +422,14 @@ static magnitude evaluate(const Model *m, Work *w, const double *x) {
     /* a turn of more than a right angle has a small sine as well */
     const magnitude x_axes = REAL_PART(P[0] * Q[0] + P[4] * Q[4] + P[8] * Q[8]);
     if (x_axes < 0.0 || REAL_PART(P[1] * Q[1] + P[5] * Q[5] + P[9] * Q[9]) < 0.0) e[0] = INFINITY;
-    worst = fmax(worst, size_of(e, 6));
-    w->closure = fmax(w->closure, fmax(fabs(sqrt(dot(e, e, 3))), fabs(sqrt(dot(e + 3, e + 3, 3)))));
+    worst = raised(worst, size_of(e, 6));
+    w->closure = raised(w->closure, raised(fabs(sqrt(dot(e, e, 3))), fabs(sqrt(dot(e + 3, e + 3, 3)))));
   }
   FOR(k, m->couplings) {
     double *e = w->residual + 6 * m->loops + k;
     *e = -m->constant[k];
     for (int i = m->term_first[k]; i < m->term_first[k + 1]; i++) *e += m->coefficient[i] * x[m->column_state[m->term_column[i]]];
-    worst = fmax(worst, fabs(*e)), w->closure = fmax(w->closure, fabs(*e));
+    worst = raised(worst, fabs(*e)), w->closure = raised(w->closure, fabs(*e));
   }
   memset(w->residual + m->held, 0, m->passives * sizeof(double));
   return worst;
@@ -556,7 +559,7 @@ static magnitude completed(const Model *m, Work *w, const double *driven, const 
   if (!m->stresses) return 0.0;
   row_sums(m, w, dq, NULL, right);
   magnitude left = 0.0;
-  FOR(r, m->rows) left = fmax(left, fabs(right[r] + (known ? known[r] : 0.0)));
+  FOR(r, m->rows) left = raised(left, fabs(right[r] + (known ? known[r] : 0.0)));
   size += size_of(dq, m->columns) + (known ? size_of(known, m->rows) : 0.0);
   return size > 0.0 ? left / size : 0.0;
 }
@@ -619,11 +622,11 @@ static void accelerate(const Model *m, Work *w, const double *ddq) {
   memset(w->A + 6 * m->frame_link, 0, 6 * sizeof(double));
   FOR(t, m->pairs - m->loops) {
     const int *step = m->walk + 4 * t, k = step[0];
-    FOR(i, 6) {
-      double sum = w->bias[6 * k + i];
-      for (int f = m->first[k]; f < m->first[k + 1]; f++) FOR(j, width(m->kind[f])) sum += w->S[6 * (m->column[f] + j) + i] * ddq[m->column[f] + j];
-      w->A[6 * step[3] + i] = w->A[6 * step[2] + i] + (step[1] ? sum : -sum);
-    }
+    const double sense = step[1] ? 1.0 : -1.0;
+    double sum[6];
+    memcpy(sum, w->bias + 6 * k, sizeof sum);
+    for (int f = m->first[k]; f < m->first[k + 1]; f++) FOR(j, width(m->kind[f])) FOR(i, 6) sum[i] += w->S[6 * (m->column[f] + j) + i] * ddq[m->column[f] + j];
+    FOR(i, 6) w->A[6 * step[3] + i] = w->A[6 * step[2] + i] + sense * sum[i];
   }
 }
 
@@ -802,10 +805,10 @@ static int rates(const Model *m, Work *w, const double *v, const double *a) {
     twist_rates(m, w, w->dq);
     move(m, w, w->dq, NULL);
   }
-  FOR(c, m->columns) turning = fmax(turning, fabs(w->dq[c]) * fabs(w->dq[c]));
+  FOR(c, m->columns) turning = raised(turning, fabs(w->dq[c]) * fabs(w->dq[c]));
   double *known = w->residual; /* closed: no longer asked for */
   row_sums(m, w, NULL, w->bias, known);
-  gap = fmax(gap, completed(m, w, a, known, turning, w->ddq));
+  gap = raised(gap, completed(m, w, a, known, turning, w->ddq));
   if (gap > INDEPENDENT) return MGK_CONTRADICTION;
   accelerate(m, w, w->ddq);
   if (m->passives) {
@@ -852,7 +855,7 @@ static int efforts(const Model *m, Work *w) {
 static void pushed(Work *w, int link, const double *force, const double *at) {
   double f[6] = {0, 0, 0, force[0], force[1], force[2]};
   wrench_moved(f, at, 1.0);
-  w->single = fmax(w->single, size_of(f, 6));
+  w->single = raised(w->single, size_of(f, 6));
   FOR(i, 6) w->applied[6 * link + i] += f[i];
 }
 
@@ -913,7 +916,7 @@ static void loads(const Model *m, Work *w, const double *x) {
       point_of(X, number + 6, at);
       pushed(w, i, force, at);
       FOR(r, 3) w->applied[6 * i + r] += force[3 + r];
-      w->single = fmax(w->single, size_of(force + 3, 3));
+      w->single = raised(w->single, size_of(force + 3, 3));
     } else if (load[0] == MGK_EFFORT) {
       w->given[i] += number[0];
     } else if (load[0] == MGK_LAW) {
@@ -956,7 +959,7 @@ static void hold(const Model *m, Work *w, double *wrenches, double *efforts, dou
   FOR(i, m->passives) {
     const double *U = w->twist + 6 * i, *rate = w->passive + i * m->columns;
     double power = dot(w->given, rate, m->columns), square = 0.0, axis[3];
-    magnitude sum = fmax(w->single, size_of(w->given, m->columns));
+    magnitude sum = raised(w->single, size_of(w->given, m->columns));
     FOR(c, m->columns) sum += fabs(w->given[c] * rate[c]);
     for (int pass = 0; pass < 2; pass++) for (int l = m->passive_first[i]; l < m->passive_first[i + 1]; l++) {
       const int link = m->passive_link[l];
@@ -1032,7 +1035,7 @@ static int self_stresses(const Model *m, Work *w, double *multiplier_stress, dou
     FOR(i, c) if (effort[i] != 0.0) FOR(r, 6) stress[6 * m->owner[i] + r] -= w->E[6 * i + r] * effort[i];
     at_points(m, w, stress, -1.0);
     FOR(i, k) multiplier_stress[s * k + i] = -null[6 * m->loops + i];
-    largest = fmax(largest, fabs(sqrt(dot(stress, stress, p))));
+    largest = raised(largest, fabs(sqrt(dot(stress, stress, p))));
   }
   at_points(m, w, w->reaction, -1.0);
   FOR(s, m->stresses) {
@@ -1072,24 +1075,25 @@ static void checks(const Model *m, Work *w, double *balance, double *power, magn
     const double own = w->column_value[c], acting = own + w->given[c] + w->coupled[c];
     FOR(r, 6) w->total[6 * m->owner[c] + r] += w->E[6 * c + r] * acting;
     *power += w->dq[c] * acting;
-    worst = fmax(worst, fabs(dot(w->S + 6 * c, w->reaction + 6 * m->owner[c], 6)));
-    const magnitude most = fmax(fabs(own), fmax(fabs(w->given[c]), fabs(w->coupled[c])));
-    wrench = fmax(wrench, most), term = fmax(term, fabs(w->dq[c]) * most);
+    worst = raised(worst, fabs(dot(w->S + 6 * c, w->reaction + 6 * m->owner[c], 6)));
+    const magnitude most = raised(fabs(own), raised(fabs(w->given[c]), fabs(w->coupled[c])));
+    wrench = raised(wrench, most), term = raised(term, fabs(w->dq[c]) * most);
   }
+  FOR(b, m->links) w->speed[b] = size_of(w->V + 6 * b, 6);
   FOR(k, m->pairs) {
     const int a = m->ends[2 * k], b = m->ends[2 * k + 1];
-    const magnitude through = size_of(w->total + 6 * k, 6), speed = fmax(size_of(w->V + 6 * a, 6), size_of(w->V + 6 * b, 6));
+    const magnitude through = size_of(w->total + 6 * k, 6), speed = raised(w->speed[a], w->speed[b]);
     FOR(r, 6) left[6 * b + r] += w->total[6 * k + r], left[6 * a + r] -= w->total[6 * k + r];
-    wrench = fmax(wrench, through), term = fmax(term, speed * through);
+    wrench = raised(wrench, through), term = raised(term, speed * through);
   }
   FOR(b, m->links) {
-    const magnitude speed = size_of(w->V + 6 * b, 6), on = fmax(size_of(w->applied + 6 * b, 6), size_of(w->inertial + 6 * b, 6));
+    const magnitude speed = w->speed[b], on = raised(size_of(w->applied + 6 * b, 6), size_of(w->inertial + 6 * b, 6));
     *power += dot(w->V + 6 * b, w->applied + 6 * b, 6) + dot(w->V + 6 * b, w->inertial + 6 * b, 6);
-    wrench = fmax(wrench, on), term = fmax(term, speed * on);
-    if (b != m->frame_link) worst = fmax(worst, size_of(left + 6 * b, 6));
+    wrench = raised(wrench, on), term = raised(term, speed * on);
+    if (b != m->frame_link) worst = raised(worst, size_of(left + 6 * b, 6));
   }
   *balance = worst;
-  largest[0] = fmax(largest[0], wrench), largest[1] = fmax(largest[1], term);
+  largest[0] = raised(largest[0], wrench), largest[1] = raised(largest[1], term);
 }
 
 /* All forces at a state with rates; the force parts of a record. */
@@ -1206,7 +1210,7 @@ static void continued(const Model *m, Work *w, double at) {
   FOR(f, m->factors) if (m->kind[f] == MGK_ROTATION) {
     const int c = m->column[f];
     const double left = w->angle[f] - whole * floor(w->angle[f] / whole + 0.5);
-    part = fmax(part, fmax(size_of(w->a.rate + c, 3), size_of(w->b.rate + c, 3)) / fmax(fabs(left), 1e-9));
+    part = raised(part, raised(size_of(w->a.rate + c, 3), size_of(w->b.rate + c, 3)) / raised(fabs(left), 1e-9));
   }
   w->told = at;
   if (!(at > from)) return;
@@ -1286,7 +1290,7 @@ static int made_node(const Model *m, Work *w, Node *node) {
   memcpy(node->row, w->row, n * sizeof(int));
   memset(node->change, 0, (size_t)n * n * sizeof(double));
   FOR(i, n) FOR(r, n) FOR(j, n) node->change[i * n + j] += node->inverse[i * n + r] * node->matrix_rate[node->row[r] * n + j];
-  node->reach = 1.0 / fmax(radius(node->change, n, w->bound), 1e-9);
+  node->reach = 1.0 / raised(radius(node->change, n, w->bound), 1e-9);
   return node->condition <= FAIR ? MGK_OK : MGK_SINGULAR;
 }
 
@@ -1329,10 +1333,10 @@ static int certified(const Model *m, Work *w, double *grown) {
   fill(m, w->S, w->middle, NULL, NULL, w->lu);
   add_border(m, w, w->lu);
   FOR(i, m->rows * n) w->lu[i] -= 0.5 * (a->matrix[i] + b->matrix[i]) + 0.125 * h * (a->matrix_rate[i] - b->matrix_rate[i]);
-  const double departure = fmax(departed(m, w, b, a, -h), departed(m, w, a, b, h));
-  double size = fmax(1.0, fmax(size_of(a->rate, m->columns), size_of(b->rate, m->columns)));
-  const double correction = 4.0 * size_of(w->column_value, n), allowed = ALONE / (size * fmax(1.0, fmax(a->condition, b->condition)));
-  *grown = fmax(0.4, 0.8 * fmin(DEPARTURE / fmax(departure, 1e-9), pow(allowed / fmax(correction, 1e-300), 1.0 / 6)));
+  const double departure = raised(departed(m, w, b, a, -h), departed(m, w, a, b, h));
+  double size = raised(1.0, raised(size_of(a->rate, m->columns), size_of(b->rate, m->columns)));
+  const double correction = 4.0 * size_of(w->column_value, n), allowed = ALONE / (size * raised(1.0, raised(a->condition, b->condition)));
+  *grown = raised(0.4, 0.8 * fmin(DEPARTURE / raised(departure, 1e-9), pow(allowed / raised(correction, 1e-300), 1.0 / 6)));
   return departure <= DEPARTURE && correction <= allowed;
 }
 
@@ -1340,7 +1344,7 @@ static int certified(const Model *m, Work *w, double *grown) {
 static int put(const Model *m, Work *w, const double *x, const double *v, const double *a, int with_forces, const int *places, double *record,
                double *largest) {
   double *condition = record + places[MGK_CONDITION];
-  record[places[MGK_CLOSURE]] = w->closure, condition[0] = fmax(w->a.condition, w->b.condition), condition[1] = w->reach;
+  record[places[MGK_CLOSURE]] = w->closure, condition[0] = raised(w->a.condition, w->b.condition), condition[1] = w->reach;
   const int status = rates(m, w, v, a);
   if (status) return status;
   PUT(MGK_X, x), PUT(MGK_DQ, w->dq), PUT(MGK_DDQ, w->ddq);
@@ -1471,7 +1475,7 @@ static int closed_at_rest(const Model *m, Work *w, double *x, double at, double 
     FOR(i, m->passives) {
       const double part = missing(m, w, i, at);
       FOR(c, m->columns) w->increment[c] += part * w->passive[i * m->columns + c];
-      most = fmax(most, fabs(part));
+      most = raised(most, fabs(part));
     }
     if (most <= UNTURNED || (most <= MISSING && most >= 0.5 * before)) return MGK_OK;
     if (!(most <= CORRECTION)) return MGK_STEP;
@@ -1590,7 +1594,7 @@ static double towards(int n, const double *p, const double *q, double *out) {
 static int along(const Model *m, Work *w, Asked *asked) {
   const int d = m->drives;
   while (asked->done < asked->count) {
-    const double here = 1e-14 * fmax(1.0, size_of(w->drive, d));
+    const double here = 1e-14 * raised(1.0, size_of(w->drive, d));
     double length = 0.0;
     int until = asked->done, status;
     while (until < asked->count && (length = towards(d, w->drive, asked->q + at_place(asked, until) * d, w->direction)) <= here) until++;
