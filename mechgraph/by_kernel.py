@@ -19,8 +19,7 @@ from mechgraph.kernel.path import MIDDLE, Kernel, Mask, Records
 from mechgraph.kernel.tables import START, Layout, layout, tables, why_not
 from mechgraph.kinematics.motion_path import in_blocks
 from mechgraph.kinematics.rates import Rates, Velocities, are_alone, expected_error
-from mechgraph.kinematics.solver import ClosureSolver
-from mechgraph.kinematics.state import ROUNDINGS, Configuration
+from mechgraph.kinematics.state import ROUNDINGS, ClosureSolver, Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.newton import Work
 from mechgraph.maths.se3 import Array, Index

@@ -58,8 +58,8 @@ from mechgraph.kinematics.passive_rest import unspun
 from mechgraph.kinematics.prescribed import Actuators, DriverMotion
 from mechgraph.kinematics.rates import PassiveMotion, PassiveMotions, are_alone, distance_to_dead_point
 from mechgraph.kinematics.reach import away_from_poles, ends_at_pole, follow
-from mechgraph.kinematics.solver import ClosureSolver, MotionEngineName, closure_solver, engine_for, solver_at_start
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.solver import MotionEngineName, closure_solver, engine_for, solver_at_start
+from mechgraph.kinematics.state import ClosureSolver, Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import independent_rows
 from mechgraph.maths.se3 import Array, Index

@@ -17,8 +17,8 @@ from mechgraph.kinematics.assembly import CLOSED
 from mechgraph.kinematics.motion_path import BLOCK, DriverPath, Positions, Status, continued, in_blocks
 from mechgraph.kinematics.prescribed import DriverMotion
 from mechgraph.kinematics.rates import PassiveMotion, Rates, Velocities, accuracy, at_dead_points, disagreement, rates
-from mechgraph.kinematics.solver import ClosureSolver, FactoredClosure, closure_solver
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.solver import closure_solver
+from mechgraph.kinematics.state import ClosureSolver, Configuration, FactoredClosure
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.singular_point import passed

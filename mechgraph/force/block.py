@@ -28,8 +28,7 @@ from mechgraph.force.reactions import (
     split_stress,
 )
 from mechgraph.kinematics.rates import PassiveMotion, PassiveMotions, Rates, Velocities
-from mechgraph.kinematics.solver import FactoredClosure
-from mechgraph.kinematics.state import Configuration, ContactLines
+from mechgraph.kinematics.state import Configuration, ContactLines, FactoredClosure
 from mechgraph.maths.linear import add_at
 from mechgraph.maths.se3 import Array, Index, cross, rotate_back
 from mechgraph.maths.tolerances import MOTIONS

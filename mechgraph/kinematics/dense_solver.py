@@ -137,28 +137,28 @@ class DenseFactored:
 
     @property
     def condition(self) -> Array:
-        """See the protocol in ``kinematics.solver``."""
+        """See the protocol in ``kinematics.state``."""
         return self._joined([system.condition for _, _, system in self._parts], (self.T,))
 
     def solve(self, b: Array) -> Array:
-        """See the protocol in ``kinematics.solver``."""
+        """See the protocol in ``kinematics.state``."""
         found = [form.columns(system.solve(form.rows(_at(b, at)))) for form, at, system in self._parts]
         return self._joined(found, (self.freedoms, b.shape[1]))
 
     def solve_transposed(self, b: Array) -> Array:
-        """See the protocol in ``kinematics.solver``."""
+        """See the protocol in ``kinematics.state``."""
         found = [form.back(system.solve_transposed(form.columns(_at(b, at)))) for form, at, system in self._parts]
         return self._joined(found, (self.rows, b.shape[1]))
 
     def residual_size(self, r: Array) -> Array:
-        """See the protocol in ``kinematics.solver``."""
+        """See the protocol in ``kinematics.state``."""
         out = np.zeros(self.T)
         for form, at, _ in self._parts:
             out[at] = np.abs(form.rows(r[:, None, at])).max(axis=(0, 1), initial=0.0)
         return out
 
     def sensitivity(self) -> Array:
-        """See the protocol in ``kinematics.solver``."""
+        """See the protocol in ``kinematics.state``."""
         if self._sensitivity is None:
             fixed = self._fixed
             Z = self.solve(-self.J.take(fixed, axis=1))
@@ -168,19 +168,19 @@ class DenseFactored:
         return self._sensitivity
 
     def motions(self) -> Array:
-        """See the protocol in ``kinematics.solver``."""
+        """See the protocol in ``kinematics.state``."""
         if self._motions is None:
             found = [form.motions(system) for form, _, system in self._parts]
             self._motions = self._joined(found, (self.freedoms, 0))
         return self._motions
 
     def self_stresses(self, every: bool = False) -> Array:
-        """See the protocol in ``kinematics.solver``."""
+        """See the protocol in ``kinematics.state``."""
         found = [form.back(system.null_of_transpose()) for form, _, system in self._parts]
         return self._joined(found, (self.rows, 0))
 
     def regular_between(self, ends: Configuration, a: Index, b: Index) -> NDArray[np.bool_]:
-        """See the protocol in ``kinematics.solver``."""
+        """See the protocol in ``kinematics.state``."""
         out = np.ones(self.T, dtype=bool)
         for form, at, system in self._parts:
             matrices = [form.matrix(_at(J, at)) for J in (self.J, ends.J.take(a, -1), ends.J.take(b, -1))]
@@ -200,11 +200,11 @@ class DenseFactored:
         return out
 
     def part(self, at: Index, here: Configuration) -> DenseFactored:
-        """See the protocol in ``kinematics.solver``."""
+        """See the protocol in ``kinematics.state``."""
         return DenseFactored(self._forms, self._fixed, self.J[:, :, at], self.which[at])
 
     def least(self, R: Sequence[scipy.sparse.csr_array], r0: Array) -> Array:
-        """See the protocol in ``kinematics.solver``."""
+        """See the protocol in ``kinematics.state``."""
         null = self.self_stresses()
         out = np.zeros((null.shape[0], self.T))
         for t in range(self.T):
@@ -213,7 +213,7 @@ class DenseFactored:
         return out
 
     def by_held(self) -> list[tuple[Index, Index]]:
-        """See the protocol in ``kinematics.solver``."""
+        """See the protocol in ``kinematics.state``."""
         same: dict[tuple[int, ...], list[Index]] = {}
         for form, at, _ in self._parts:
             same.setdefault(tuple(form.choice.held.tolist()), []).append(at)
@@ -255,20 +255,20 @@ class DenseSolver:
         self.forms: list[Form] = []
 
     def leaves_nothing_free(self, here: Configuration) -> bool:
-        """See the protocol in ``kinematics.solver``."""
+        """See the protocol in ``kinematics.state``."""
         which = self.chosen(here, np.full(here.T, -1))
         f = self.factored(here, which)
         free = self.forms[int(which[0])].choice.held.size
         return not free and bool((f.condition < PATH.doubtful).all()) and independent(here, f.sensitivity())
 
     def begun(self, here: Configuration) -> DenseSolver:
-        """See the protocol in ``kinematics.solver``."""
+        """See the protocol in ``kinematics.state``."""
         out = DenseSolver(self.fixed, self.keep)
         out.forms = list(self.forms)
         return out
 
     def corrigible(self, dq: Array, which: Index) -> Array:
-        """See the protocol in ``kinematics.solver``."""
+        """See the protocol in ``kinematics.state``."""
         for i in set(which.tolist()):
             held = self.forms[i].choice.held
             if held.size:
@@ -276,7 +276,7 @@ class DenseSolver:
         return dq
 
     def factored(self, here: Configuration, which: Index) -> DenseFactored:
-        """See the protocol in ``kinematics.solver``."""
+        """See the protocol in ``kinematics.state``."""
         return DenseFactored(self.forms, self.fixed, here.J, which.copy())
 
     def chosen(self, here: Configuration, which: Index) -> Index:

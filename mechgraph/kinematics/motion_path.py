@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.kinematics.solver import ClosureSolver, FactoredClosure
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.state import ClosureSolver, Configuration, FactoredClosure
 from mechgraph.kinematics.system import System
 from mechgraph.maths.newton import Work
 from mechgraph.maths.se3 import Array, Index, Mask

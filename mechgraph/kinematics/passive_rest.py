@@ -16,7 +16,7 @@ import numpy as np
 
 from mechgraph.kinematics.motion_path import DriverPath, Positions, Status, in_blocks
 from mechgraph.kinematics.rates import PassiveMotion, PassiveMotions, Velocities, are_alone
-from mechgraph.kinematics.solver import FactoredClosure
+from mechgraph.kinematics.state import FactoredClosure
 from mechgraph.maths.newton import Closed
 from mechgraph.maths.se3 import Array, Index, Mask, cross, rotate, rotate_back
 from mechgraph.maths.singular_point import WINDOW

@@ -19,8 +19,7 @@ import scipy
 from numpy.typing import NDArray
 
 from mechgraph.graph.linkgraph import labels_of_bipartite, members
-from mechgraph.kinematics.solver import ClosureSolver, FactoredClosure
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.state import ClosureSolver, Configuration, FactoredClosure
 from mechgraph.maths.se3 import Array, Index, cross, cross_twist
 from mechgraph.maths.tolerances import MOTIONS, PATH
 

@@ -5,8 +5,8 @@
 A *form* is what is decided once and serves many positions: which rows are independent and which columns are held (dense), or the
 borders that make the matrix square (sparse). Positions name their form by its number.
 
-Rank, motions and self-stresses at one position. Both engines start from the reduced rows ``K`` of all loops (``kinematics.state``),
-so that a self-stress of a single loop is the same in both:
+Rank, motions and self-stresses at one position. Both engines start from the reduced rows ``K`` of all loops (``kinematics.state``), so
+that a self-stress of a single loop is the same in both:
 
     rank J = rank K,   J q = 0  <=>  K (q / scale) = 0,   J^T x = 0  <=>  x = local self-stresses + those with K^T y = 0.
 
@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from mechgraph.graph.linkgraph import labels_of_bipartite, members
 from mechgraph.kinematics.dense_solver import DenseSolver, independent
 from mechgraph.kinematics.sparse_system import Elimination, Factored, LoopSystem
-from mechgraph.kinematics.state import ClosureRows, Configuration, ReducedRows
+from mechgraph.kinematics.state import ClosureRows, ClosureSolver, Configuration, ReducedRows
 from mechgraph.maths.linear import rank_of
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.sparse import BlockFactor, Pattern, SparseFactors, singular_ratio
@@ -216,7 +216,7 @@ class SparseSolver:
         return self._last[1]
 
     def leaves_nothing_free(self, here: Configuration) -> bool:
-        """See the protocol in ``kinematics.solver``."""
+        """See the protocol in ``kinematics.state``."""
         which = self.chosen(here, np.full(here.T, -1))
         form = self.forms[int(which[0])]
         return form.regular and not form.held and independent(here, self.factored(here, which).sensitivity())
@@ -290,77 +290,6 @@ Measured by ``tests/benchmarks/bench_large.py --crossover`` on ladders of four-b
 position), 80 (16 positions), 62 (36), 36 (200) and 24 (1000), where the sparse one goes group by group. A platform on six legs (30 rows,
 one group) takes a quarter more with the sparse one at 1000 positions, so that this many rows stay with the dense one.
 """
-
-
-class FactoredClosure(Protocol):
-    """The closure equations at a batch of positions, factored. ``m`` rows, ``F`` freedoms, ``T`` positions."""
-
-    which: Index
-    dense: bool
-    """Whether matrices are dense."""
-    complete: bool
-    """Whether ``self_stresses`` is a basis of all self-stresses; otherwise it holds random ones that represent them."""
-    groups: int
-    """Number of groups that are solved one after the other; 0 where all equations are factored as a whole."""
-
-    @property
-    def condition(self) -> Array:
-        """Condition numbers ``(T,)``."""
-
-    def solve(self, b: Array) -> Array:
-        """``q (F, k, T)`` with ``J q = b (m, k, T)``, zero in fixed and held columns."""
-
-    def solve_transposed(self, b: Array) -> Array:
-        """``x (m, k, T)`` with ``J^T x = b (F, k, T)`` in the columns neither fixed nor held."""
-
-    def residual_size(self, r: Array) -> Array:
-        """Largest entry ``(T,)`` of residuals ``(m, T)``, displacements over the sizes of their loops."""
-
-    def sensitivity(self) -> Array:
-        """Rates ``Z (F, d, T)`` of all freedoms for unit rates of the fixed ones."""
-
-    def motions(self) -> Array:
-        """Motions ``(F, p, T)`` with the fixed columns at rest: one a held motion."""
-
-    def self_stresses(self, every: bool = False) -> Array:
-        """Multipliers ``(m, s, T)`` with ``J^T x = 0`` in the columns not fixed: a basis if ``complete`` or ``every``, or random."""
-
-    def regular_between(self, ends: Configuration, a: Index, b: Index) -> NDArray[np.bool_]:
-        """Whether no matrix on the parabola through those at ``ends`` ``a (T,)``, here and at ``b`` is singular or nearly so, ``(T,)``."""
-
-    def part(self, at: Index, here: Configuration) -> FactoredClosure:
-        """Some of the positions, evaluated in ``here``."""
-
-    def least(self, R: Sequence[scipy.sparse.csr_array], r0: Array) -> Array:
-        """Multipliers ``x (m, T)`` with ``J^T x = 0`` that make ``|r0 + R x|`` least; ``R[t] (n, m)``, ``r0 (n, T)``.
-
-        Only asked for where ``self_stresses`` are not complete.
-        """
-
-    def by_held(self) -> list[tuple[Index, Index]]:
-        """Freedoms that are held (beside the fixed ones), and the positions at which they are."""
-
-
-class ClosureSolver(Protocol):
-    """The closure equations of one mechanism with the columns ``fixed``; makes and keeps forms."""
-
-    fixed: Index
-    engine: str
-
-    def chosen(self, here: Configuration, which: Index) -> Index:
-        """Forms ``(T,)`` for positions: ``which`` where these are good enough, new ones where they are not (or are -1)."""
-
-    def factored(self, here: Configuration, which: Index) -> FactoredClosure:
-        """The equations at positions, each in its form."""
-
-    def leaves_nothing_free(self, here: Configuration) -> bool:
-        """Whether the factors at a position prove that the fixed columns determine all others; False proves nothing."""
-
-    def begun(self, here: Configuration) -> ClosureSolver:
-        """A solver that goes on from here with the forms of this one, which was last asked at the same state."""
-
-    def corrigible(self, dq: Array, which: Index) -> Array:
-        """Increments ``(F, T)`` without the motions that are held: no correction can remove what a prediction adds to them."""
 
 
 def engine_for(rows: int, positions: int, engine: str) -> Literal["dense", "sparse"]:

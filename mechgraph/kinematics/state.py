@@ -28,10 +28,10 @@ Dense and sparse engine start from these rows, so that they reach the same decis
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import scipy
@@ -414,6 +414,77 @@ def _summed(matrix: scipy.sparse.csr_array, values: Array) -> Array:
 def _stacked(parts: list[Array]) -> Array:
     """Rows of several contributors, one below the other."""
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+
+class FactoredClosure(Protocol):
+    """The closure equations at a batch of positions, factored. ``m`` rows, ``F`` freedoms, ``T`` positions."""
+
+    which: Index
+    dense: bool
+    """Whether matrices are dense."""
+    complete: bool
+    """Whether ``self_stresses`` is a basis of all self-stresses; otherwise it holds random ones that represent them."""
+    groups: int
+    """Number of groups that are solved one after the other; 0 where all equations are factored as a whole."""
+
+    @property
+    def condition(self) -> Array:
+        """Condition numbers ``(T,)``."""
+
+    def solve(self, b: Array) -> Array:
+        """``q (F, k, T)`` with ``J q = b (m, k, T)``, zero in fixed and held columns."""
+
+    def solve_transposed(self, b: Array) -> Array:
+        """``x (m, k, T)`` with ``J^T x = b (F, k, T)`` in the columns neither fixed nor held."""
+
+    def residual_size(self, r: Array) -> Array:
+        """Largest entry ``(T,)`` of residuals ``(m, T)``, displacements over the sizes of their loops."""
+
+    def sensitivity(self) -> Array:
+        """Rates ``Z (F, d, T)`` of all freedoms for unit rates of the fixed ones."""
+
+    def motions(self) -> Array:
+        """Motions ``(F, p, T)`` with the fixed columns at rest: one a held motion."""
+
+    def self_stresses(self, every: bool = False) -> Array:
+        """Multipliers ``(m, s, T)`` with ``J^T x = 0`` in the columns not fixed: a basis if ``complete`` or ``every``, or random."""
+
+    def regular_between(self, ends: Configuration, a: Index, b: Index) -> Mask:
+        """Whether no matrix on the parabola through those at ``ends`` ``a (T,)``, here and at ``b`` is singular or nearly so, ``(T,)``."""
+
+    def part(self, at: Index, here: Configuration) -> FactoredClosure:
+        """Some of the positions, evaluated in ``here``."""
+
+    def least(self, R: Sequence[scipy.sparse.csr_array], r0: Array) -> Array:
+        """Multipliers ``x (m, T)`` with ``J^T x = 0`` that make ``|r0 + R x|`` least; ``R[t] (n, m)``, ``r0 (n, T)``.
+
+        Only asked for where ``self_stresses`` are not complete.
+        """
+
+    def by_held(self) -> list[tuple[Index, Index]]:
+        """Freedoms that are held (beside the fixed ones), and the positions at which they are."""
+
+
+class ClosureSolver(Protocol):
+    """The closure equations of one mechanism with the columns ``fixed``; makes and keeps forms."""
+
+    fixed: Index
+    engine: str
+
+    def chosen(self, here: Configuration, which: Index) -> Index:
+        """Forms ``(T,)`` for positions: ``which`` where these are good enough, new ones where they are not (or are -1)."""
+
+    def factored(self, here: Configuration, which: Index) -> FactoredClosure:
+        """The equations at positions, each in its form."""
+
+    def leaves_nothing_free(self, here: Configuration) -> bool:
+        """Whether the factors at a position prove that the fixed columns determine all others; False proves nothing."""
+
+    def begun(self, here: Configuration) -> ClosureSolver:
+        """A solver that goes on from here with the forms of this one, which was last asked at the same state."""
+
+    def corrigible(self, dq: Array, which: Index) -> Array:
+        """Increments ``(F, T)`` without the motions that are held: no correction can remove what a prediction adds to them."""
 
 
 class ContactLines:

@@ -46,8 +46,8 @@ from mechgraph.by_kernel import COMPILED
 from mechgraph.errors import DeclarationError
 from mechgraph.force.loads import NOT_FINITE, Site, user_poses, user_twists
 from mechgraph.kinematics.motion_path import DriverPath
-from mechgraph.kinematics.solver import FactoredClosure, closure_rank, closure_solver
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.solver import closure_rank, closure_solver
+from mechgraph.kinematics.state import Configuration, FactoredClosure
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Array, Index, cross, rotate
 from mechgraph.maths.singular_point import WINDOW, Crossing, leapt, passed

@@ -55,8 +55,8 @@ from mechgraph.kernel.tables import Integers, layout, tables, why_not
 from mechgraph.kinematics.layout import Tree
 from mechgraph.kinematics.motion_path import BLOCK
 from mechgraph.kinematics.rates import PassiveMotion, PassiveMotions, Rates, Velocities
-from mechgraph.kinematics.solver import ClosureSolver, FactoredClosure, closure_rank, closure_solver
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.solver import closure_rank, closure_solver
+from mechgraph.kinematics.state import ClosureSolver, Configuration, FactoredClosure
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Array, Index, cross, rotate, rotate_back
 from mechgraph.maths.sparse import Factors

@@ -24,8 +24,8 @@ from mechgraph.force.reactions import MethodName
 from mechgraph.kinematics.motion_path import DriverPath, Status
 from mechgraph.kinematics.prescribed import DriverMotion, Motions
 from mechgraph.kinematics.reach import away_from_poles
-from mechgraph.kinematics.solver import FactoredClosure, MotionEngineName, closure_solver
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.solver import MotionEngineName, closure_solver
+from mechgraph.kinematics.state import Configuration, FactoredClosure
 from mechgraph.kinematics.system import System
 from mechgraph.kinetostatics import Pipeline, RedundantName, solve_quietly
 from mechgraph.maths.se3 import Array, Index
