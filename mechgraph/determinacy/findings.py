@@ -161,7 +161,7 @@ def rounding(m: Mechanism, verdict: Callable[[Mechanism], tuple[Any, ...]], limi
     Raises
     ------
     SearchEnded
-        where it takes more than ``limit`` seconds (see ``determinacy.budget``), and of more than ``MOST_PAIRS`` pairs.
+        where it takes more than ``limit`` seconds (see ``errors.Budget``), and of more than ``MOST_PAIRS`` pairs.
     """
     budget = Budget(limit)
     if isinstance(m, SnappedMechanism) or not m.has_geometry:

@@ -742,7 +742,7 @@ def meant(m: Mechanism, tol: float | None, call: str, limit: float = np.inf) -> 
     Raises
     ------
     SearchEnded
-        where that takes more than ``limit`` seconds (see ``determinacy.budget``).
+        where that takes more than ``limit`` seconds (see ``errors.Budget``).
     """
     tol = m.tol if tol is None else tol
     if tol is None or isinstance(m, SnappedMechanism):
