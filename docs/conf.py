@@ -6,6 +6,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from docutils.nodes import literal_block
 from latex2mathml.converter import convert
 
 DOCS = Path(__file__).resolve().parent
@@ -22,7 +23,7 @@ version = release
 project_copyright = author
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "sphinx_design"]
-exclude_patterns = ["_built/*.md"]
+exclude_patterns = ["_built/**"]
 nitpicky = True
 
 myst_enable_extensions = ["amsmath", "attrs_block", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
@@ -91,11 +92,44 @@ def displayed(translator: Any, node: Any) -> None:
 def draw(app: Any) -> None:
     """Pages draw their pictures before Sphinx looks for them."""
     import gallery
+    import pair_drawings
     import player
 
     gallery.draw()
+    pair_drawings.draw()
     for page in player.PAGES:
         player.draw(page)
+
+
+TABLE = re.compile(r"^ *--+  +--", re.MULTILINE)
+"""The rule under the heads of a table of text."""
+
+
+MADE = {
+    "../library/lee-1977.md": "/reference/generated/lee-1977.md",
+    "../library/higher-pairs.md": "/reference/generated/higher-pairs.md",
+    "../../mechgraph/errors.py": "/reference/generated/group-errors.md",
+}
+"""Files of the repository to which pages link, and what the build makes of them."""
+
+
+def to_made_pages(app: Any, name: str, source: list[str]) -> None:
+    """Let a link that works where the repository is read lead to the page of the site."""
+    for file, page in MADE.items():
+        source[0] = source[0].replace(f"]({file})", f"]({page})")
+
+
+def keep_tables(app: Any, document: Any, name: str) -> None:
+    """Tables of text scroll where other outputs wrap."""
+    for block in document.findall(literal_block):
+        if TABLE.search(block.astext()):
+            block["classes"].append("text-table")
+
+
+def no_arguments(app: Any, what: str, name: str, found: Any, *_: Any) -> tuple[str, str] | None:
+    """Of what users get from a call, no arguments are shown."""
+    hidden = what == "class" and generate.RETURNED.search(found.__doc__ or "") and not issubclass(found, Exception)
+    return ("", "") if hidden else None
 
 
 def stays_here(app: Any, exception: Exception | None) -> None:
@@ -111,5 +145,8 @@ def stays_here(app: Any, exception: Exception | None) -> None:
 def setup(app: Any) -> dict[str, bool]:
     app.add_html_math_renderer("mathml", (formula, None), (displayed, None))
     app.connect("builder-inited", draw)
+    app.connect("source-read", to_made_pages)
+    app.connect("doctree-resolved", keep_tables)
+    app.connect("autodoc-process-signature", no_arguments)
     app.connect("build-finished", stays_here)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 import mechgraph as mg
+from mechgraph.quantities import FORCE, MOMENT, unit_of
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "docs" / "_built" / "gallery"
@@ -259,7 +260,12 @@ def numbers(s: mg.Solution) -> str:
         effort = s[freedom.partition(".")[0]].effort
         effort = effort[np.isfinite(effort).all(axis=-1)]
         if len(m.drives) == 1 and np.abs(effort).max() > 1e-9:
-            text += f" Driver {effort.min():.4g} to {effort.max():.4g}."
+            turns = m.turns(freedom)
+            unit = unit_of(m.units, MOMENT if turns else FORCE)
+            text += (
+                f" Driver {'torque' if turns else 'force'} {effort.min():.3g} to {effort.max():.3g} {unit}".rstrip()
+                + "."
+            )
     return text
 
 

@@ -1,4 +1,4 @@
-"""Pages of the reference that the program itself tells: public names, command line, file format, drawings of the pairs, two sources.
+"""Pages of the reference that the program itself tells: public names, command line, file format, two sources.
 
 ``conf.py`` calls ``write`` before a build; what it writes is not kept in the repository.
 """

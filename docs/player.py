@@ -26,7 +26,7 @@ PAGES = [
     *sorted(page for page in DOCS.rglob("*.md") if not {BUILT, DOCS / "reference" / "generated"} & {*page.parents}),
 ]
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-PICTURE = re.compile(r"!\[[^\]]*\]\((?:\.\./)*_built/([^)]+)/[^/)]+\)")
+PICTURE = re.compile(r"^```\{image\} (?:\.\./)*_built/(.+)/[^/\n]+$", re.MULTILINE)
 """A picture of a page's own, and the folder in which the page draws it."""
 
 
