@@ -1,6 +1,7 @@
 """mechgraph: spatial mechanisms as graphs of links and pairs; determinacy, equations, motion, drivers and reactions."""
 
 import sys
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from mechgraph import errors  # noqa: F401  # isort: skip  # before all that takes time to load
@@ -28,6 +29,7 @@ from mechgraph.errors import (
     StudyError,
 )
 from mechgraph.exchange.files import load, save
+from mechgraph.fields import Formatted
 from mechgraph.graph.atlas import (
     Identity,
     MultipleJoint,
@@ -112,12 +114,15 @@ methods.TABLE |= {
 }
 
 
-for _name in set(__all__) & set(globals()):
-    _public = globals()[_name]
-    if isinstance(_public, type) and _public.__module__.startswith(
-        ("mechgraph.model", "mechgraph.pairs", "mechgraph.maths")
-    ):
-        with_clear_calls(_public)
+def _with_subclasses(kind: type[Any]) -> Iterator[type[Any]]:
+    yield kind
+    for one in kind.__subclasses__():
+        yield from _with_subclasses(one)
+
+
+for _declared in (*_with_subclasses(Formatted), Tolerances, PairType, Freedom, Component, Bookkeeping):
+    if "__init__" in vars(_declared):
+        with_clear_calls(_declared)
 
 
 def __dir__() -> list[str]:

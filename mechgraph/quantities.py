@@ -457,9 +457,11 @@ def _takes_any(method: types.FunctionType) -> bool:
 
 
 def _called(function: Callable[..., Any], args: tuple[Any, ...]) -> str:
-    """``solve 'four-bar'``: what was called, of what."""
-    name = getattr(args[0], "name", None) if args else None
-    return f"{function.__qualname__} {name!r}" if isinstance(name, str) else function.__qualname__
+    """``solve 'four-bar'`` or ``Solution.point``: what was called, of what, by the names that users know."""
+    what, name = function.__name__, getattr(args[0], "name", None) if args else None
+    if "." in function.__qualname__ and args:
+        what = f"{(args[0] if isinstance(args[0], type) else type(args[0])).__name__}.{what}"
+    return f"{what} {name!r}" if isinstance(name, str) else what
 
 
 def _told(signature: inspect.Signature) -> str:

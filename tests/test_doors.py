@@ -100,6 +100,8 @@ WRONG = {
     "an argument that a mechanism lacks": (lambda: door(drive=["A"]), "'drive'; did you mean drives? It takes name, links"),
     "a mechanism of nothing": (lambda: mg.Mechanism(), "missing a required argument: 'name'; it takes name"),
     "an argument that a pair lacks": (lambda: mg.Pair("A", "R", "frame", "door", axes=Z), "did you mean axis? It takes"),
+    "an argument that a curve lacks": (lambda: mg.Curve.circle(rad=1), "did you mean radius? It takes"),
+    "a method of a report": (lambda: mg.check(M).ledger("x"), "DeterminacyReport.ledger: 1 fault"),
     "an argument that a load lacks": (lambda: mg.Effort("A", 1, breaking=1), "did you mean breaks? It takes freedom"),
     "an unknown group of tolerances": (lambda: mg.Tolerances(ranks={}), "did you mean rank? It takes rank, motion"),
     "an option that a call lacks": (lambda: mg.solve(M, {"A": 0.0}, on_rech="flag"), "did you mean on_reach? It takes m"),

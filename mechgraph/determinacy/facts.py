@@ -574,7 +574,9 @@ class Facts(GraphFacts):
         R at A -> C, R at B -> S: redundancy 3 -> 0, mobility 1 -> 1, passive 0 -> 0
         """
         if most is not None and not (type(most) is int and most >= 1):
-            raise DeclarationError("self_aligning", [wrong(most, "most", "a whole number from 1, or None for any")])
+            raise DeclarationError(
+                "DeterminacyReport.self_aligning", [wrong(most, "most", "a whole number from 1, or None for any")]
+            )
         g = self.geometry
         if g is None:
             return iter(())

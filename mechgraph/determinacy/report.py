@@ -282,7 +282,7 @@ SECTIONS = (
     ),
     Section("Loops", ("loops",), _loops),
     Section("By count alone (unknowns matched to equations)", ("parts",), _count),
-    Section("Ledger of the force equations (unknowns / equations)", ("ledger",), _ledger_table),
+    Section("Count of the force equations (unknowns / equations)", ("ledger",), _ledger_table),
     Section("Checks", ("engine", "dropped"), _checks),
 )
 """All facts in the order of the report."""

@@ -175,7 +175,7 @@ TABLES_OF_FILE: dict[str, FileTable] = {
         efforts=OTHER(
             "one dual to every freedom, as above", default="unit couple or force", rules=_named_or("component")
         ),
-        bookkeeping=TABLE("how Lee's ledger counts it", table="bookkeeping", default="6 - f unknowns"),
+        bookkeeping=TABLE("how Lee counts its unknowns and equations", table="bookkeeping", default="6 - f unknowns"),
         directed=FLAG("whether it has an axis"),
         square_second=FLAG("whether `second` must be perpendicular as given"),
     ),
@@ -197,7 +197,7 @@ TABLES_OF_FILE: dict[str, FileTable] = {
     ),
     "bookkeeping": _table(
         Bookkeeping,
-        words="How a ledger in Lee's manner writes the pair: a free dual force and parts along the axis, under conditions.",
+        words="How a count in Lee's manner writes the pair: a free dual force and parts along the axis, under conditions.",
         needed=(),
         conditions=TABLES("unit twists of frame 0 to which the dual force is reciprocal", table="freedom"),
         along=TABLES("components that the pair transmits along its axis", table="component"),

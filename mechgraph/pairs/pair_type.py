@@ -336,7 +336,7 @@ class PairTable(Mapping[str, PairType], Shown):
                     f"{unknowns} / {equations}",
                 )
             )
-        header = ("symbol", "name", "f", "freedoms in order", "reactions @ frame", "Lee's ledger")
+        header = ("symbol", "name", "f", "freedoms in order", "reactions @ frame", "Lee's count")
         return Document("Pair types", (Table(header, tuple(rows)),))
 
 
