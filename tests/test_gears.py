@@ -431,7 +431,7 @@ def test_gears_that_cannot_mesh_are_named(make, words):
 @pytest.mark.parametrize("kind", ["spur", "bevel", "worm", "rack", "belt"])
 def test_numbers_that_decide_are_never_assumed(kind, tmp_path):
     made = {"spur": mg.SpurGears, "bevel": mg.BevelGears, "worm": mg.WormGear, "rack": mg.Rack, "belt": mg.Belt}[kind]
-    with pytest.raises(mg.DeclarationError, match="missing .* required"):
+    with pytest.raises(mg.DeclarationError, match=r"missing .* required"):
         made("g", "A", "B")
     file = tmp_path / "gears.toml"
     mg.save(two(spur()), file)
