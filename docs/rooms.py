@@ -6,6 +6,7 @@ Arrows that follow from others are left out. ``python docs/rooms.py`` writes ``d
 from __future__ import annotations
 
 import ast
+import functools
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -38,6 +39,7 @@ def typing_only(tree: ast.Module) -> ast.Module:
     return tree
 
 
+@functools.cache
 def rooms() -> nx.DiGraph:
     """Folders of the package, and which imports which; ``root`` stands for the modules beside them."""
     folders = {path.name for path in PACKAGE.iterdir() if (path / "__init__.py").exists()}

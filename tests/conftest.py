@@ -100,8 +100,11 @@ def spoken_warnings() -> None:
 
 @pytest.fixture(scope="session")
 def kernel_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where tests of the kernel build it: not where programs that other tests start would find it."""
-    return tmp_path_factory.mktemp("kernel")
+    """Where tests of the kernel build it, once for all workers: not where programs that other tests start would find it."""
+    folder = tmp_path_factory.getbasetemp()
+    folder = (folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder) / "kernel"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    return folder
 
 
 @pytest.fixture(autouse=True)

@@ -88,7 +88,7 @@ MOTIONS = {
 
 
 @pytest.mark.usefixtures("compiled")
-@pytest.mark.parametrize("name", MOTIONS)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n == "stiff" else n for n in MOTIONS])
 def test_it_is_the_motion_of_the_dense_engine(name):
     made, how, end = MOTIONS[name]
     m, t = made(), np.linspace(0.0, end, 7)

@@ -93,14 +93,14 @@ def test_started_next_to_a_dead_point(seed: int) -> None:
     np.testing.assert_allclose(again[:, 1], states[1][:, 1], atol=1e-8)
 
 
-@pytest.mark.daily(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [10049, 10093])
 def test_a_polygon_that_comes_back_to_the_dead_point_beside_which_it_starts(seed: int) -> None:
     """The start is no reference for how much rates have grown towards it."""
     test_started_next_to_a_dead_point(seed)
 
 
-@pytest.mark.daily(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [10735, 10787])
 def test_passive_links_beside_a_dead_point_are_at_rest_however_near_nodes_lie(seed: int) -> None:
     """Polynomials over nodes a rounding apart led the integration of rest astray by 2e-4 and 4e-3, in silence."""
