@@ -57,7 +57,7 @@ class Kernel:
         each = len(q) // count
         order, ends = _orders(begin, q.reshape(count, each, len(begin)), batch)
         values, largest = np.empty((len(q), self.layout.record(forces))), np.zeros(2)
-        work, whole, room = np.zeros(3, dtype=ctypes.c_long), np.ones(count, dtype=np.intc), self._room()
+        work, whole, room = np.zeros(3, dtype="l"), np.ones(count, dtype=np.intc), self._room()
         self.library.mgk_variants(
             pointer(self.I), ctypes.c_int(count), ctypes.c_int(self.P.shape[1]), pointer(self.P), pointer(room),
             ctypes.c_int(each), ctypes.c_int(ends.shape[1]), *map(pointer, (ends, order, q, v, a)), ctypes.c_int(forces),
@@ -97,5 +97,6 @@ def _orders(begin: Array, q: Array, batch: tuple[int, ...]) -> tuple[Integers, I
         return np.tile(np.arange(n, dtype=np.int32), (count, 1)), np.tile(ends, (count, 1))
     along = q[:, :, 0] - begin[0][:, None]
     order = np.lexsort((np.abs(along), along < 0.0), axis=-1).astype(np.int32)
-    ends = np.stack([(along >= 0.0).sum(axis=1), np.full(count, n)], axis=1).astype(np.int32)
+    ends = np.full((count, 2), n, dtype=np.int32)
+    ends[:, 0] = (along >= 0.0).sum(axis=1)
     return order, ends
