@@ -111,8 +111,6 @@ class DenseFactored:
         self.J, self.which = J, which
         self.rows, self.freedoms, self.T = J.shape
         self._forms, self._fixed = forms, fixed
-        self._sensitivity: Array | None = None
-        self._motions: Array | None = None
 
     @cached_property
     def _parts(self) -> list[tuple[Form, Index, ChosenSystem]]:
@@ -159,20 +157,13 @@ class DenseFactored:
 
     def sensitivity(self) -> Array:
         """See the protocol in ``kinematics.state``."""
-        if self._sensitivity is None:
-            fixed = self._fixed
-            Z = self.solve(-self.J.take(fixed, axis=1))
-            for i, column in enumerate(fixed):
-                Z[column, i] = 1.0
-            self._sensitivity = Z
-        return self._sensitivity
+        Z = self.solve(-self.J.take(self._fixed, axis=1))
+        Z[self._fixed, np.arange(len(self._fixed))] = 1.0
+        return Z
 
     def motions(self) -> Array:
         """See the protocol in ``kinematics.state``."""
-        if self._motions is None:
-            found = [form.motions(system) for form, _, system in self._parts]
-            self._motions = self._joined(found, (self.freedoms, 0))
-        return self._motions
+        return self._joined([form.motions(system) for form, _, system in self._parts], (self.freedoms, 0))
 
     def self_stresses(self, every: bool = False) -> Array:
         """See the protocol in ``kinematics.state``."""

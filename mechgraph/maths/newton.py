@@ -8,14 +8,12 @@ from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
-import scipy
 
 from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.tolerances import PATH
 
 LONGEST = 0.5
 """Longest step (largest increment) that is taken at once."""
-EVERY = slice(None)
 
 
 def largest(values: Array) -> Array:
@@ -168,122 +166,69 @@ class Newton:
 
     def nodes(self, x: Array, drive: Array, tracks: Index, which: Index, goal: float) -> Closed:
         """States corrected until the last step is below ``goal``, with their sensitivities."""
-        return _Run(self, x, drive, tracks, which, goal, 0.0).closed()
+        return self._closed(x, drive, tracks, which, goal, 0.0)
 
     def close(self, x: Array, drive: Array, tracks: Index, which: Index) -> Closed:
         """States corrected until the residual is rounding."""
-        return _Run(self, x, drive, tracks, which, 0.0, PATH.closed).closed()
+        return self._closed(x, drive, tracks, which, 0.0, PATH.closed)
 
+    def _closed(self, x: Array, drive: Array, tracks: Index, which: Index, step_goal: float, goal: float) -> Closed:
+        """States corrected until the last step is below one goal, or the residual below the other, or at rounding and no longer falls.
 
-class _Run:
-    """States ``x (nx, n)`` on their way to zeros; ``active`` are those that are corrected further, evaluated at ``point``."""
-
-    def __init__(
-        self, newton: Newton, x: Array, drive: Array, tracks: Index, which: Index, step_goal: float, goal: float
-    ) -> None:
-        (F, d), n = newton.problem.size, x.shape[1]
-        self.problem, self.work = newton.problem, newton.work
-        self.x, self.drive, self.tracks, self.which = x.copy(), drive, tracks, which.copy()
-        self.step_goal, self.goal = step_goal, goal
-        self.total, self.Z, self.condition = np.zeros((F, n)), np.zeros((F, d, n)), np.full(n, np.inf)
-        self.before = self.condition.copy()
-        self.done, self.chosen_again = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
-        self.active = np.arange(n)
-
-    def closed(self) -> Closed:
-        """The outcome, after as many steps as it takes."""
-        point = None
-        for _ in range(PATH.iterations):
-            if self._evaluated():
-                point = self.point if self.active.size == len(self.done) else None
-                break
-            self._correct()
-            if not self.active.size:
-                break
-        return Closed(self.x, self.total, self.Z, self.condition, self.which, self.done, point)
-
-    @property
-    def _mine(self) -> Index | slice:
-        return EVERY if self.active.size == len(self.done) else self.active
-
-    def _evaluated(self) -> bool:
-        """Evaluate the active states; where the residual is at its goal, or at rounding and no longer falls, they are done.
-
-        Whether all of them are.
+        States that a step leads too far away are left; those ``at`` are corrected further.
         """
-        mine = self._mine
-        self.point = self.problem.at(self.x[:, mine], self.drive[:, mine], self.tracks[mine])
-        self.work.evaluations += self.active.size
-        self.work.calls += 1
-        self.left = largest(self.point.residual)
-        if self.goal == 0:
-            return False
-        near = self.left <= self.goal
-        stalled = self.left > 0.5 * self.before[mine]
-        if stalled.any():
-            near |= stalled & (self.left <= np.maximum(PATH.accepted, self.point.rounding))
-        self.x[:, self.active[near]] = self.point.x[:, near]
-        self.done[self.active[near]] = True
-        if near.all():
-            return True
-        if near.any():
-            keep = np.flatnonzero(~near)
-            self.active, self.point, self.left = self.active[keep], self.point.part(keep), self.left[keep]
-        return False
-
-    def _correct(self) -> None:
-        """Take one step; where it is at its goal the state is done, where it leads too far away it is left."""
-        mine = self._mine
-        f = self.problem.factored(self.point, self.which[mine])
-        self.work.factorizations += self.active.size
-        step = f.solve(-self.point.residual[:, None])[:, 0]
-        size = largest(step)
-        finite = None
-        if np.count_nonzero(size <= LONGEST) < len(size):
+        problem, (F, d), n = self.problem, self.problem.size, x.shape[1]
+        x, which, at = x.copy(), which.copy(), np.arange(n)
+        total, Z, condition = np.zeros((F, n)), np.zeros((F, d, n)), np.full(n, np.inf)
+        before, done, chosen_again = condition.copy(), np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+        for _ in range(PATH.iterations):
+            point = problem.at(x[:, at], drive[:, at], tracks[at])
+            self.work.evaluations += at.size
+            self.work.calls += 1
+            left = largest(point.residual)
+            if goal > 0.0:
+                near = (left <= goal) | (
+                    (left > 0.5 * before[at]) & (left <= np.maximum(PATH.accepted, point.rounding))
+                )
+                x[:, at[near]], done[at[near]] = point.x[:, near], True
+                if near.all():
+                    return Closed(x, total, Z, condition, which, done, point if at.size == n else None)
+                if near.any():
+                    keep = np.flatnonzero(~near)
+                    at, point, left = at[keep], point.part(keep), left[keep]
+            f = problem.factored(point, which[at])
+            self.work.factorizations += at.size
+            step = f.solve(-point.residual[:, None])[:, 0]
+            size = largest(step)
             finite = np.isfinite(size)
             step = np.where(finite, step, 0.0) * np.minimum(1.0, LONGEST / np.maximum(size, LONGEST))
-        self.x[:, mine] = self.problem.advance(self.point.x, step, self.tracks[mine])
-        self.total[:, mine] += step
-        self.before[mine] = self.left
-        small = self._small(f, size)
-        going = ~small if finite is None else finite & ~small
-        unmet = self._unmet(small, step, size)
-        if unmet is not None:
-            again = unmet & ~self.chosen_again[mine]
-            self._choose_again(np.flatnonzero(again))
-            small, going = small & ~unmet, (going & ~unmet) | again
-        if count := np.count_nonzero(small):
-            at, those = (mine, EVERY) if count == self.active.size else (self.active[small], small)
-            self.Z[:, :, at] = self.problem.sensitivity(self.point, f)[:, :, those]
-            self.condition[at], self.done[at] = f.condition[those], True
-        if count < self.active.size:
-            going &= largest(self.total[:, mine]) <= PATH.lost
-        self.active = self.active[going]
-
-    def _small(self, f: Any, size: Array) -> Mask:
-        """Where a step of that size is at its goal."""
-        small: Mask = size <= self.step_goal
-        if self.step_goal <= PATH.node and np.count_nonzero(small):
-            # the rates of a node err by the last step times the condition: poor ones are closed further, down to rounding
-            condition_here = np.maximum(f.condition, 1.0)
-            small &= size <= np.maximum(PATH.rates / condition_here, PATH.rounding * condition_here)
-        return small
-
-    def _unmet(self, small: Mask, step: Array, size: Array) -> Mask | None:
-        """Where a last step leaves the residual of rows that were left out as dependent as large as it is: they are not. None: nowhere."""
-        # residual over the step that takes it away from which on it is asked whether it does: rows are of size one, a few freedoms each
-        doubt = small & (self.left > np.maximum(30.0 * size, 10.0 * PATH.accepted))
-        if not np.count_nonzero(doubt):
-            return None
-        rest = largest(self.point.residual + self.point.closure_rates(step))
-        return np.asarray(doubt & (rest > 0.5 * self.left))
-
-    def _choose_again(self, again: Index) -> None:
-        """Another form, tried once."""
-        if again.size:
-            at = self.active[again]
-            self.which[at] = self.problem.chosen(self.point.part(again), np.full(again.size, -1))
-            self.chosen_again[at] = True
+            x[:, at] = problem.advance(point.x, step, tracks[at])
+            total[:, at] += step
+            before[at] = left
+            small = size <= step_goal
+            if step_goal <= PATH.node and small.any():
+                # the rates of a node err by the last step times the condition: poor ones are closed further, down to rounding
+                poor = np.maximum(f.condition, 1.0)
+                small &= size <= np.maximum(PATH.rates / poor, PATH.rounding * poor)
+            # rows that were left out as dependent are not where a last step leaves their residual as large as it is: another form is tried
+            # once. A residual 30 times the step is no matter of sizes: rows are of size one, with a few freedoms each
+            unmet = small & (left > np.maximum(30.0 * size, 10.0 * PATH.accepted))
+            if unmet.any():
+                unmet &= largest(point.residual + point.closure_rates(step)) > 0.5 * left
+            again = unmet & ~chosen_again[at]
+            if again.any():
+                which[at[again]] = problem.chosen(
+                    point.part(np.flatnonzero(again)), np.full(np.count_nonzero(again), -1)
+                )
+                chosen_again[at[again]] = True
+            small &= ~unmet
+            if small.any():
+                Z[:, :, at[small]] = problem.sensitivity(point, f)[:, :, small]
+                condition[at[small]], done[at[small]] = f.condition[small], True
+            at = at[((finite & ~small & ~unmet) | again) & (largest(total[:, at]) <= PATH.lost)]
+            if not at.size:
+                break
+        return Closed(x, total, Z, condition, which, done)
 
 
 def least_norm_steps(J: Array, r: Array, tolerance: float) -> Array:
@@ -291,9 +236,6 @@ def least_norm_steps(J: Array, r: Array, tolerance: float) -> Array:
 
     Singular values below ``tolerance`` times the largest are dropped.
     """
-    if J.shape[2] == 1 and J.size:  # one matrix: no inverse is formed
-        found = scipy.linalg.lstsq(J[:, :, 0], -r[:, 0], cond=tolerance, lapack_driver="gelsd", check_finite=False)
-        return np.asarray(found[0])[:, None]
     finite = np.isfinite(J).all(axis=(0, 1)) & np.isfinite(r).all(axis=0)
     inverse = np.linalg.pinv(np.moveaxis(np.where(finite, J, 0.0), -1, 0), rcond=tolerance)
     return np.where(finite, -np.einsum("tnm,mt->nt", inverse, np.where(finite, r, 0.0)), np.nan)

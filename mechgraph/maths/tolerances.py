@@ -554,11 +554,6 @@ def _part(name: str, part: type, given: Mapping[str, Any], faults: list[str]) ->
     return part(**known)
 
 
-def asked_for() -> Tolerances:
-    """Those of the running call."""
-    return ASKED.get() or DEFAULT
-
-
 class _Asked:
     """One part of the tolerances of the running call."""
 

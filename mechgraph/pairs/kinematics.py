@@ -22,8 +22,6 @@ from mechgraph.maths.se3 import (
     move_twist,
     quaternion_exp,
     quaternion_log,
-    turn_between,
-    turn_tangent,
     turned,
 )
 from mechgraph.pairs.factors import Component, Factor, Freedom
@@ -221,29 +219,6 @@ def advance(row: EvaluatedRow, x: Array, dq: Array) -> Array:
             out[rows] = turned(x[rows], dq[columns])
         else:
             out[rows] = x[rows] + dq[columns]
-    return out
-
-
-def difference(row: EvaluatedRow, x1: Array, x0: Array) -> Array:
-    """Increments ``dq`` that lead from ``x0`` to ``x1``; the inverse of ``advance`` (rotations by the short way)."""
-    out = np.empty((row.f, *np.broadcast_shapes(x1.shape[1:], x0.shape[1:])), dtype=np.result_type(x1, x0))
-    for step, columns, rows in _placed(row):
-        if step.holds_rotation:
-            out[columns] = turn_between(x1[rows], x0[rows])
-        else:
-            out[columns] = x1[rows] - x0[rows]
-    return out
-
-
-def tangent(row: EvaluatedRow, dq: Array, rates: Array) -> Array:
-    """Rates of the increments ``dq`` at the state that they lead to, from the rates ``(f, ...)`` of the freedoms there.
-
-    Unchanged for single freedoms; ``turn_tangent`` for a rotation.
-    """
-    out = rates.copy()
-    for step, columns, _ in _placed(row):
-        if step.holds_rotation:
-            out[columns] = turn_tangent(dq[columns], rates[columns])
     return out
 
 
