@@ -31,9 +31,6 @@ from mechgraph.errors import visible
 from mechgraph.memo import Remembers
 from mechgraph.quantities import with_doors, with_memory
 
-DEEPEST_HEADING = 5
-"""Deepest heading level; the title is level 0."""
-
 ALIGNMENTS = {"l": "left", "r": "right", "c": "center"}
 
 
@@ -56,8 +53,9 @@ class Heading:
 
     def __post_init__(self) -> None:
         """Check the level."""
-        if not 1 <= self.level <= DEEPEST_HEADING:
-            raise ValueError(f"heading {self.text!r}: level must be 1 to {DEEPEST_HEADING}, got {self.level}")
+        deepest_heading = 5  # deepest heading level; the title is level 0
+        if not 1 <= self.level <= deepest_heading:
+            raise ValueError(f"heading {self.text!r}: level must be 1 to {deepest_heading}, got {self.level}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -591,8 +589,6 @@ def tabular(table: Table, environment: str) -> list[str]:
     return [rf"\begin{{{environment}}}{{{columns}}}", *rows, rf"\end{{{environment}}}"]
 
 
-LINE_SIGNS = 78
-"""Signs of usual width that a line of an equation holds."""
 ACCENTS = {0x300, 0x301, 0x302, 0x303, 0x304, 0x306, 0x307, 0x308, 0x30A, 0x30B, 0x30C, 0x327}
 """Combining accents that TeX sets on letters; it knows these letters itself."""
 SIGNS = {
@@ -637,9 +633,10 @@ def _block(block: Block) -> str:
 def _broken(latex: str) -> str:
     """A displayed equation, in lines where it is long: broken before signs, and within a product where that alone is too long."""
     lines: list[str] = []
+    line_signs = 78  # signs of usual width that a line of an equation holds
     for term in _terms(latex):
-        for part in [term] if _width(term) <= LINE_SIGNS else _pieces(term):
-            if lines and _width(lines[-1]) + _width(part) < LINE_SIGNS:
+        for part in [term] if _width(term) <= line_signs else _pieces(term):
+            if lines and _width(lines[-1]) + _width(part) < line_signs:
                 lines[-1] += f" {part}"
             else:
                 lines.append(part)

@@ -17,8 +17,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 if TYPE_CHECKING:
     from os import PathLike
 
-MOST_FAULTS = 30
-"""Faults that a message lists."""
 MOST_NAMES = 30
 """Names that a fault lists."""
 
@@ -120,8 +118,9 @@ class DeclarationError(MechgraphError):
         self.subject = shortened(subject)
         self.faults = tuple(map(shortened, faults))
         lines = [f"{self.subject}: {len(faults)} fault{'s' if len(faults) != 1 else ''}"]
-        lines += [f"  {fault}" for fault in self.faults[:MOST_FAULTS]]
-        more = len(faults) - MOST_FAULTS
+        most_faults = 30  # faults that a message lists
+        lines += [f"  {fault}" for fault in self.faults[:most_faults]]
+        more = len(faults) - most_faults
         super().__init__("\n".join(lines + [f"  and {more} more (in .faults)"] * (more > 0)))
 
 

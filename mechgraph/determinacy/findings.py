@@ -122,12 +122,8 @@ LARGEST_TOL = 1e-2
 """Largest tolerance that is tried."""
 LIMIT = 20.0
 """Seconds that the search for near-special geometry may take unless another limit is given."""
-MOST_PAIRS = 300
-"""Pairs up to which rounding is looked for without being asked."""
 TOO_MANY = "of {} pairs it is not looked for (of up to {} it is)"
 """What is said of more."""
-BY_CHANCE = (60, 1.5)
-"""Relations within a tolerance, in all and a pair, above which they are no rounding: of many pairs some come near any relation."""
 SAFE = 4.0
 """Tolerance that is advised, in largest changes of a pair: closure errors add up along a loop."""
 
@@ -161,21 +157,25 @@ def rounding(m: Mechanism, verdict: Callable[[Mechanism], tuple[Any, ...]], limi
     Raises
     ------
     SearchEnded
-        where it takes more than ``limit`` seconds (see ``errors.Budget``), and of more than ``MOST_PAIRS`` pairs.
+        where it takes more than ``limit`` seconds (see ``errors.Budget``), and of more than 300 pairs.
     """
     budget = Budget(limit)
     if isinstance(m, SnappedMechanism) or not m.has_geometry:
         return None
-    if len(m.pairs) > MOST_PAIRS:
-        raise SearchEnded(TOO_MANY.format(len(m.pairs), MOST_PAIRS))
+    most_pairs = 300  # pairs up to which rounding is looked for without being asked
+    if len(m.pairs) > most_pairs:
+        raise SearchEnded(TOO_MANY.format(len(m.pairs), most_pairs))
     own: tuple[Any, ...] | None = None
     other: tuple[SnappedMechanism, float, tuple[Any, ...]] | None = None
     try:
         sizes = candidates(m, LARGEST_TOL)
     except MechgraphError:  # the loops do not close to that either
         return None
+    # relations within a tolerance, in all and a pair, above which they are no rounding: of many pairs some come near
+    # any relation
+    by_chance = (60, 1.5)
     for tol in _decades(sizes):
-        if (sizes <= tol).sum() > max(BY_CHANCE[0], BY_CHANCE[1] * len(m.pairs)):
+        if (sizes <= tol).sum() > max(by_chance[0], by_chance[1] * len(m.pairs)):
             break
         try:
             exact = snapped(m, tol, budget)

@@ -53,14 +53,8 @@ BRANCHING_MOTIONS = 24
 """Motions up to which branches are sought: of more, far more branches than are told apart meet, or all of a continuum."""
 TRIAL_STEPS = (0.05, 0.0125, 0.003)
 """Lengths of trial steps (radians, or lengths / L): the first ones tell a motion that returns, the last ones tolerate curvature."""
-STROKE = 0.35
-"""Length over which a motion is followed."""
-RESOLUTION = 0.01
-"""Parts in which that length is given: just where it ends is a matter of step control."""
 MOVED = 0.05
 """Part of a step that must be left for the position reached to count as another one."""
-SLOW = 0.2
-"""Part of the closure error that such a correction may leave."""
 STEPS_SEED = 7
 
 
@@ -179,7 +173,8 @@ class _Closed:
         # gigabytes of rates
         if len(given) > 200:
             return 0.0
-        ahead = STROKE * self.increments(v)[given]
+        stroke = 0.35  # length over which a motion is followed
+        ahead = stroke * self.increments(v)[given]
         if not np.abs(ahead).max(initial=0.0) > MOVED * TRIAL_STEPS[0]:
             return 0.0
         solver = closure_solver(engine_for(self.system.n_rows, 1, self.engine), given)
@@ -189,8 +184,9 @@ class _Closed:
         paths = Paths([np.stack([begin, begin + ahead], axis=1)])
         nodes = Follower(path).follow(self.x[:, None], paths).nodes
         closed = Configuration(self.system, nodes.x).closure <= CLOSED
-        length = STROKE * float(nodes.place[closed].max(initial=0.0)) / float(paths.end[0])
-        return RESOLUTION * np.floor(length / RESOLUTION + 1e-6)
+        length = stroke * float(nodes.place[closed].max(initial=0.0)) / float(paths.end[0])
+        resolution = 0.01  # parts in which that length is given: just where it ends is a matter of step control
+        return resolution * np.floor(length / resolution + 1e-6)
 
 
 @dataclass(frozen=True)
@@ -274,12 +270,13 @@ def _corrected(system: System, x: Array, rows: ReducedRows) -> Array | None:
     """The loops closed from ``x`` in the kept rows of a nearby position alone; None where that does not converge quickly."""
     before, goal = np.inf, max(CLOSURE_GOAL, rows.rounding)
     # corrections with the equations of the position left
+    slow = 0.2  # part of the closure error that such a correction may leave
     for _ in range(12):
         residual = Configuration(system, x[:, None]).residual[:, 0]
         error = float(np.abs(rows.kept_part(residual[:, None])).max(initial=0.0))
-        if error <= goal or (error < 10 * goal and error > SLOW * before):
+        if error <= goal or (error < 10 * goal and error > slow * before):
             return x
-        if error > SLOW * before:
+        if error > slow * before:
             return None
         before = error
         x = system.advance(x[:, None], rows.correction(residual)[:, None])[:, 0]

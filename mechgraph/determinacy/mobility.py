@@ -161,10 +161,6 @@ class Position:
         return Position(self.declared, rows, {**self.changed, **pairs}), column
 
 
-DIFFERENCE_STEP = 1e-4
-"""Step of the central differences that tell whether a pair element leaves its place."""
-
-
 @dataclass(frozen=True)
 class _Search:
     """A position and the freedoms of every pair that are not ``driven``."""
@@ -366,7 +362,8 @@ def _leaving(position: Position, k: int, links: tuple[int, ...], moves: Array, t
     """Rate at which the reaction wrenches of pair ``k`` leave their span, one column a motion."""
     pair = position.pair(k)
     carried = position.graph.ends[k][0] in links
-    steps = np.array([DIFFERENCE_STEP, -DIFFERENCE_STEP, 0.0])
+    difference_step = 1e-4  # step of the central differences that tell whether a pair element leaves its place
+    steps = np.array([difference_step, -difference_step, 0.0])
     columns = []
     for move, twist in zip(moves[position.columns(k)].T, twists.T, strict=True):
         frame = np.repeat(pair.frame, 3, axis=2)
@@ -376,7 +373,7 @@ def _leaving(position: Position, k: int, links: tuple[int, ...], moves: Array, t
         frames = evaluation.frames_of(pair.type, pair.pitch, x, frame[:, :, None])
         W = evaluation.reactions_of(pair.type, pair.pitch, frames)[:, :, 0]
         Q, _ = np.linalg.qr(W[:, :, 2])
-        change = (W[:, :, 0] - W[:, :, 1]) / (2 * DIFFERENCE_STEP)
+        change = (W[:, :, 0] - W[:, :, 1]) / (2 * difference_step)
         columns.append((change - Q @ (Q.T @ change)).ravel())
     return np.stack(columns, axis=1)
 
@@ -643,10 +640,6 @@ def generic(m: Mechanism, graph: LinkGraph, engine: EngineName = "auto") -> Gene
     return Generic(closure.rank, freedoms - closure.rank, closure.count - closure.rank, closure.sets)
 
 
-MOST_NAMED = 12
-"""Freedoms that a message names."""
-
-
 def stand_still(Z: Array, acting: Index) -> np.ndarray:
     """Positions ``(T,)`` at which freedoms ``acting`` can rest while the mechanism moves, so that efforts in them cannot hold it.
 
@@ -674,9 +667,10 @@ def actuation_fault(m: Mechanism, Z: Array, acting: Index) -> str:
     if spare:
         why = f"depends on {', '.join(names[c] for c in kept)}" if kept else "stands still while the mechanism moves"
         parts.append(f"{', '.join(spare)} {why}")
+    most_named = 12  # freedoms that a message names
     if d > len(kept) and able:
         count = "any one of " if d - len(kept) == 1 else f"{d - len(kept)} independent ones of "
-        which = ", ".join(able[:MOST_NAMED]) + (", ..." if len(able) > MOST_NAMED else "")
+        which = ", ".join(able[:most_named]) + (", ..." if len(able) > most_named else "")
         where = " in its place" if spare else " beside them" if kept else ""
         parts.append(f"{count if len(able) > 1 else ''}{which} would do{where}")
     elif spare:

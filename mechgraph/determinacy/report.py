@@ -45,8 +45,6 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.pairs.pair_type import TABLE
 from mechgraph.quantities import Limit, door, wrong
 
-TERMS = 4
-"""Most terms of a sum that is printed."""
 LISTED = 20
 """Most items of one kind that are printed; all are in the JSON."""
 NOT_UNIQUE = (
@@ -189,11 +187,12 @@ def _combined(r: Facts) -> Iterator[Block]:
     if known.unique_directions:
         yield Paragraph("Directions in the axes x, y, z of the pair's marker.")
         yield from _listed(d.text for d in known.unique_directions)
+    terms = 4  # most terms of a sum that is printed
     if known.combinations:
-        lines = [f"group {group + 1}: {text}" for group, text in known.combinations if text.count(":") <= TERMS]
+        lines = [f"group {group + 1}: {text}" for group, text in known.combinations if text.count(":") <= terms]
         more = len(known.combinations) - len(lines)
         if more:
-            lines.append(f"{'and ' if lines else ''}{more} of more than {TERMS} terms (see report.to_dict())")
+            lines.append(f"{'and ' if lines else ''}{more} of more than {terms} terms (see report.to_dict())")
         yield Paragraph("These sums are unique though their terms are not:")
         yield from _listed(lines)
     if known.unsought:

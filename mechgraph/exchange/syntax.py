@@ -171,8 +171,6 @@ def read_xml(path: Path, kind: str, root: str) -> XmlElement:
     return found
 
 
-LONGEST_FORMULA = 2000
-"""Characters of a formula."""
 DECIMAL = r"(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
 DOUBLE = re.compile(rf"({DECIMAL})d(?!\w)", re.ASCII)
 """A number with the letter that Smalltalk writes after one of double precision: ``4.0d*pi*time``."""
@@ -309,8 +307,9 @@ def law(formula: str, variables: Mapping[str, str] = NONE) -> Callable[[Array, A
 def _tree(formula: str) -> ast.expr:
     """The syntax tree of a formula."""
     text = QUOTED.sub(r"\1", formula.strip()).replace("<n>", " ").lower()
-    if len(text) > LONGEST_FORMULA:
-        raise FormulaFault(f"longer than {LONGEST_FORMULA} characters")
+    longest_formula = 2000  # characters of a formula
+    if len(text) > longest_formula:
+        raise FormulaFault(f"longer than {longest_formula} characters")
     try:
         if TOKENS.fullmatch(text):
             return ast.parse(DOUBLE.sub(r"\1", text).replace("^", "**"), mode="eval").body

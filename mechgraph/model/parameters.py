@@ -175,15 +175,13 @@ def _of_sides(m: Mechanism, fields: tuple[str, ...]) -> list[Array]:
     return out
 
 
-NOWHERE = (0.0, 0.0, 0.0)
-
-
 def declared(m: Mechanism) -> Declared:
     """The declared numbers of one mechanism with geometry, a batch of one."""
     point, axis, second = _of_sides(m, ("point", "axis", "second"))
     n = len(m.links)
-    center = _rows((NOWHERE if link.center is None else link.center for link in m.links), n).T
-    tensors = ((NOWHERE,) * 3 if link.inertia is None else link.inertia for link in m.links)
+    nowhere = (0.0, 0.0, 0.0)
+    center = _rows((nowhere if link.center is None else link.center for link in m.links), n).T
+    tensors = ((nowhere,) * 3 if link.inertia is None else link.inertia for link in m.links)
     inertia = _rows(chain.from_iterable(tensors), 3 * n).reshape(n, 3, 3).transpose(1, 2, 0)
     return Declared(
         point[..., None],

@@ -134,7 +134,6 @@ class Stop(Described):
         return [f"stop of {shown(self.freedom)}: {fault}" for fault in found]
 
 
-MOST_POINTS = 10_000_000
 MethodName = Literal["auto", "RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"]
 METHODS: tuple[MethodName, ...] = get_args(MethodName)
 PassiveName = Literal["free", "held"]
@@ -222,8 +221,9 @@ class ResponseSetup(Described):
         """What is wrong with it, one line each."""
         found: list[str] = []
         times, points = read_times(self.time, found), self.points
-        if points is not None and (type(points) is not int or not 2 <= points <= MOST_POINTS or len(times) != 2):
-            found.append(wrong(points, "points", f"a number from 2 to {MOST_POINTS}, beside time = (begin, end)"))
+        most_points = 10_000_000
+        if points is not None and (type(points) is not int or not 2 <= points <= most_points or len(times) != 2):
+            found.append(wrong(points, "points", f"a number from 2 to {most_points}, beside time = (begin, end)"))
         for what in ("start", "rates"):
             found += _value_faults(m, what, getattr(self, what))
         found += tolerance_faults(self.rtol, self.atol, self.max_step)

@@ -135,8 +135,6 @@ def swept(first: float, end: float, step: float) -> Array | str:
     return np.asarray(first + step * np.arange(max(int(np.ceil(count - 1e-9)), 1)), dtype=float)
 
 
-LINE_OF_FILE = 120
-"""Characters of a line of a written list."""
 LIST = re.compile(r"""\[\n((?:\ +[^\[\]{}"'\n]+,\n)+)\ *\]""")
 LIST_OF_LISTS = re.compile(r"""\[\n((?:\ +\[[^\[\]{}"'\n]*\],\n)+)\ *\]""")
 """Lists of numbers, and lists of these, one item a line."""
@@ -487,13 +485,14 @@ def written(m: Mechanism, path: str | os.PathLike[str] = "") -> str:
 
 def _in_few_lines(text: str) -> str:
     """TOML with lists of numbers, and lists of these, in as few lines as they fill; no text of it goes over the end of a line."""
+    line_of_file = 120  # characters of a line of a written list
 
     def filled(found: re.Match[str]) -> str:
         items = [line.strip().removesuffix(",") for line in found[1].splitlines()]
         one = f"[{', '.join(items)}]"
-        if len(one) <= LINE_OF_FILE:
+        if len(one) <= line_of_file:
             return one
-        lines = textwrap.wrap(", ".join(items), LINE_OF_FILE, break_long_words=False, break_on_hyphens=False)
+        lines = textwrap.wrap(", ".join(items), line_of_file, break_long_words=False, break_on_hyphens=False)
         return "[\n" + "".join(f"    {line.removesuffix(',')},\n" for line in lines) + "]"
 
     return LIST_OF_LISTS.sub(filled, LIST.sub(filled, text))

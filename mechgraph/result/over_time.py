@@ -27,8 +27,6 @@ from mechgraph.result.values import bracket, number, with_unit
 
 SAME_TIME = 1e-6
 """Part of the duration by which drivers may disagree about the time of a position."""
-RETURNED = 1e-6
-"""Part of the range of a coordinate (at least 1 rad for a turn) within which it is back where it was."""
 
 
 @dataclass(frozen=True)
@@ -142,8 +140,10 @@ def _returned(values: Array, name: str, s: Solution, ended: bool) -> bool:
         gap -= period * round(gap / period)
     size = float(np.ptp(values)) + float(np.abs(values).max())
     # so many of its largest steps may part the last value of a coordinate from the first where the end of a cycle is left out
+    # part of the range of a coordinate (at least 1 rad for a turn) within which it is back where it was
+    returned = 1e-6
     return abs(gap) <= (
-        RETURNED * max(size, 1e-300) if ended else 2.0 * float(np.abs(np.diff(values)).max()) + RETURNED * size
+        returned * max(size, 1e-300) if ended else 2.0 * float(np.abs(np.diff(values)).max()) + returned * size
     )
 
 

@@ -118,8 +118,6 @@ LIGHT = np.array([-0.45, 0.65, 0.75]) / np.linalg.norm([-0.45, 0.65, 0.75])
 """Direction to the light: right, up, towards the viewer."""
 MARGIN = np.array([0.07, 0.13, 0.07])
 """Part of a box that is left free beside, below and above a drawing: for names, and for the directions and the scale."""
-AMBIENT = 0.66
-"""Brightness of what lies in the shade."""
 
 
 class Painter(Protocol):
@@ -284,7 +282,8 @@ def shaded(colour: str, corners: Sequence[Array], camera: Array, alpha: float = 
     light = LIGHT @ camera
     normals = np.array([np.cross(p[1] - p[0], p[2] - p[0]) for p in corners])
     sizes = np.linalg.norm(normals, axis=1)
-    bright = AMBIENT + (1 - AMBIENT) * np.abs(normals @ light) / np.where(sizes > 0, sizes, 1.0)
+    ambient = 0.66  # brightness of what lies in the shade
+    bright = ambient + (1 - ambient) * np.abs(normals @ light) / np.where(sizes > 0, sizes, 1.0)
     out = np.tile(to_rgba(colour, alpha), (len(corners), 1))
     out[:, :3] *= bright[:, None]
     return out
@@ -301,10 +300,6 @@ def inside(ax: Any) -> Array:
     """The place of axes on the screen as their figure gives it, ``[[left, bottom], [right, top]]`` in pixels."""
     place = ax.get_position(original=True).transformed(ax.figure.transSubfigure)
     return np.array(place.get_points())
-
-
-LARGE = 40
-"""Nodes from which on one layout is taken, unseen; from four times as many on that of springs, which is faster."""
 
 
 def places(names: Iterable[str], edges: Iterable[tuple[str, str]]) -> dict[str, Array]:
@@ -327,8 +322,10 @@ def places(names: Iterable[str], edges: Iterable[tuple[str, str]]) -> dict[str, 
 
 def _clearest(graph: nx.Graph[int]) -> dict[int, Any]:
     """Of several layouts that give distances their due, the one in which the fewest lines cross each other or run over nodes."""
-    if len(graph) > LARGE:
-        return nx.kamada_kawai_layout(graph) if len(graph) < 4 * LARGE else nx.spring_layout(graph, seed=0)
+    # nodes from which on one layout is taken, unseen; from four times as many on that of springs, which is faster
+    large = 40
+    if len(graph) > large:
+        return nx.kamada_kawai_layout(graph) if len(graph) < 4 * large else nx.spring_layout(graph, seed=0)
     first = [nx.planar_layout(graph)] if nx.is_planar(graph) else []
     first += [nx.circular_layout(graph), *(nx.spring_layout(graph, seed=seed) for seed in range(3))]
     found = [_scaled(graph, nx.kamada_kawai_layout(graph, pos=pos)) for pos in first]
@@ -372,8 +369,6 @@ def _cycle_order(graph: nx.Graph[int]) -> list[int]:
 RINGS = (1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 8.0)
 """Distances at which a place for a text is looked for, over the nearest."""
 ANGLES = np.linspace(0.0, 2 * np.pi, 24, endpoint=False) + 0.3
-FORBIDDEN = 1e4
-"""Cost of covering another text, or of reaching beyond the axes, over that of covering one point of the drawing."""
 
 
 @dataclass
@@ -580,17 +575,19 @@ def _best(
         # cost of moving a text by its height from where it stood before, over that of covering one point of the drawing
         cost += 1.2 * np.minimum(np.linalg.norm(low - kept, axis=1) / float(size[1]), 2.0)
     beyond = np.maximum(box[0] - low, 0.0).sum(axis=1) + np.maximum(high - box[1], 0.0).sum(axis=1)
-    cost += FORBIDDEN * (beyond > 0) * (1.0 + beyond)
+    # cost of covering another text, or of reaching beyond the axes, over that of covering one point of the drawing
+    forbidden = 1e4
+    cost += forbidden * (beyond > 0) * (1.0 + beyond)
     if boxes:
         others = np.array(boxes)[:, :, None]
         overlap = np.clip(np.minimum(high, others[:, 1]) - np.maximum(low, others[:, 0]), 0.0, None).prod(axis=2)
-        cost += FORBIDDEN * ((overlap > 0) * (1.0 + overlap / size.prod())).sum(axis=0)
+        cost += forbidden * ((overlap > 0) * (1.0 + overlap / size.prod())).sum(axis=0)
     near = taken[(np.abs(taken - point) < np.abs(reach).max(axis=0) + size).all(axis=1)]
     if len(near):
         covered = ((near > low[:, None] - away / 3) & (near < high[:, None] + away / 3)).all(axis=2)
         cost += covered.sum(axis=1) * 0.6
     best = int(np.argmin(cost))
-    return low[best], float(rings[best]), bool(cost[best] < FORBIDDEN)
+    return low[best], float(rings[best]), bool(cost[best] < forbidden)
 
 
 def nice_length(extent: float) -> float:

@@ -45,8 +45,6 @@ LETTER, CLEARED = (0.045, 0.11), 1.3
 """Width and height of a letter of the text on a line, over the length of a line; clearance over its size that is enough."""
 LEGEND_LETTERS = 34
 """Letters of a line of the legend."""
-LABELLED = 64
-"""Equations and unknowns up to which each is named beside the pattern; beyond, their owners are."""
 
 
 @door
@@ -324,7 +322,8 @@ def draw_sparsity(f: Formulation, *, ax: Axes = None) -> Any:
     rows, columns, _, _ = f.pattern
     owners = list(dict.fromkeys(e.owner for e in f.equations))
     n, k = len(f.equations), len(f.unknowns)
-    size = (max(4.5, 2.4 + 0.145 * min(k, LABELLED)), max(4.0, 1.6 + 0.145 * min(n, LABELLED)))
+    labelled = 64  # equations and unknowns up to which each is named beside the pattern; beyond, their owners are
+    size = (max(4.5, 2.4 + 0.145 * min(k, labelled)), max(4.0, 1.6 + 0.145 * min(n, labelled)))
     ax = new_axes(size) if ax is None else ax
     from matplotlib.colors import ListedColormap
 
@@ -343,11 +342,11 @@ def draw_sparsity(f: Formulation, *, ax: Axes = None) -> Any:
         starts = [i for i in range(len(groups)) if i == 0 or groups[i] != groups[i - 1]]
         for i in starts[1:]:
             put(i - 0.5, color=FAINT, lw=0.8, zorder=0.5)
-        if len(items) <= LABELLED:
+        if len(items) <= labelled:
             axis.set_ticks(range(len(items)), [said(item.name) for item in items])
         else:
             ends = [*starts[1:], len(items)]
-            every = -(-len(starts) // LABELLED)
+            every = -(-len(starts) // labelled)
             middles = [0.5 * (a + b - 1) for a, b in zip(starts, ends, strict=True)]
             axis.set_ticks(middles[::every], [said(groups[a]) for a in starts[::every]])
     ax.xaxis.tick_top()
@@ -357,12 +356,6 @@ def draw_sparsity(f: Formulation, *, ax: Axes = None) -> Any:
     ax.set_xlabel(f"{k} unknowns", color=INK)
     ax.set_ylabel(f"{n} equations", color=INK)
     return ax
-
-
-MOST_ON_A_PAGE = 240
-"""Chains on one page."""
-CELL = 1.5
-"""Width and height of a chain (inches)."""
 
 
 MARKERS, OTHER = {"R": "o", "P": "s"}, "D"
@@ -404,12 +397,14 @@ def draw_chains(chains: Iterable[Chain], *, columns: int = 6, titles: Iterable[s
     True
     """
     some = list(chains)
-    if not 0 < len(some) <= MOST_ON_A_PAGE or columns < 1:
-        expected = f"expected 1 to {MOST_ON_A_PAGE} chains and columns from 1"
+    most_on_a_page = 240  # chains on one page
+    if not 0 < len(some) <= most_on_a_page or columns < 1:
+        expected = f"expected 1 to {most_on_a_page} chains and columns from 1"
         raise DeclarationError("draw_chains", [f"{len(some)} chains in {columns} columns: {expected}"])
     names = list(titles) if titles is not None else [str(i) for i in range(1, len(some) + 1)]
     rows = -(-len(some) // columns)
-    figure = new_axes((CELL * min(columns, len(some)), CELL * rows)).figure
+    cell = 1.5  # width and height of a chain (inches)
+    figure = new_axes((cell * min(columns, len(some)), cell * rows)).figure
     figure.clear()
     for i, shown in enumerate(some):
         ax = figure.add_subplot(rows, min(columns, len(some)), i + 1)

@@ -39,8 +39,6 @@ def rounded(values: Array) -> list[float]:
     return [float(f"{value:.7g}") for value in np.asarray(values, dtype=float).ravel()]
 
 
-OBLIQUE = (0.6, -1.0, 0.55)
-"""Direction from which a spatial mechanism is seen, in upright axes."""
 LEFT_OUT = {"reaction"}
 """Parts that the page draws itself, from numbers."""
 
@@ -72,7 +70,8 @@ class Figure:
         scene, frames = self.scene, self.stands
         points = np.concatenate([scene.everything, *(moved(part.shape, frames[part.frame][0]) for part in self.parts)])
         points = points[np.isfinite(points).all(axis=1)]
-        look = scene.normal if scene.normal is not None else scene.upright @ np.array(OBLIQUE) / np.linalg.norm(OBLIQUE)
+        oblique = (0.6, -1.0, 0.55)  # direction from which a spatial mechanism is seen, in upright axes
+        look = scene.normal if scene.normal is not None else scene.upright @ np.array(oblique) / np.linalg.norm(oblique)
         screen = np.stack([np.cross(scene.upright[:, 2], look), scene.upright[:, 2], look])
         screen[0] /= np.linalg.norm(screen[0])
         screen[1] = np.cross(look, screen[0])
@@ -403,8 +402,6 @@ MOST_LINKS = 250
 """Links up to which a mechanism is drawn in space."""
 MOST_ITEMS, LEAST_ITEMS = 24, 4
 """Freedoms, self-stresses and advice, each, that are shown of a small mechanism, and of any."""
-LONGEST_TITLE = 48
-"""Letters of a self-stress by which it is chosen; all of it stands below the picture."""
 MOST_POSITIONS = 1500
 """Positions of a cycle that are shown; of more, so many evenly spread."""
 
@@ -576,7 +573,8 @@ def _rows_of(m: Mechanism, report: DeterminacyReport) -> dict[str, list[list[str
 
 def _title(stress: SelfStress, number: int) -> str:
     text = stress.text or "efforts of couplings"
-    return f"{number}: {text if len(text) <= LONGEST_TITLE else text[:LONGEST_TITLE].rsplit(' ', 1)[0] + ' ...'}"
+    longest_title = 48  # letters of a self-stress by which it is chosen; all of it stands below the picture
+    return f"{number}: {text if len(text) <= longest_title else text[:longest_title].rsplit(' ', 1)[0] + ' ...'}"
 
 
 def _told(m: Mechanism, stress: SelfStress, L: float) -> str:
@@ -590,8 +588,6 @@ def _told(m: Mechanism, stress: SelfStress, L: float) -> str:
 REACH = 0.35
 """How far a freedom is followed to either side (radians, or lengths / L), in so many steps."""
 STEPS_A_MODE = 12
-KEPT = 0.3
-"""Part of a step that must be left once the loops are closed."""
 
 
 @dataclass(frozen=True)
@@ -672,12 +668,13 @@ def _followed(g: Geometry, group: str, title: str, text: str, rates: Array, rest
 def _side(g: Geometry, v: Array, rest: Index) -> list[Array]:
     """Closed states to one side: each step goes on in the direction of the one before."""
     h, x, out = REACH / STEPS_A_MODE, g.x, []
+    kept = 0.3  # part of a step that must be left once the loops are closed
     for _ in range(STEPS_A_MODE):
         guess = g.system.advance(x[:, None], h * v[:, None])[:, 0]
         closed, error = close(g.system, guess, rest)
         moved = g.system.difference(closed[:, None], x[:, None])[:, 0]
         size = float(np.abs(moved).max())
-        if error > CLOSED or size < KEPT * h or moved @ v < KEPT * h * (v @ v):
+        if error > CLOSED or size < kept * h or moved @ v < kept * h * (v @ v):
             break
         v, x = moved / size, closed
         out.append(closed)
