@@ -44,10 +44,9 @@ from mechgraph.graph.chains import Chain
 from mechgraph.kinetostatics import Transmission, assemble, kinematics, solve, transmission
 from mechgraph.maths import inertia
 from mechgraph.maths.tolerances import Tolerances
-from mechgraph.model.chain import chain
 from mechgraph.model.couplings import Belt, BevelGears, Coupling, Rack, SpurGears, WormGear
 from mechgraph.model.loads import Damper, Effort, ForceLaw, ForceTable, Gravity, Spring, TorsionSpring, Wrench
-from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.mechanism import Mechanism, chain
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.model.response_setup import Event, ResponseSetup, Stop

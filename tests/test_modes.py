@@ -16,7 +16,7 @@ from mechgraph.files import cache_folder
 from mechgraph.force.loads import user_poses
 from mechgraph.kinematics.assembly import close_all, closed_start
 from mechgraph.kinematics.state import Configuration
-from mechgraph.model.chain import chain_symbols
+from mechgraph.model.mechanism import chain_symbols
 from mechgraph.modes import start_sets
 from mechgraph.modes.assemblies import Finder, Question
 from mechgraph.modes.family import Member

@@ -38,8 +38,8 @@ from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.pairs import kinematics as evaluation
 from mechgraph.pairs.pair_type import TABLE, PairType
 
-CHANGES_SHOWN = 6
-"""Largest number of single changes, and of sets of changes, reported."""
+CHANGES_SHOWN, FREEING = 6, 3
+"""Largest number of single changes, and of sets of changes, reported; and of changes that let a structure move."""
 LARGEST_FOR_SETS = 120
 """Redundancy up to which sets of changes that remove all of it are sought; the work grows as its cube (half a second here)."""
 
@@ -532,8 +532,6 @@ def _sets(exact: list[Change], bases: list[Array], redundancy: int, size: int) -
         waiting += longer[::-1]
 
 
-FREEING = 3
-"""Changes reported that let a structure move."""
 FEW_CHANGES, LARGEST_SET = 80, 3
 """Changes up to which the best of all sets of so many heads the advice, some hundredths of a second; of more, the best of a beam."""
 

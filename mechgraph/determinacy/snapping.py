@@ -435,10 +435,8 @@ SLACK = 1.001
 """A tolerance is met up to this factor: it may be the printed size of the change itself."""
 NEARER, FARTHER = 0.12, 0.3
 """Steps between the positions along a motion: at first, and once the loops close at those."""
-POSITIONS = 5
-"""Positions along a motion each way."""
-MOST_ROWS = 60
-"""Closure rows up to which motions are followed: dense decompositions. Larger mechanisms are left to the relations."""
+POSITIONS, MOST_ROWS = 5, 60
+"""Positions along a motion each way; closure rows up to which motions are followed, by dense decompositions."""
 
 
 def least_change(placed: PlacedPairs, tol: float) -> tuple[Array, tuple[Relation, ...], tuple[Relation, ...], bool]:

@@ -31,9 +31,8 @@ from mechgraph.fields import (
 )
 from mechgraph.files import text_of, toml_of, write_whole
 from mechgraph.maths.se3 import Array
-from mechgraph.model.chain import chain
 from mechgraph.model.file_format import DEGREES, KINDS, SCHEMA, TABLES_OF_FILE, USUAL
-from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.mechanism import Mechanism, chain
 from mechgraph.model.motion import Motion
 from mechgraph.pairs.contact_types import travels
 from mechgraph.pairs.curves import Curve

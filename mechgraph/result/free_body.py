@@ -273,8 +273,6 @@ def about_origin(one: PointLoad) -> Array:
     return np.concatenate([one.moment + np.cross(np.array(one.point), one.force), one.force], axis=-1)
 
 
-FIRST_NODE = 900_001
-"""Number of the first node of a deck: beyond those of a mesh."""
 Path = str | os.PathLike[str]
 
 
@@ -327,7 +325,7 @@ def load_deck(
     inertia: Literal["wrench", "acceleration"] = "wrench",
     elements: str = "EALL",
     couples: Positive | None = None,
-    first_node: Count = FIRST_NODE,
+    first_node: Count = 900_001,
 ) -> None:
     """Write a load deck of CalculiX or Abaqus: a node at every point at which something acts, in the link's frame, and a step a position.
 

@@ -354,10 +354,8 @@ def _reactions(places: PositionLabels) -> tuple[ReactionData, ...]:
 
 LISTED = 20
 """Most rows of one table."""
-UNASKED = 1_000_000
-"""Reactions (pairs times positions) up to which the extremes are found without being asked for."""
-RATE = 1e6
-"""Reactions that are looked through in a second, about."""
+UNASKED, RATE = 1_000_000, 1e6
+"""Reactions (pairs times positions) up to which the extremes are found without being asked for; looked through in a second, about."""
 
 LEAST_NORM = "Statically indeterminate; minimum-norm values (equal pair stiffness, rigid links, no preload)."
 NO_VALUE = (

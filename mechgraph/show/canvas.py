@@ -366,11 +366,6 @@ def _cycle_order(graph: nx.Graph[int]) -> list[int]:
     return list(nx.dfs_preorder_nodes(graph, source=(ends or list(graph))[0]))
 
 
-RINGS = (1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 8.0)
-"""Distances at which a place for a text is looked for, over the nearest."""
-ANGLES = np.linspace(0.0, 2 * np.pi, 24, endpoint=False) + 0.3
-
-
 @dataclass
 class PlacedText:
     """A text, the point of space that it belongs to, the length in space that it keeps away from it, and its leader line."""
@@ -563,9 +558,10 @@ def _best(
     point: Array, size: Array, away: float, box: Array, boxes: Sequence[Array], taken: Array, kept: Array | None = None
 ) -> tuple[Array, float, bool]:
     """Lower left corner of a text near a point, its distance over the nearest one, and whether it is free; it would rather be ``kept``."""
-    directions = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
-    rings = np.repeat(RINGS, len(ANGLES))
-    d = np.tile(directions, (len(RINGS), 1))
+    # distances, over the nearest, and directions in which a place is looked for
+    distances, angles = (1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 8.0), np.linspace(0.0, 2 * np.pi, 24, endpoint=False) + 0.3
+    rings = np.repeat(distances, len(angles))
+    d = np.tile(np.stack([np.cos(angles), np.sin(angles)], axis=1), (len(distances), 1))
     # the middle of the text is so far away that its nearest edge is at the distance asked for
     reach = rings[:, None] * away * d + 0.5 * size * np.clip(1.6 * d, -1.0, 1.0)
     low = point + reach - 0.5 * size

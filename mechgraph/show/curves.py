@@ -23,9 +23,6 @@ from mechgraph.result.values import MaterialPoint
 from mechgraph.show.canvas import HATCH, INK, MUTED, PALETTE, REACTION, Axes, axis_label, new_axes, plain, said
 from mechgraph.show.scene import DrawnPose, known_force, place_of
 
-STRIP = 0.07
-"""Height of a hatched strip over that of the axes."""
-
 
 @dataclass(frozen=True)
 class Abscissa:
@@ -110,14 +107,15 @@ def hatched_strips(ax: Any, x: Abscissa, lost: Sequence[tuple[str, Array, str]])
     if not lost:
         return
     low, high = ax.get_ylim()
-    ax.set_ylim(low, high + (high - low) * STRIP * len(lost) / (1 - STRIP * len(lost)))
+    height = 0.07  # of a strip, over that of the axes
+    ax.set_ylim(low, high + (high - low) * height * len(lost) / (1 - height * len(lost)))
     for i, (name, where, colour) in enumerate(lost):
         there = x.values[np.reshape(where, x.values.shape) & np.isfinite(x.values)]
         begin, end = (there.min(), there.max()) if there.size else ax.get_xlim()
         if begin == end:
             begin, end = ax.get_xlim()
         strip = Rectangle(
-            (begin, 1 - STRIP * (i + 0.92)), end - begin, 0.84 * STRIP, transform=ax.get_xaxis_transform(),
+            (begin, 1 - height * (i + 0.92)), end - begin, 0.84 * height, transform=ax.get_xaxis_transform(),
             facecolor="white", edgecolor=colour, hatch=HATCH, lw=0.8, label=said(f"{name}: not unique"), gid=f"not unique {name}", zorder=3,
         )  # fmt: skip
         ax.add_patch(strip)

@@ -13,10 +13,8 @@ from mechgraph.maths.se3 import Array
 from mechgraph.pairs.factors import Freedom
 from mechgraph.pairs.pair_type import PairType
 
-GUIDE, BODY, PIN = 0.95, 0.62, 0.24
-"""Radii of guides, of what runs in them, and of pins, over the size of a symbol."""
-PAD = 1.6
-"""How far a guide or plate goes beyond the stroke."""
+GUIDE, BODY, PIN, PAD = 0.95, 0.62, 0.24, 1.6
+"""Radii of guides, of what runs in them, and of pins, over the size of a symbol; how far a guide or plate goes beyond the stroke."""
 
 Role = Literal["guide", "body", "dark", "axis"]
 

@@ -26,10 +26,9 @@ from mechgraph.errors import DeclarationError, did_you_mean, near_names
 from mechgraph.fields import POINT, Described, FieldFormat, PerCase
 from mechgraph.maths.inertia import physical
 from mechgraph.maths.se3 import Array
-from mechgraph.model.chain import NUMBERS_OF_CHAIN, chain_numbers, markers_of_chain
 from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.loads import Load
-from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.mechanism import NUMBERS_OF_CHAIN, Mechanism, chain_numbers, markers_of_chain
 from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.model.parameters import Declared, coupling_places, declared
 from mechgraph.quantities import is_numeric

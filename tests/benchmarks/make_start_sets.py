@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 import mechgraph as mg
-from mechgraph.model.chain import chain_symbols
+from mechgraph.model.mechanism import chain_symbols
 from mechgraph.model.toml import library_path
 from mechgraph.modes import start_sets
 from mechgraph.modes.assemblies import Question

@@ -585,9 +585,8 @@ def _told(m: Mechanism, stress: SelfStress, L: float) -> str:
     )
 
 
-REACH = 0.35
+REACH, STEPS_A_MODE = 0.35, 12
 """How far a freedom is followed to either side (radians, or lengths / L), in so many steps."""
-STEPS_A_MODE = 12
 
 
 @dataclass(frozen=True)
