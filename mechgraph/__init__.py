@@ -1,4 +1,4 @@
-"""mechgraph: spatial mechanisms as graphs of links and pairs; determinacy, equations, motion, drivers and reactions."""
+"""mechgraph: kinematics, kinetostatics and dynamics of spatial mechanisms."""
 
 import sys
 from collections.abc import Iterator

@@ -220,7 +220,7 @@ class AssemblyError(MechgraphError):
     message : str
         What happened.
     residual : float
-        Smallest closure error found: largest of angle [rad] and length / L over the loops.
+        Smallest closure residual found: largest angle [rad] or length / L over all loops.
     best : dict
         Pair coordinates at which it was found, freedom -> value.
 

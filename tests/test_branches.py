@@ -73,7 +73,7 @@ def test_a_fold_at_which_no_other_branch_ends_leaves_the_map_open() -> None:
     coarse, fine = (mg.branches(m, "O0", over=(0.0, 0.09), samples=n, points=20) for n in (3, 20))
     assert (len(coarse), len(coarse.circuits), coarse.open_ends) == (2, 2, 2)
     assert (len(fine), len(fine.circuits), fine.open_ends) == (4, 1, 0)
-    assert "2 ends of branches could not be told" in " ".join(str(coarse).split())
+    assert "2 ends of branches unresolved" in " ".join(str(coarse).split())
 
 
 def test_branch_circuit_and_order_defects_are_told() -> None:

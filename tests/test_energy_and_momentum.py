@@ -235,7 +235,7 @@ def test_energy_that_is_lost_is_said():
     pair = mg.Pair("A", "R", "frame", "arm", point=(0, 0, 0), axis=(0, 0, 1))
     m = mg.Mechanism("pendulum", links, [pair], ["A"], [mg.Gravity((0, -9.81, 0))])
     t = np.linspace(0.0, 10.0, 41)
-    with pytest.warns(mg.MechgraphWarning, match="energy balance: off by .* of the greatest energy, from t = "):
+    with pytest.warns(mg.MechgraphWarning, match="energy balance: off by .* of the largest energy from t = "):
         lost = mg.respond(m, t, method="RK23", rtol=0.03, atol=0.03)
     assert np.abs(lost.energy.balance).max() > 1e-3 * lost.energy.kinetic.max()
     assert "Doubtful: energy balance: off by" in str(lost)  # all that the command line shows

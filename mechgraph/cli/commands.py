@@ -53,14 +53,16 @@ def save(
         Path,
         opt.file_option("The file; ", WRITERS),
     ],
-    advice: Annotated[int | None, opt.option("--advice", "Apply advice NUMBER of 'check' (from 0).", "NUMBER")] = None,
+    advice: Annotated[
+        int | None, opt.option("--advice", "Apply recommendation NUMBER of 'check' (from 0).", "NUMBER")
+    ] = None,
     json: opt.AsJson = False,
 ) -> None:
     """Write a mechanism as another file: TOML, which holds all of it, or what other programs read.
 
     Example: mechgraph save four-bar --advice 0 --out better.toml
 
-    Exit status: 0 done; 1 it cannot be assembled, where the file holds it at its start; 2 wrong usage or bad input.
+    Exit status: 0 success; 1 it cannot be assembled, where the file holds it at its start; 2 usage or input error.
     """
     opt.check_out(out, mechanism, WRITERS)
     m = opt.loaded(mechanism)
@@ -99,7 +101,7 @@ def check(
 
     Exit status: 0 where forces can be solved; 1 where the loops cannot be closed, drivers depend on each other or have nothing
     to move, or a freedom is neither driven nor passive. Redundancy is information: a mechanism some of whose reactions are not
-    unique has exit status 0, and so has a topology without geometry. 2 wrong usage or bad input.
+    unique has exit status 0, and so has a topology without geometry. 2 usage or input error.
     """
     if json + markdown + compared > 1:
         opt.refuse("check", "--json, --markdown and --compare exclude each other")
@@ -140,7 +142,7 @@ def structure(
 
     Example: mechgraph structure windows-2 --driver A1
 
-    Exit status: 0 done; 1 where the drivers leave links undetermined, or the loops cannot be closed; 2 wrong usage or bad input.
+    Exit status: 0 success; 1 where the drivers leave links undetermined, or the loops cannot be closed; 2 usage or input error.
     """
     m = opt.loaded(mechanism)
     values = opt.values_of(m, at)
@@ -189,7 +191,7 @@ def equations(
 
     Example: mechgraph equations rcsr --at O1=160deg@0.1
 
-    Exit status: 0 done; 1 the mechanism has no such position; 2 wrong usage or bad input.
+    Exit status: 0 success; 1 the mechanism has no such position; 2 usage or input error.
     """
     if (latex or blocks) and (coefficients or csv):
         opt.refuse(
@@ -246,9 +248,9 @@ def solve(
 
     Example: mechgraph solve 7r --drive O1=0:360:5deg@10 --out 7r.csv
 
-    Exit status: 0 done; 1 the loops cannot be closed, a position is out of reach or a dead point (unless flagged and others were
-    solved), a freedom is neither driven nor passive, or drivers contradict each other; 2 wrong usage or bad input. A file is
-    written whole or not at all.
+    Exit status: 0 success; 1 the loops cannot be closed, a position is out of reach or a dead point (unless flagged and others were
+    solved), a freedom is neither driven nor passive, or drivers contradict each other; 2 usage or input error. Files are
+    written atomically.
     """
     if json and compared:
         opt.refuse("solve", "--json and --compare exclude each other")
@@ -333,14 +335,14 @@ def respond(
     over_time: opt.OverTime = False,
     json: opt.AsJson = False,
 ) -> None:
-    """Follow the motion that the loads produce, print a summary with the energy balance and write a table.
+    """Simulate the motion under loads: print a summary with the energy balance, write a table.
 
     What is left out is that of [response] of the file, where it has one.
 
     Example: mechgraph respond windows-2 --for 500ms --rate A0=-1
 
-    Exit status: 0 done; 1 the loops cannot be closed, or the motion cannot be followed to its end (what there is is written); 2 wrong
-    usage or bad input. Ctrl-C keeps what was computed. A file is written whole or not at all.
+    Exit status: 0 success; 1 the loops cannot be closed, or the motion cannot be followed to its end (what there is is written); 2 usage
+    or input error. Ctrl-C keeps what was computed. Files are written atomically.
     """
     opt.check_out(out, mechanism, FORMATS)
     m = opt.loaded(mechanism)
@@ -404,7 +406,7 @@ def loads(
 
     Example: mechgraph loads 7r link3 --drive O1=0:360:5deg@10 --at all
 
-    Exit status: 0 done; 1 as for solve; 2 wrong usage or bad input, or something that is not unique would have to be written as known.
+    Exit status: 0 success; 1 as for solve; 2 usage or input error, or something that is not unique would have to be written as known.
     """
     opt.check_out(out, mechanism, LOAD_FILES)
     m = opt.loaded(mechanism)
@@ -444,7 +446,7 @@ def compile_(
 
     The C needs no compiler here: positions, efforts of the drives and reactions by the equations that 'mechgraph equations' prints.
 
-    Exit status: 0 done; 1 the loops cannot be closed, or a freedom is neither driven nor passive; 2 wrong usage or bad input, or the
+    Exit status: 0 success; 1 the loops cannot be closed, or a freedom is neither driven nor passive; 2 usage or input error, or the
     kernel does not carry the mechanism.
 
     Example: mechgraph compile four-bar --out press.c
@@ -544,8 +546,7 @@ def plot(
 
     Example: mechgraph plot four-bar reaction --of B --out B.svg
 
-    Exit status: 0 done; 1 the mechanism has no answer (the message says why); 2 wrong usage or bad input. A file is written whole or not
-    at all.
+    Exit status: 0 success; 1 no solution (see message); 2 usage or input error. Files are written atomically.
     """
     if what not in KINDS:
         opt.refuse(f"WHAT {what!r}", f"expected one of {', '.join(KINDS)}")
@@ -595,9 +596,9 @@ def report(
 
     Without --drive the stored motion is solved, where all drivers store one; else the page shows the mechanism as it stands.
 
-    Exit status: 0 done; 1 the loops cannot be closed for a motion, a freedom is neither driven nor passive, drivers contradict each
-    other, or a position cannot be reached (the page says what there is); 2 wrong usage or bad input. The file is written whole or not
-    at all.
+    Exit status: 0 success; 1 the loops cannot be closed for a motion, a freedom is neither driven nor passive, drivers contradict each
+    other, or a position cannot be reached (the page says what there is); 2 usage or input error. The file is written
+    atomically.
 
     Example: mechgraph report four-bar -o four-bar.html
     """
@@ -650,7 +651,7 @@ def assemblies(mechanism: opt.Named, at: opt.At = None, out: Picture = None, jso
 
     Example: mechgraph assemblies four-bar --at A=30deg
 
-    Exit status: 0 done; 1 where there is no real assembly; 2 wrong usage or bad input.
+    Exit status: 0 success; 1 where there is no real assembly; 2 usage or input error.
     """
     opt.check_out(out, mechanism, PICTURES)
     m = opt.loaded(mechanism)
@@ -680,7 +681,7 @@ def branches(
 
     Example: mechgraph branches rssr --driver A --out rssr.svg
 
-    Exit status: 0 done; 1 where there is no branch; 2 wrong usage or bad input.
+    Exit status: 0 success; 1 where there is no branch; 2 usage or input error.
     """
     opt.check_out(out, mechanism, PICTURES)
     m = opt.loaded(mechanism)

@@ -472,7 +472,7 @@ def not_drivable(freedoms: Freedoms, able: tuple[Finding, ...], null_nearby: Arr
         if still[i]:
             dead = nearby[i] and freedoms.mobility
             why = "dead point here (moves in nearby positions)" if dead else "stands still"
-        out.append(Finding(f"{name} cannot drive: {why}", (name,)))
+        out.append(Finding(f"{name} is not a valid driver: {why}", (name,)))
     return tuple(out)
 
 

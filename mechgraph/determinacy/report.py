@@ -634,8 +634,8 @@ def check(
 def structure_error(m: Mechanism, drives: Sequence[str]) -> IndeterminateError:
     """Nothing moves that could be driven."""
     return IndeterminateError(
-        f"mechanism {m.name!r}: {', '.join(drives)} cannot drive it: it is a structure (mobility 0) where it was assembled. Change a pair, "
-        "see mg.check",
+        f"mechanism {m.name!r}: {', '.join(drives)} cannot drive it: mobility is 0 at the start position. Change a pair type; "
+        "mg.check(m) lists options",
         check(m),
     )
 
@@ -677,8 +677,8 @@ def undecided_error(m: Mechanism, counts: Sequence[int]) -> IndeterminateError:
 def dead_point_error(m: Mechanism, still: Sequence[str], values: dict[str, float], solution: object) -> DeadPointError:
     """Drivers stand ``still`` at the start while the mechanism moves."""
     return DeadPointError(
-        f"mechanism {m.name!r}: dead point where it was assembled: {', '.join(still)} stands still there while the mechanism moves, so "
-        "that it does not determine the motion; drive another freedom, or start at another position",
+        f"mechanism {m.name!r}: dead point where it was assembled: {', '.join(still)} is stationary there while the mechanism "
+        "moves. Drive another freedom, or start at another position",
         values,
         solution,
     )

@@ -281,7 +281,7 @@ def _closed_start(m: Mechanism, preferred: Mapping[str, float], tol: float) -> C
         best = dict(zip(m.freedom_names(), system.coordinates_of(x[:, None])[:, 0].tolist(), strict=True))
         raise AssemblyError(
             f"mechanism {m.name!r}: no closed configuration near start; best closure residual {error:.3g} "
-            f"(largest of angle in radians and length / L, L = {system.par.L:.4g}). "
+            f"(largest angle [rad] or length / L over all loops, L = {system.par.L:.4g}). "
             f"{turned or 'Check the dimensions, or give another start'}",
             error,
             best,

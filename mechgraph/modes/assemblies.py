@@ -752,11 +752,11 @@ def _completeness(
     ]
     evidence.append(
         f"{counted(found.tracks, 'track')} to this position in {counted(found.runs, 'run')}: of {N} modes "
-        f"{', '.join(parts)}, {found.infinite} at infinity; {found.lost} lost in the best run."
+        f"{', '.join(parts)}, {found.infinite} at infinity, {found.lost} failed (best run)."
     )
     adds_up = int(found.count.sum()) + found.on_continua + found.infinite + found.left_out == N
     if not found.clean or not adds_up:
-        return "searched", (*evidence, "Tracks that are lost, or meet, leave open whether these are all.")
+        return "searched", (*evidence, "Some paths failed or merged, so the list may be incomplete.")
     return weakest(word for word, _ in told), tuple(evidence)
 
 

@@ -252,7 +252,7 @@ class Branch:
     """An assembly followed as far as the driver goes: driver ``values (n,)``, rising, and ``coordinates (n, F)`` of all freedoms.
 
     ``interval`` is that of the driver, up to the folds at its ends; ``turns`` of the driver bring it back where it is a ``full_turn``,
-    which is None where an end could not be told.
+    which is None if an end is unresolved.
     """
 
     values: Array
@@ -322,7 +322,7 @@ class Branches(Shown):
 
     @property
     def full_turn(self) -> tuple[bool | None, ...]:
-        """Whether the driver turns right round on every branch; None where an end of it could not be told."""
+        """Whether the driver turns right round on every branch; None if an end is unresolved."""
         return tuple(b.full_turn for b in self.branches)
 
     @property
@@ -467,7 +467,7 @@ class Branches(Shown):
         ]
         if self.open_ends:
             words.append(
-                f"{counted(self.open_ends, 'end')} of branches could not be told: the map is not whole; more samples may tell."
+                f"{counted(self.open_ends, 'end')} of branches unresolved: the map is incomplete. Increase samples."
             )
         words += [
             f"Branches {', '.join(map(str, b.branches))} cross at {values_text(m, {driver: b.value})}, a double point."

@@ -90,8 +90,8 @@ class EnergyLost:
 
     def __str__(self) -> str:
         return (
-            f"energy balance: off by {self.error:.2g} of the greatest energy, from t = {self.t:.4g} on, so that the motion "
-            "from there is doubtful (a change point or a jump of the loads that steps do not resolve); give a smaller rtol"
+            f"energy balance: off by {self.error:.2g} of the largest energy from t = {self.t:.4g} on, so later results are "
+            "unreliable (a change point or a discontinuous load that steps do not resolve). Pass a smaller rtol"
         )
 
 

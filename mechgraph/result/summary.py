@@ -359,8 +359,8 @@ UNASKED, RATE = 1_000_000, 1e6
 
 LEAST_NORM = "Statically indeterminate; minimum-norm values (equal pair stiffness, rigid links, no preload)."
 NO_VALUE = (
-    "Any self-stress can be added to these components, so they have no value (NaN). The table above shows what is unique; where "
-    "components are missing, those that it contains are named in brackets."
+    "Statically indeterminate components are NaN. The table above shows unique components; where some are missing, brackets name "
+    "those that it contains."
 )
 
 

@@ -65,7 +65,7 @@ Mask = NDArray[np.bool_]
 class Checks(Shown):
     """Every solution's own checks, arrays over positions.
 
-    closure : closure error, the largest of angle [rad] and length / L over the loops.
+    closure : closure error, the largest angle [rad] or length / L over all loops.
     equilibrium : residual of the equilibrium of all links and of ``S^T w = effort`` in all undriven freedoms, relative to the
         largest wrench in the batch (NaN without forces).
     power : driver power + load power - rate of kinetic energy, relative to the largest term in the batch. Above 1e-6 of either

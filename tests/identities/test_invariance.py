@@ -126,7 +126,7 @@ def test_at_a_dead_point() -> None:
     assert report.contradicting_drives
     assert not report.determinate
     assert report.verdict.startswith(("Singular drive", "Under-driven"))
-    assert any("O4.Tz cannot drive: dead point" in found.text for found in report.not_drivable)
+    assert any("O4.Tz is not a valid driver: dead point" in found.text for found in report.not_drivable)
 
 
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
