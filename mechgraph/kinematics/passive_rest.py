@@ -43,11 +43,17 @@ def unspun(path: DriverPath, found: Positions, passive: tuple[PassiveMotion, ...
     good = np.flatnonzero((found.status == Status.OK) & (found.near < 0) & ((found.place != 0.0) | (turns != 0)))
     if not len(nodes.steps[0]) or not found.moved.any():
         return found
-    carried = (
-        _Carried(path, found, *parts_of_steps(path, found), passive)
-        if are_alone(passive)
-        else PassiveSteps(path, Interpolation(path, nodes), found.follower, passive)
-    )
+    carried: _Carried | PassiveSteps
+    if are_alone(passive):
+        parts = _with_bends(path, found)
+        # where the freedom that holds a motion hardly does, it turns fast: parts of such a step are foretold one after the other
+        for _ in range(8):
+            carried = _Carried(path, found, *parts_of_steps(path, found, parts), passive)
+            if carried.sure.all():
+                break
+            parts = _nearer(carried, parts)
+    else:
+        carried = PassiveSteps(path, Interpolation(path, nodes), found.follower, passive)
     x, status = found.x.copy(), found.status.copy()
     for at in in_blocks(good) if good.size else ():
         x[:, at], sure = carried.turned(found.x[:, at], found.which[at], found.track[at], found.place[at], turns[at])
@@ -63,9 +69,8 @@ def unspun(path: DriverPath, found: Positions, passive: tuple[PassiveMotion, ...
     return replace(found, x=x, status=status, here=None, tracks=tracks, crossings=crossings, spin=spin)
 
 
-def parts_of_steps(path: DriverPath, found: Positions) -> tuple[Interpolation, Rule]:
-    """Steps between nodes, parted where a path bends so that what is integrated along them is smooth, and the rule for these parts."""
-    nodes = _with_bends(path, found)
+def parts_of_steps(path: DriverPath, found: Positions, nodes: Nodes) -> tuple[Interpolation, Rule]:
+    """Steps between nodes, of which there may be more than were found, and the rule for such parts of a step."""
     out, (left, right) = Interpolation(path, nodes), found.tracks.nodes.steps
     if nodes is found.tracks.nodes or not len(left):
         return out, rule()
@@ -94,6 +99,21 @@ def _with_bends(path: DriverPath, found: Positions) -> Nodes:
     step = interpolation.find(track, place)
     which, drive = nodes.which[interpolation.left[step]], paths.drive(track, place)
     closed = found.follower.newton.nodes(interpolation(step, place, drive), drive, track, which, PATH.node)
+    return Nodes.join([nodes, Nodes.closed(closed, drive, track, place, sure=True)])
+
+
+def _nearer(carried: _Carried, nodes: Nodes) -> Nodes:
+    """The nodes, and in every step that is not as foretold one more, at the last point of the rule up to which it is."""
+    interpolation, follower = carried.interpolation, carried.follower
+    steps = np.arange(len(interpolation.left))
+    closed, track, _ = at_points(interpolation, follower, rule(), steps)
+    near = (closed.done & (closed.correction <= PATH.correction)).reshape(len(steps), -1)
+    good = np.cumprod(near, axis=1).sum(axis=1)
+    some = np.flatnonzero((good > 0) & (good < near.shape[1]))
+    at, left, right = some * near.shape[1] + good[some] - 1, interpolation.left[some], interpolation.right[some]
+    place = nodes.place[left] + 0.5 * (rule().points[good[some] - 1] + 1.0) * (nodes.place[right] - nodes.place[left])
+    track, drive = track[at], follower.paths.drive(track[at], place)
+    closed = follower.newton.nodes(closed.x[:, at], drive, track, closed.which[at], PATH.node)
     return Nodes.join([nodes, Nodes.closed(closed, drive, track, place, sure=True)])
 
 
@@ -233,7 +253,7 @@ class _Carried:
         """The motions at the Gauss points of all steps, twists ``(6, n, T)`` at rest in them, rates ``(6, n, p, T)`` of their own."""
         closed, track, slope = at_points(self.interpolation, self.follower, self._rule, np.arange(len(self._h)))
         step = np.repeat(np.arange(len(self._h)), self._rule.count)
-        self._sure = rest_is_sure(closed, step, self.interpolation.begin)
+        self.sure = rest_is_sure(closed, step, self.interpolation.begin)
         there, f = self._motions(closed.x, closed.which, track)
         dq = (f.sensitivity() * slope).sum(axis=1)
         moving = Velocities(there.here, dq + there.at_rest(there.here.link_twists(dq)))
@@ -351,7 +371,7 @@ class _Carried:
             amount, part = course.left(_At.of(here, i), step, t, turns, None if expected is None else expected[i])
             amounts[i] = np.where(moved, amount, 0.0)
             dq += np.where(moved, part, 0.0)
-        return amounts, dq, self._sure[step] | ~moved
+        return amounts, dq, self.sure[step] | ~moved
 
 
 def _turning(e: Array, u: Array, du: Array) -> Array:
