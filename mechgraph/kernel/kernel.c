@@ -1529,7 +1529,7 @@ static int follow(const Model *m, Work *w, Asked *asked, const double *begin, co
   double h = fmin(LONGEST, length), furthest = 0.0, *drive = w->column_value;
   int known = 0, status;
   while (*w->a.at < length) {
-    if (++w->steps > MOST_STEPS) return MGK_TOO_FAR;
+    if (++w->steps > MOST_STEPS + asked->done) return MGK_TOO_FAR;
     h = fmin(h, NEAREST * w->a.reach);
     if (asked->done + AT_ONCE < until) h = fmin(h, raised(SHORTEST, along_line(m, w, asked, asked->done + AT_ONCE, begin) - *w->a.at));
     const double left = length - *w->a.at, step = h >= left ? left : h > 0.5 * left ? 0.5 * left : h;
