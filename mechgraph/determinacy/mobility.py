@@ -43,7 +43,7 @@ from mechgraph.maths.linear import complement, independent_rows, rank_of, singul
 from mechgraph.maths.se3 import Array, Index, compose, null_space, pose_exp, rotation_exp
 from mechgraph.maths.tolerances import MOTIONS, PATH, RANKS
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.pairs import kinematics as evaluation
+from mechgraph.pairs import pair_type as evaluation
 from mechgraph.pairs.pair_type import PairType
 
 

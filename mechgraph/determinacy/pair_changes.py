@@ -35,7 +35,7 @@ from mechgraph.maths.se3 import Array, Index, null_space
 from mechgraph.maths.tolerances import MOTIONS, STRESSES
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Marker, Pair
-from mechgraph.pairs import kinematics as evaluation
+from mechgraph.pairs import pair_type as evaluation
 from mechgraph.pairs.pair_type import TABLE, PairType
 
 CHANGES_SHOWN, FREEING = 6, 3

@@ -39,7 +39,7 @@ from mechgraph.model.loads import Gravity
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Drive
 from mechgraph.model.pair import Link, Marker, Pair, second_direction
-from mechgraph.pairs import kinematics as evaluation
+from mechgraph.pairs import pair_type as evaluation
 from mechgraph.pairs.factors import ConstantScrew
 from mechgraph.quantities import shown
 

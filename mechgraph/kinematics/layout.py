@@ -32,7 +32,7 @@ from mechgraph.maths.se3 import Array, Index, compose, cross, homogeneous, ident
 from mechgraph.memo import graph_cached, of_graph, unit_cached
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Parameters
-from mechgraph.pairs import kinematics as evaluation
+from mechgraph.pairs import pair_type as evaluation
 from mechgraph.pairs.factors import Component, Factor, FixedStack, Stack
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.pairs.travelling import Travelling

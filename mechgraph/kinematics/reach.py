@@ -40,7 +40,7 @@ from mechgraph.maths.track import STRAIGHT_ON, Interpolation, Nodes, Paths, plac
 from mechgraph.maths.tracker import End, Follower
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
-from mechgraph.pairs import kinematics as evaluation
+from mechgraph.pairs import pair_type as evaluation
 from mechgraph.pairs.contact_types import placed_surface
 
 

@@ -43,7 +43,7 @@ from mechgraph.maths.se3 import Array, Index, Mask, compose, cross, cross_twist,
 from mechgraph.maths.sparse import LeastNorm
 from mechgraph.maths.tolerances import RANKS
 from mechgraph.model.couplings import Axes, Contact, Lines
-from mechgraph.pairs import kinematics as evaluation
+from mechgraph.pairs import pair_type as evaluation
 
 ROUNDINGS = 20
 """Roundings of a position that add up in a closure residual."""

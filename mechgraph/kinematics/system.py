@@ -29,7 +29,7 @@ from mechgraph.maths.se3 import Array, Index, turn_between, turn_tangent, turned
 from mechgraph.memo import graph_cached
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Parameters, coupling_places, parameters
-from mechgraph.pairs import kinematics as evaluation
+from mechgraph.pairs import pair_type as evaluation
 
 
 class Evaluated(Protocol):

@@ -50,7 +50,7 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Pair
 from mechgraph.model.parameters import Parameters
 from mechgraph.modes.family import Array, Family, generated
-from mechgraph.pairs import kinematics
+from mechgraph.pairs import pair_type as evaluation
 from mechgraph.pairs.pair_type import PairType
 
 
@@ -357,7 +357,7 @@ def behind(system: System, step: RodStep, x: Array) -> Array:
     """Pose ``(3, 4, T)`` of the link behind a pair, seen from the link before it, at states ``x (nx, T)``."""
     par, pair = system.par, step.pair
     row, states = system.m.pairs[pair].type.scaled(par.L), x[system.first_row[pair] : system.first_row[pair + 1], None]
-    moved = kinematics.frames_of(row, par.pitch[[pair]], states)[-1][:, :, 0] if row.steps else identity(x.shape[1])
+    moved = evaluation.frames_of(row, par.pitch[[pair]], states)[-1][:, :, 0] if row.steps else identity(x.shape[1])
     D = compose(compose(par.marker_a[:, :, pair], moved), inverse(par.marker_b[:, :, pair]))
     return D if step.sign > 0 else inverse(D)
 

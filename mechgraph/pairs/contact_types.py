@@ -22,7 +22,7 @@ from mechgraph.errors import ShapeError
 from mechgraph.fields import POSITIVE, TWO, TWO_POSITIVE, Described
 from mechgraph.maths.se3 import Array, cross
 from mechgraph.maths.tolerances import SHAPES
-from mechgraph.pairs import kinematics as evaluation
+from mechgraph.pairs import pair_type as evaluation
 from mechgraph.pairs.curves import Curve, Line, Travel, outside, point_text, roller_faults, shape_faults
 from mechgraph.pairs.factors import Touching
 from mechgraph.pairs.pair_type import TABLE, PairType, table_row

@@ -21,7 +21,7 @@ from mechgraph.maths.se3 import Array
 from mechgraph.model.loads import Effort, Gravity, Law, Wrench
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
-from mechgraph.pairs import kinematics
+from mechgraph.pairs import pair_type as evaluation
 from mechgraph.result.solution import Solution
 from mechgraph.show import shapes
 from mechgraph.show.shapes import FreedomLine, Shape, frame_along, lines_of, symbol
@@ -250,9 +250,9 @@ class DrawnPose:
         base, marker = self.place.poses[pair.a][:, :3], pair.markers[0].pose()
         origin = base[:, :, :3] @ marker[:, 3] + base[:, :, 3]
         start = np.concatenate([base[:, :, :3] @ marker[:, :3], origin[:, :, None]], axis=2)
-        x = kinematics.coordinates_to_state(pair.type, self.place.coordinates[pair.name][:, None])
+        x = evaluation.coordinates_to_state(pair.type, self.place.coordinates[pair.name][:, None])
         pitch = np.array([[pair.pitch_per_radian]])
-        found = kinematics.frames_of(pair.type, pitch, x, np.moveaxis(start, 0, -1)[:, :, None])
+        found = evaluation.frames_of(pair.type, pitch, x, np.moveaxis(start, 0, -1)[:, :, None])
         return [np.moveaxis(frame[:, :, 0], -1, 0) for frame in found]
 
     def on(self, link: str, point: Any) -> Array:

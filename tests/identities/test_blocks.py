@@ -10,7 +10,7 @@ from mechgraph.kinematics import motion_path
 from mechgraph.kinematics.assembly import assembled
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.tracker import Follower
-from mechgraph.pairs import kinematics as evaluation
+from mechgraph.pairs import pair_type as evaluation
 
 POSITIONS = 29
 

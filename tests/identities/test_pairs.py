@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import mechgraph as mg
 from mechgraph.maths import se3
-from mechgraph.pairs import kinematics as evaluation
+from mechgraph.pairs import pair_type as evaluation
 
 PITCH = 0.37
 USER_ROWS = {
