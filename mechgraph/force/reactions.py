@@ -156,10 +156,6 @@ class PairFrames:
         return np.asarray(np.einsum("ijt,j...t->i...t", batch_last(inverse), shifted)[: 6 - g.row.f])
 
 
-BAD_CONDITION = 1e8
-"""Condition number above which other independent rows and columns are chosen."""
-
-
 @dataclass(frozen=True)
 class ForceProblem:
     """What a method solves: closed positions with loads (internal units).
@@ -318,15 +314,17 @@ def chosen_for_all(A: Array, known: list[Choice], fixed: Index | None = None) ->
         known.append(choose(A[:, :, 0], nothing))
     which = np.zeros(T, dtype=np.intp)
     best = np.full(T, np.inf)
+    # condition number above which other independent rows and columns are chosen
+    bad_condition = 1e8
     for i in range(len(known) + 6):
         if i == len(known):
             known.append(choose(A[:, :, int(np.argmax(best))], nothing))
-        open_ = np.flatnonzero(best > BAD_CONDITION)
+        open_ = np.flatnonzero(best > bad_condition)
         condition = ChosenSystem(A[:, :, open_], [known[i]], np.zeros(open_.size, dtype=np.intp)).condition
         better = condition < best[open_]
         which[open_[better]] = i
         best[open_[better]] = condition[better]
-        if (best <= BAD_CONDITION).all() or (i >= len(known) - 1 and i > 0 and not better.any()):
+        if (best <= bad_condition).all() or (i >= len(known) - 1 and i > 0 and not better.any()):
             break
     return ChosenSystem(A, known, which)
 

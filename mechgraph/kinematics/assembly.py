@@ -30,9 +30,6 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker
 from mechgraph.quantities import is_numeric, shown, wrong
 
-NO_DISTANCE = 1e-14
-"""Distance over that size, and singular value, that is rounding."""
-
 
 def refuse_mixed_lengths(here: Configuration) -> None:
     """Raise a DeclarationError where the first position of a configuration has such a loop; looked at once at a position."""
@@ -58,11 +55,13 @@ def _fault(here: Configuration) -> str:
     apart, size = np.linalg.norm(points[:, pair] - points[:, pair[after]], axis=0), lengths_of(s.graph, points, middles)
     part = apart / size[loop]
     too_near = 10 * RANKS.loop  # up to there it is asked whether a distance was lost in a rank
-    near = np.flatnonzero((part < too_near) & (part > NO_DISTANCE))
+    # distance over the size of a loop, and singular value, that is rounding
+    no_distance = 1e-14
+    near = np.flatnonzero((part < too_near) & (part > no_distance))
     if not near.size:
         return ""
     # above this part of the distance the largest singular value that counted as zero comes of it: directions make it smaller
-    lost = near[closure_rank(here).dropped > np.maximum(0.01 * part[near], NO_DISTANCE)]
+    lost = near[closure_rank(here).dropped > np.maximum(0.01 * part[near], no_distance)]
     if not lost.size:
         return ""
     i, names = int(lost[np.argmin(part[lost])]), [p.name for p in s.m.pairs]

@@ -23,8 +23,6 @@ from mechgraph.maths.linear import (
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import PATH
 
-OWN_SIZE = 2.0
-"""Factor by which a loop is smaller or larger than L from which on its rows are taken over its own size."""
 TRIES = 8
 """Choices tried for a batch at most."""
 
@@ -92,7 +90,9 @@ def own_scale(here: Configuration, t: int) -> tuple[Array, Array] | None:
     """
     s = here.system
     size = lengths_of(s.graph, here.pair_points[:, :, t], here.middles[:, :, t])
-    if not ((size * OWN_SIZE < 1.0) | (size > OWN_SIZE)).any():
+    # factor by which a loop is smaller or larger than L from which on its rows are taken over its own size
+    own_size = 2.0
+    if not ((size * own_size < 1.0) | (size > own_size)).any():
         return None
     rows, columns = np.ones(s.n_rows), np.ones(s.n_freedoms)
     rows[: 6 * len(size)].reshape(-1, 2, 3)[:, 1] = 2.0 ** np.round(-np.log2(size))[:, None]

@@ -24,9 +24,6 @@ from mechgraph.maths.tolerances import PATH
 from mechgraph.maths.track import Interpolation, Nodes, Rule, rule
 from mechgraph.maths.tracker import Follower
 
-UNTURNED = 1e-13
-"""Angle that is rounding."""
-
 
 def unspun(path: DriverPath, found: Positions, passive: tuple[PassiveMotion, ...]) -> Positions:
     """The same positions with passive links at rest on the way from the start.
@@ -323,19 +320,21 @@ class _Carried:
         Also where that is beyond doubt.
         """
         part, left, times, most = np.ones(len(track)), None, 0, 0
+        # angle that is rounding
+        unturned = 1e-13
         while True:
             amounts, dq, sure = self._missing(x, which, track, place, turns, left)
             amount = np.abs(list(amounts.values())).max(axis=0)
             if left is None:
                 # most repetitions of the turn that takes the spin out; over a plane half a turn takes some thirty
                 most = 80 * (1 + int(amount.max(initial=0.0) / np.pi))
-            if amount.max(initial=0.0) < UNTURNED or times == most:
+            if amount.max(initial=0.0) < unturned or times == most:
                 break
             times += 1
             # exact where the rates of the motion are constant (ball joints, hinges), so that nothing is left to correct; over a plane it
             # comes nearer with every repetition, by parts of the way that need no large correction
             closed = self.follower.newton.close(self.path.advance(x, part * dq, track), x[self.path.rows], track, which)
-            if closed.correction.max(initial=0.0) < UNTURNED and (part == 1.0).all():
+            if closed.correction.max(initial=0.0) < unturned and (part == 1.0).all():
                 x, amount = closed.x, np.zeros(len(track))
                 break
             near = closed.done & (closed.correction <= PATH.correction)

@@ -439,10 +439,6 @@ def _requests(found: Positions, polygon: _Polygon, way: _Way) -> tuple[Request, 
     return parts[0], parts[1:]
 
 
-BACK_AGAIN = 1e-11
-"""Distance (radians, lengths / L) up to which a motion is back: rounding over a poor condition; shifts are whole turns or nothing."""
-
-
 @dataclass
 class _Curve:
     """Positions of a request to one side of its start, ``way (n,)`` from there, and the ``period`` and ``shift (F,)`` of the motion."""
@@ -552,5 +548,7 @@ def _shift(path: DriverPath, follower: Follower, node: Nodes, start: Nodes, cros
     turned[system.single_rows[turning]] += shift[turning][:, None]
     again = path.at(turned, turned[path.rows], start.track)
     # screws and couplings of freedoms that have gained turns may not be back
-    back = np.abs(again.poses - here.poses).max() <= BACK_AGAIN and again.closure[0] <= BACK_AGAIN + here.closure[0]
-    return shift if back and np.abs(left).max(initial=0.0) <= BACK_AGAIN else None
+    # distance (radians, lengths / L) up to which a motion is back: rounding over a poor condition; shifts are whole turns or nothing
+    back_again = 1e-11
+    back = np.abs(again.poses - here.poses).max() <= back_again and again.closure[0] <= back_again + here.closure[0]
+    return shift if back and np.abs(left).max(initial=0.0) <= back_again else None

@@ -407,8 +407,6 @@ def _levels(before: Index, after: Index, count: int) -> Index:
 
 
 """Rows or columns up to which singular values are those of the whole matrix (a tenth of a second at most)."""
-LANCZOS_SETTLED = 1e-3
-"""Relative change at which these steps end."""
 
 
 class LeastNorm:
@@ -458,6 +456,8 @@ def _largest(apply: Callable[[Array], Array], v: Array) -> float:
     beta: list[float] = []
     value = 0.0
     # Lanczos steps for the smallest singular value of a larger one
+    # relative change at which the steps end
+    lanczos_settled = 1e-3
     for _ in range(24):
         w = apply(basis[-1])
         alpha.append(float(w @ basis[-1]))
@@ -465,7 +465,7 @@ def _largest(apply: Callable[[Array], Array], v: Array) -> float:
             w -= (w @ u) * u
         found = float(scipy.linalg.eigvalsh_tridiagonal(alpha, beta)[-1])
         size = float(np.linalg.norm(w))
-        if abs(found - value) <= LANCZOS_SETTLED * found or size <= LANCZOS_SETTLED**2 * found:
+        if abs(found - value) <= lanczos_settled * found or size <= lanczos_settled**2 * found:
             return found
         value = found
         beta.append(size)

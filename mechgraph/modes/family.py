@@ -517,10 +517,6 @@ def _same_back(row: PairType) -> bool:
     return bool(np.abs(cross_twist(np.repeat(S, n, axis=1), np.tile(S, (1, n)))).max(initial=0.0) < MODES.span)
 
 
-GUESSES_TOGETHER = 200
-"""Guesses closed together."""
-
-
 def searched(
     system: System,
     x: Array,
@@ -537,8 +533,10 @@ def searched(
     """
     found = []
     turning = ~system.is_length
-    for i in range(0, starts, GUESSES_TOGETHER):
-        n = min(GUESSES_TOGETHER, starts - i)
+    # guesses closed together
+    guesses_together = 200
+    for i in range(0, starts, guesses_together):
+        n = min(guesses_together, starts - i)
         if progress is not None:
             progress(f"guess {i + 1} to {i + n} of {starts}")
         dq = rng.uniform(-2 * np.pi * turns, 2 * np.pi * turns, (system.n_freedoms, n))

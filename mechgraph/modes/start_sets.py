@@ -199,8 +199,6 @@ def _of_triad(family: Family) -> Bound | None:
 
 MOST_TRACKS = 24_000
 """Tracks over all of them, at most."""
-SPARE_VALUES = 4
-"""Singular values beyond the degree, at least."""
 
 
 @dataclass(frozen=True)
@@ -258,7 +256,9 @@ def trace_test(
 
 def rational(z: Array, f: Array, weights: Array) -> Trace:
     """Whether a function with values ``f (n,)`` at ``z (n,)`` is rational, and of which degree; ``weights (n,)`` fall with rounding."""
-    if len(z) // 2 <= SPARE_VALUES:
+    # singular values beyond the degree, at least
+    spare_values = 4
+    if len(z) // 2 <= spare_values:
         return NOT_PASSED
     loewner, _ = _loewner(z, f, weights)
     sigma = np.linalg.svd(loewner, compute_uv=False)
@@ -266,7 +266,7 @@ def rational(z: Array, f: Array, weights: Array) -> Trace:
     # singular value, as part of the largest, below which the Loewner matrix of a rational function ends
     # ratio of two singular values, one after the other, at which they end; where they fade it is below 300
     ends = 1 + np.flatnonzero(
-        (sigma[1:-SPARE_VALUES] < 1e-11) & (sigma[1:-SPARE_VALUES] * 1e4 < sigma[: -SPARE_VALUES - 1])
+        (sigma[1:-spare_values] < 1e-11) & (sigma[1:-spare_values] * 1e4 < sigma[: -spare_values - 1])
     )
     if not ends.size:
         return NOT_PASSED
@@ -400,12 +400,8 @@ def _told(family: Family, here: Configuration) -> Array:
 MISSED, MISSED_AGAIN = 1e-4, 1e-6
 """Chance of an assembly having been missed at which loops of members end, where every permutation is as likely as any other: at the
 first member, and at the one that is kept."""
-MOST_FOUND = 1200
-"""Assemblies of one member from which on they are not looked for any further."""
 MOST_TRACKED = 60_000
 """Tracks in all, after which they are not either."""
-CANDIDATES = 6
-"""Members of which the best one is kept."""
 
 
 class Irregular(Exception):
@@ -509,13 +505,15 @@ def _permuted(
     Where a bound is met, no loop could bring a further one.
     """
     known = bound(equations.family)
-    group = _Group(equations, base, x[:, None], MOST_FOUND if known is None else known.count)
+    # assemblies of one member from which on they are not looked for any further
+    most_found = 1200
+    group = _Group(equations, base, x[:, None], most_found if known is None else known.count)
     group.grow(MISSED, rng, progress)
     group.move(*_tame(equations, group.base, group.x, rng))
     group.grow(MISSED_AGAIN, rng, progress)
     N = group.x.shape[1]
     met = known is not None and known.count == N
-    whole = met or (N < MOST_FOUND and group.chance <= MISSED_AGAIN)
+    whole = met or (most_found > N and group.chance <= MISSED_AGAIN)
     test = whole and not met
     trace = trace_test(equations, group.base, group.x, rng, progress) if test else NOT_PASSED
     return StartSet(
@@ -575,9 +573,11 @@ def _tame(equations: Equations, base: Member, x: Array, rng: np.random.Generator
     Assemblies ``x (nx, N)`` that come to one there are one, which large numbers had told apart by their rounding.
     """
     family, N = equations.family, x.shape[1]
-    members = [family.random_member(rng) for _ in range(CANDIDATES)]
-    which = np.repeat(np.arange(CANDIDATES), N)
-    tracked = follow(Leg(equations, base, Member.joined(members), which), np.tile(x, CANDIDATES), Care())
+    # members of which the best one is kept
+    candidates = 6
+    members = [family.random_member(rng) for _ in range(candidates)]
+    which = np.repeat(np.arange(candidates), N)
+    tracked = follow(Leg(equations, base, Member.joined(members), which), np.tile(x, candidates), Care())
     keep, found = np.arange(N), []
     for number, member in enumerate(members):
         mine = which == number
