@@ -62,9 +62,9 @@ from mechgraph.kinematics.solver import MotionEngineName, closure_solver, engine
 from mechgraph.kinematics.state import ClosureSolver, Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import independent_rows
+from mechgraph.maths.newton import Nodes
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import MOTIONS, PATH, Tolerances
-from mechgraph.maths.track import Nodes
 from mechgraph.model.couplings import Contact
 from mechgraph.model.loads import Effort, Load
 from mechgraph.model.mechanism import Mechanism

@@ -43,10 +43,9 @@ from mechgraph.kinematics.solver import ClosureRank, EngineName, closure_solver,
 from mechgraph.kinematics.state import ClosureRows, Configuration, ReducedRows
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import independent_rows
-from mechgraph.maths.newton import closest_zeros
+from mechgraph.maths.newton import Paths, closest_zeros
 from mechgraph.maths.se3 import Array, Index, null_space
 from mechgraph.maths.tolerances import RANKS
-from mechgraph.maths.track import Paths
 from mechgraph.maths.tracker import Follower
 
 BRANCHING_MOTIONS = 24

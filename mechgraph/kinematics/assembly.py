@@ -22,10 +22,9 @@ from mechgraph.kinematics.solver import closure_rank, closure_solver, engine_for
 from mechgraph.kinematics.state import ClosureRows, Configuration, ReducedRows, lengths_of
 from mechgraph.kinematics.system import System, indexed
 from mechgraph.maths.linear import compact, complement
-from mechgraph.maths.newton import closest_zeros, least_norm_steps
+from mechgraph.maths.newton import Nodes, closest_zeros, least_norm_steps
 from mechgraph.maths.se3 import Array, Index, rotate
 from mechgraph.maths.tolerances import PATH, RANKS
-from mechgraph.maths.track import Nodes
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker
 from mechgraph.quantities import is_numeric, shown, wrong

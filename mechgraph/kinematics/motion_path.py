@@ -19,11 +19,10 @@ from numpy.typing import NDArray
 
 from mechgraph.kinematics.state import ClosureSolver, Configuration, FactoredClosure
 from mechgraph.kinematics.system import System
-from mechgraph.maths.newton import Work
+from mechgraph.maths.newton import Interpolation, Nodes, Paths, Work, places_of
 from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.singular_point import WINDOW, Crossing, followed, passed
 from mechgraph.maths.tolerances import PATH
-from mechgraph.maths.track import Interpolation, Nodes, Paths, places_of
 from mechgraph.maths.tracker import End, Follower, Tracks
 
 FARTHEST = 1e6

@@ -17,11 +17,10 @@ import numpy as np
 from mechgraph.kinematics.motion_path import DriverPath, Positions, Status, in_blocks
 from mechgraph.kinematics.rates import PassiveMotion, PassiveMotions, Velocities, are_alone
 from mechgraph.kinematics.state import FactoredClosure
-from mechgraph.maths.newton import Closed
+from mechgraph.maths.newton import Closed, Interpolation, Nodes, Rule, rule
 from mechgraph.maths.se3 import Array, Index, Mask, cross, rotate, rotate_back
 from mechgraph.maths.singular_point import WINDOW
 from mechgraph.maths.tolerances import PATH
-from mechgraph.maths.track import Interpolation, Nodes, Rule, rule
 from mechgraph.maths.tracker import Follower
 
 

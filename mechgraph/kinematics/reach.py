@@ -33,10 +33,10 @@ import numpy as np
 
 from mechgraph.kinematics.motion_path import DriverPath, Legs, Positions, Request, Status, along_polygons
 from mechgraph.kinematics.system import System
+from mechgraph.maths.newton import STRAIGHT_ON, Interpolation, Nodes, Paths, places_of
 from mechgraph.maths.se3 import Array, Index, compose, inverse, matrix_quaternion, quaternion_log
 from mechgraph.maths.singular_point import followed
 from mechgraph.maths.tolerances import PATH
-from mechgraph.maths.track import STRAIGHT_ON, Interpolation, Nodes, Paths, places_of
 from mechgraph.maths.tracker import End, Follower
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair

@@ -28,10 +28,9 @@ from functools import cached_property
 
 import numpy as np
 
-from mechgraph.maths.newton import Problem, largest
+from mechgraph.maths.newton import BENT, Nodes, Paths, Problem, largest, through
 from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.tolerances import PATH
-from mechgraph.maths.track import BENT, Nodes, Paths, through
 from mechgraph.maths.tracker import LEAD, End, Follower, Tracks
 
 WINDOW = 5e-3

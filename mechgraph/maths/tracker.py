@@ -20,10 +20,9 @@ from enum import Enum
 
 import numpy as np
 
-from mechgraph.maths.newton import Newton, Problem, Work
+from mechgraph.maths.newton import Newton, Nodes, Paths, Problem, Work, cubic, through
 from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.tolerances import PATH
-from mechgraph.maths.track import Nodes, Paths, cubic, through
 
 
 def between(problem: Problem, a: Nodes, b: Nodes, part: Array | float, drive: Array) -> Array:

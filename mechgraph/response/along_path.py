@@ -49,10 +49,10 @@ from mechgraph.kinematics.motion_path import DriverPath
 from mechgraph.kinematics.solver import closure_rank, closure_solver
 from mechgraph.kinematics.state import Configuration, FactoredClosure
 from mechgraph.kinematics.system import System
+from mechgraph.maths.newton import Interpolation, Nodes, Paths
 from mechgraph.maths.se3 import Array, Index, cross, rotate
 from mechgraph.maths.singular_point import WINDOW, Crossing, leapt, passed
 from mechgraph.maths.tolerances import PATH, RESPONSE
-from mechgraph.maths.track import Interpolation, Nodes, Paths
 from mechgraph.maths.tracker import End, Follower
 from mechgraph.model.loads import Load
 from mechgraph.response.charts import Task

@@ -28,8 +28,8 @@ from mechgraph.kinematics.solver import MotionEngineName, closure_solver
 from mechgraph.kinematics.state import Configuration, FactoredClosure
 from mechgraph.kinematics.system import System
 from mechgraph.kinetostatics import Pipeline, RedundantName, solve_quietly
+from mechgraph.maths.newton import Paths
 from mechgraph.maths.se3 import Array, Index
-from mechgraph.maths.track import Paths
 from mechgraph.maths.tracker import End, Follower, Tracks
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
