@@ -28,15 +28,13 @@ def batch_last(M: Array) -> Array:
     return np.ascontiguousarray(np.moveaxis(M, (-2, -1), (0, 1)))
 
 
-NEXT, LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
-"""The components that follow each other, and those before."""
-
-
 def cross(a: Array, b: Array, out: Array | None = None) -> Array:
     """Vector product of ``(3, ...)`` arrays along the first axis, into ``out`` where given."""
-    out = np.multiply(a.take(NEXT, 0), b.take(LAST, 0), out=out)
-    out -= a.take(LAST, 0) * b.take(NEXT, 0)
-    return np.asarray(out)
+    if out is None:
+        out = np.empty(np.broadcast_shapes(a.shape, b.shape), dtype=np.result_type(a, b))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        np.subtract(a[j] * b[k], a[k] * b[j], out=out[i, ...])
+    return out
 
 
 def skew(a: Array) -> Array:
