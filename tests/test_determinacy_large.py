@@ -12,6 +12,7 @@ import mechanisms as known
 import numpy as np
 import pytest
 import scipy
+import scipy.stats
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from lattices import LATTICES
@@ -21,8 +22,9 @@ import mechgraph as mg
 from mechgraph.determinacy import findings, snapping
 from mechgraph.determinacy.facts import counted_ledger
 from mechgraph.determinacy.families import kind_of
+from mechgraph.determinacy.findings import plausible
 from mechgraph.determinacy.mobility import free_motion, random_rows
-from mechgraph.determinacy.uniqueness import uniqueness
+from mechgraph.determinacy.uniqueness import canonical, uniqueness
 from mechgraph.graph.linkgraph import link_graph
 from mechgraph.kinematics.assembly import assembled
 from mechgraph.kinematics.solver import ClosureRank, closure_rank, rank_of_rows
@@ -377,3 +379,25 @@ def test_a_start_with_many_motions_is_refused_without_large_arrays() -> None:
         assert tracemalloc.get_traced_memory()[1] < 1e8
     finally:
         tracemalloc.stop()
+
+
+def test_of_two_echelon_forms_of_as_many_terms_the_first_rows_decide() -> None:
+    """A general plane of four components: the form taken from its first row on has its zeros there, in any basis."""
+    columns = np.random.default_rng(5).normal(size=(1, 4, 2))
+    found = canonical(columns)
+    np.testing.assert_array_equal(found[0, :2] == 0.0, [[False, True], [True, False]])
+    assert (found[0, 2:] != 0.0).all()
+    np.testing.assert_allclose(canonical(columns @ [[1.0, 2.0], [3.0, -1.0]]), found, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("point", "axis", "allowed"),
+    [((0, 0, 0), (0, 0, 1), 1e-3), ((0, 0, 0), (0.37, 0.56, 0.74), 2e-2), ((0.5, 0, 0), (0, 0.6, 0.8), 1e-3),
+     ((1 / 3, 0, 0), (2**0.5, 0, 1), 1e-3), ((123, 40, 0), (0, 0, 1), 0.02), ((1.25, 0, 0), (3, 4, 0), 0.02),
+     ((1.251, 0, 0), (371, 557, 743), 0.002 / 0.9997)],
+)  # fmt: skip
+def test_what_rounding_explains(point: tuple[float, ...], axis: tuple[float, ...], allowed: float) -> None:
+    """Four half units of the last digit, over L or over the length of the axis; whole directions are exact."""
+    pairs = [mg.Pair("A", "R", "frame", "arm", point=point, axis=axis, second=(0, 0, 1) if axis[2] == 0 else (1, 0, 0))]
+    m, L = mg.Mechanism("m", pairs=pairs), 100.0 if point[0] > 100 else 1.0
+    assert plausible(m, L) == pytest.approx(allowed, rel=1e-2)

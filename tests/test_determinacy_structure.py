@@ -11,9 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mechgraph as mg
-from mechgraph.determinacy.mobility import generic
-from mechgraph.determinacy.uniqueness import canonical
-from mechgraph.graph.linkgraph import link_graph, parts_of
 
 TYPES = ("R", "P", "C", "S", "E", "U", "W", "Sp", "Sg")
 
@@ -64,7 +61,7 @@ def reachable(graph: nx.Graph, matching: dict[object, object], starts: set[objec
 )
 def test_parts_against_a_matching_of_single_unknowns(seed: int, links: int, chords: int, letters: list[str]) -> None:
     m = random_topology(seed, links, chords, letters)
-    found = parts_of(m, link_graph(m))
+    found = mg.check(m).parts
     graph, unknowns, equations = bipartite(m)
     matching = nx.bipartite.hopcroft_karp_matching(graph, top_nodes=unknowns)
     over = reachable(graph, matching, {u for u in unknowns if u not in matching})
@@ -87,7 +84,7 @@ def test_parts_against_a_matching_of_single_unknowns(seed: int, links: int, chor
 def test_generic_rank_against_random_placements(seed: int, links: int, chords: int, letters: list[str]) -> None:
     """The rank of random geometry declared as a mechanism; the excess is shared out over the places."""
     m = random_topology(seed, links, chords, letters)
-    found = generic(m, link_graph(m))
+    found = mg.check(m).generic
     rng = np.random.default_rng(seed)
     placed = [
         p.replace(
@@ -142,12 +139,3 @@ def test_a_driven_dyad_is_free_and_a_closed_frame_is_over() -> None:
     assert parts.spare_unknowns == 6
     assert parts.free_links == ("3",)
     assert parts.spare_equations == 1
-
-
-def test_of_two_echelon_forms_of_as_many_terms_the_first_rows_decide() -> None:
-    """A general plane of four components: the form taken from its first row on has its zeros there, in any basis."""
-    columns = np.random.default_rng(5).normal(size=(1, 4, 2))
-    found = canonical(columns)
-    np.testing.assert_array_equal(found[0, :2] == 0.0, [[False, True], [True, False]])
-    assert (found[0, 2:] != 0.0).all()
-    np.testing.assert_allclose(canonical(columns @ [[1.0, 2.0], [3.0, -1.0]]), found, atol=1e-12)

@@ -1,6 +1,4 @@
-"""Many positions solved group by group: block triangular systems, and mechanisms against all at once, one by one, and group by hand."""
-
-from itertools import pairwise
+"""Many positions solved group by group: against all at once, one by one, and group by hand."""
 
 import numpy as np
 import pytest
@@ -10,59 +8,6 @@ from test_groups import random_mechanism
 from test_large import AGREE, assert_same
 
 import mechgraph as mg
-from mechgraph.kinematics.solver import engine_for
-from mechgraph.maths.sparse import BlockTriangular
-
-SIZES = (3, 1, 4, 3, 2)
-T = 7
-
-
-def block_systems(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Rows, columns and values ``(T, entries)`` of systems that are block triangular once permuted, and the matrices."""
-    rng = np.random.default_rng(seed)
-    ends = np.cumsum((0, *SIZES))
-    mask = np.zeros((ends[-1], ends[-1]), dtype=bool)
-    for k, (a, b) in enumerate(pairwise(ends)):
-        mask[a:b, a:b] = True
-        mask[a:b, :a] = rng.random((b - a, a)) < (0.3 if k != 2 else 0.0)
-    p, q = rng.permutation(ends[-1]), rng.permutation(ends[-1])
-    rows, cols = np.nonzero(mask[p][:, q])
-    A = np.where(mask[p][:, q], rng.normal(size=(T, *mask.shape)) + 4.0 * np.eye(ends[-1])[p][:, q], 0.0)
-    return rows, cols, A[:, rows, cols], A
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_block_triangular_systems(seed: int) -> None:
-    rows, cols, values, A = block_systems(seed)
-    form = BlockTriangular(rows, cols, sum(SIZES))
-    assert form.sizes == {1: 1, 2: 1, 3: 2, 4: 1}
-    factor = form.factor(values)
-    b = np.random.default_rng(seed).normal(size=(sum(SIZES), 2, T))
-    for transposed in (False, True):
-        x = factor.solve(b, transposed)
-        for t in range(T):
-            expected = np.linalg.solve(A[t].T if transposed else A[t], b[:, :, t])
-            assert_allclose(x[:, :, t], expected, atol=1e-12 * np.abs(expected).max())
-    some = np.array([5, 2])
-    assert_allclose(factor.part(some).solve(b[:, :, some]), factor.solve(b)[:, :, some], atol=1e-14)
-
-
-def test_a_singular_block_spoils_its_own_system_only() -> None:
-    rows, cols, values, A = block_systems(1)
-    form = BlockTriangular(rows, cols, sum(SIZES))
-    alone = form._diagonal[0][2]
-    values[3, alone] = 0.0
-    factor = form.factor(values)
-    assert np.flatnonzero(factor.smallest_pivot == 0).tolist() == [3]
-    b = np.ones((sum(SIZES), 1, T))
-    assert np.isnan(factor.solve(b)[..., 3]).any()
-    assert_allclose(A[2] @ factor.solve(b)[:, 0, 2], b[:, 0, 2], atol=1e-12)
-
-
-def test_no_matching_no_blocks() -> None:
-    form = BlockTriangular(np.array([0, 1, 2, 2]), np.array([0, 0, 1, 2]), 3)
-    assert form.blocks == 0
-    assert not form.pays(1000)
 
 
 def with_random_driver(seed: int) -> tuple[mg.Mechanism, str]:
@@ -115,16 +60,9 @@ def test_large_ones_group_by_group(kind: str) -> None:
     assert_same(s, dense)
 
 
-def test_engines_by_size_and_positions() -> None:
-    assert [engine_for(60, positions, "auto") for positions in (1, 8, 36, 1000)] == [
-        "dense",
-        "dense",
-        "sparse",
-        "sparse",
-    ]
-    assert engine_for(30, 10**6, "auto") == "dense"
+def test_reactions_of_least_norm_gain_nothing_from_many_positions() -> None:
     few = mg.solve(ladder(30), {"J0": np.linspace(0, 0.05, 40)}, redundant="minimum_norm")
-    assert few.engine == "dense"  # reactions of least norm gain nothing from many positions
+    assert few.engine == "dense"
 
 
 def test_groups_of_a_choice_that_no_longer_fits() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import gc
 import weakref
+from itertools import pairwise
 
 import mechanisms as known
 import numpy as np
@@ -20,10 +21,11 @@ from mechgraph.graph.linkgraph import link_graph
 from mechgraph.kinematics import layout
 from mechgraph.kinematics.assembly import assembled, scaled_start
 from mechgraph.kinematics.layout import Numbers, Tree
+from mechgraph.kinematics.solver import engine_for
 from mechgraph.kinematics.sparse_system import LoopSystem
 from mechgraph.kinematics.state import ClosureRows, Configuration
 from mechgraph.kinematics.system import System
-from mechgraph.maths.sparse import SparseFactors
+from mechgraph.maths.sparse import BlockTriangular, SparseFactors
 from mechgraph.model.parameters import parameters
 
 AGREE = 1e-9
@@ -400,3 +402,67 @@ def test_a_start_between_two_folds(engine):
     m = solvable(78)
     s = mg.solve(m, motions(m, 78, np.linspace(0, 1, 3)), engine=engine, on_reach="flag")
     assert s.status.tolist() == ["ok", "out of reach", "out of reach"]
+
+
+SIZES = (3, 1, 4, 3, 2)
+
+
+T = 7
+
+
+def block_systems(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Rows, columns and values ``(T, entries)`` of systems that are block triangular once permuted, and the matrices."""
+    rng = np.random.default_rng(seed)
+    ends = np.cumsum((0, *SIZES))
+    mask = np.zeros((ends[-1], ends[-1]), dtype=bool)
+    for k, (a, b) in enumerate(pairwise(ends)):
+        mask[a:b, a:b] = True
+        mask[a:b, :a] = rng.random((b - a, a)) < (0.3 if k != 2 else 0.0)
+    p, q = rng.permutation(ends[-1]), rng.permutation(ends[-1])
+    rows, cols = np.nonzero(mask[p][:, q])
+    A = np.where(mask[p][:, q], rng.normal(size=(T, *mask.shape)) + 4.0 * np.eye(ends[-1])[p][:, q], 0.0)
+    return rows, cols, A[:, rows, cols], A
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_block_triangular_systems(seed: int) -> None:
+    rows, cols, values, A = block_systems(seed)
+    form = BlockTriangular(rows, cols, sum(SIZES))
+    assert form.sizes == {1: 1, 2: 1, 3: 2, 4: 1}
+    factor = form.factor(values)
+    b = np.random.default_rng(seed).normal(size=(sum(SIZES), 2, T))
+    for transposed in (False, True):
+        x = factor.solve(b, transposed)
+        for t in range(T):
+            expected = np.linalg.solve(A[t].T if transposed else A[t], b[:, :, t])
+            assert_allclose(x[:, :, t], expected, atol=1e-12 * np.abs(expected).max())
+    some = np.array([5, 2])
+    assert_allclose(factor.part(some).solve(b[:, :, some]), factor.solve(b)[:, :, some], atol=1e-14)
+
+
+def test_a_singular_block_spoils_its_own_system_only() -> None:
+    rows, cols, values, A = block_systems(1)
+    form = BlockTriangular(rows, cols, sum(SIZES))
+    alone = form._diagonal[0][2]
+    values[3, alone] = 0.0
+    factor = form.factor(values)
+    assert np.flatnonzero(factor.smallest_pivot == 0).tolist() == [3]
+    b = np.ones((sum(SIZES), 1, T))
+    assert np.isnan(factor.solve(b)[..., 3]).any()
+    assert_allclose(A[2] @ factor.solve(b)[:, 0, 2], b[:, 0, 2], atol=1e-12)
+
+
+def test_no_matching_no_blocks() -> None:
+    form = BlockTriangular(np.array([0, 1, 2, 2]), np.array([0, 0, 1, 2]), 3)
+    assert form.blocks == 0
+    assert not form.pays(1000)
+
+
+def test_engines_by_size_and_positions() -> None:
+    assert [engine_for(60, positions, "auto") for positions in (1, 8, 36, 1000)] == [
+        "dense",
+        "dense",
+        "sparse",
+        "sparse",
+    ]
+    assert engine_for(30, 10**6, "auto") == "dense"

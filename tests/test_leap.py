@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+import scipy
 
 import mechgraph as mg
 from mechgraph.kernel import build
 from mechgraph.kinematics.assembly import assembled_at
 from mechgraph.response.along_path import POINTS, Arc, Way, _coarse
-from mechgraph.response.charts import Prescribed, Task
+from mechgraph.response.charts import Prescribed, Task, differentiated, samples_fault
 from mechgraph.response.motion_equations import KernelPath, Loads
 
 Z = np.eye(3)[2]
@@ -86,3 +87,30 @@ def test_noise_beside_a_crossing_that_is_open_makes_no_more_pieces(engine):
     w = way(0.0, engine, narrower=3e-8)
     assert w.length > 2.0
     assert len(w._pieces) < 90
+
+
+def test_motions_of_functions_break_where_their_acceleration_jumps():
+    """A harmonic rise between dwells; revolutions far faster than what is looked at beside a large offset."""
+
+    def rise(t):
+        if not 1.1 < t < 1.4:
+            return 0.0 if t <= 1.1 else 0.2, 0.0, 0.0
+        w = np.pi / 0.3
+        s = w * (t - 1.1)
+        return 0.1 * (1 - np.cos(s)), 0.1 * w * np.sin(s), 0.1 * w * w * np.cos(s)
+
+    np.testing.assert_allclose(differentiated(rise, 0.0, 3.0), [1.1, 1.4], atol=1e-6)
+    assert (
+        differentiated(lambda t: (1e3 + np.sin(9e3 * t), 9e3 * np.cos(9e3 * t), -81e6 * np.sin(9e3 * t)), 0.0, 3.0)
+        == ()
+    )
+
+
+def test_coarse_samples_of_a_sine_and_of_a_trapezoidal_velocity_are_right():
+    t = np.arange(0, 7, 1.2)
+    assert samples_fault(t, np.stack([np.sin(t), np.cos(t), -np.sin(t)], axis=1)) == ""
+    t = np.linspace(0, 4, 17)
+    ramp = np.interp(t, [0, 1, 3, 4], [0, 1, 1, 0])
+    position = scipy.integrate.cumulative_trapezoid(ramp, dx=0.25, initial=0)
+    slope = np.select([t < 1, t > 3], [1.0, -1.0])
+    assert samples_fault(t, np.stack([position, ramp, slope], axis=1)) == ""

@@ -6,7 +6,6 @@ import scipy
 from test_response import slider_crank
 
 import mechgraph as mg
-from mechgraph.response.charts import differentiated, samples_fault
 
 X, Y, Z = np.eye(3)
 BEGIN, END, FORCE = 5.0, 5.05, 100.0
@@ -152,7 +151,7 @@ def test_rates_that_are_not_those_of_the_position_are_refused_by_name(what):
 
 
 def test_motions_that_are_right_are_taken_and_their_jumps_of_acceleration_are_breaks():
-    """A harmonic rise between dwells, revolutions far faster than what is looked at, a large offset, coarse samples of a sine."""
+    """A harmonic rise between dwells."""
 
     def rise(t):
         if not 1.1 < t < 1.4:
@@ -161,18 +160,8 @@ def test_motions_that_are_right_are_taken_and_their_jumps_of_acceleration_are_br
         s = w * (t - 1.1)
         return 0.1 * (1 - np.cos(s)), 0.1 * w * np.sin(s), 0.1 * w * w * np.cos(s)
 
-    found = differentiated(rise, 0.0, 3.0)
-    np.testing.assert_allclose(found, [1.1, 1.4], atol=1e-6)
     r = mg.respond(block(), (0, 3), motions={"P": rise}, loads=[])
     np.testing.assert_allclose(r["P"].position[-1], 0.2, atol=1e-12)
-    fast = law_of(lambda t: 1e3 + np.sin(9e3 * t), lambda t: 9e3 * np.cos(9e3 * t), lambda t: -81e6 * np.sin(9e3 * t))
-    assert differentiated(fast, 0.0, 3.0) == ()
-    t = np.arange(0, 7, 1.2)
-    assert samples_fault(t, np.stack([np.sin(t), np.cos(t), -np.sin(t)], axis=1)) == ""
-    ramp = np.interp(np.linspace(0, 4, 17), [0, 1, 3, 4], [0, 1, 1, 0])  # a trapezoidal velocity
-    position = scipy.integrate.cumulative_trapezoid(ramp, dx=0.25, initial=0)
-    slope = np.select([np.linspace(0, 4, 17) < 1, np.linspace(0, 4, 17) > 3], [1.0, -1.0])
-    assert samples_fault(np.linspace(0, 4, 17), np.stack([position, ramp, slope], axis=1)) == ""
 
 
 def turning(pose, twist, t):

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
-from mechgraph.response.integration import LOOKS_IN_STEP, Stops, _Limit
 
 X, Y, Z = np.eye(3)
 G = 9.81
@@ -211,22 +210,3 @@ def test_the_end_of_a_curve_ends_the_motion():
     assert stopped.events
     assert (stopped["A"].position <= 3.0 + 1e-9).all()
     assert stopped.t[-1] == 3.0
-
-
-class Sinking:
-    """A coordinate that is beyond its limit from the beginning on, by ever more."""
-
-    def positions(self, t):
-        return -np.asarray(t)[None]
-
-    def rates(self, t):
-        return np.zeros((2, 1, len(t)))
-
-
-def test_what_is_passed_at_once_is_met_at_the_first_look(monkeypatch):
-    """So that the least is lost: a limit that is passed, and one that no longer presses."""
-    first = LOOKS_IN_STEP[1]
-    limit = _Limit(mg.Stop("A", lower=0.0), "lower", 0, 0, 1.0, 0.0)
-    assert Stops(None, (limit,)).met(Sinking(), 0.0, 1.0) == first
-    monkeypatch.setattr(Stops, "_pressing", lambda self, motion, times: motion.positions(times)[0])
-    assert Stops(None, (limit,), (limit,)).met(Sinking(), 0.0, 1.0) == first

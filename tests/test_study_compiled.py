@@ -13,7 +13,6 @@ import scipy.stats
 
 import mechgraph as mg
 from mechgraph import by_kernel
-from mechgraph.variants import study as module
 
 MOTION = {"O1": mg.Motion(np.deg2rad([150.0, 175.0, 200.0]), 0.1, 0.2)}
 NOMINAL = {"length[0]": 0.5, "length[1]": 0.8, "length[2]": 0.4, "twist[0]": np.deg2rad(12), "twist[3]": np.deg2rad(15)}
@@ -56,7 +55,7 @@ def test_a_way_through_a_singular_mechanism_is_not_led() -> None:
 
 def test_threads_give_what_one_gives(monkeypatch: pytest.MonkeyPatch) -> None:
     """Parts are solved on threads, not in processes; in any number the same bits in the same order."""
-    monkeypatch.setattr(module, "POSITIONS_TOGETHER", 6)
+    monkeypatch.setattr("mechgraph.variants.study.POSITIONS_TOGETHER", 6)
     monkeypatch.setattr(concurrent.futures, "ProcessPoolExecutor", None)
     found, calls = [], []
     for workers in (1, 3):

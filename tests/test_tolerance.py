@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 from strategies import closed_mechanism
 
 import mechgraph as mg
-from mechgraph.determinacy.findings import plausible
 
 SPECIAL = {
     **{name: getattr(mechanisms, name) for name in (
@@ -118,19 +117,6 @@ def test_a_hint_agrees_with_the_digits(name: str) -> None:
     assert "tol=" not in str(caught.value)
     assert mg.check(rounded(wide, 2)).rounding is not None
     assert mg.check(bent(SPECIAL[name](), 5e-4, 4)).rounding is not None
-
-
-@pytest.mark.parametrize(
-    ("point", "axis", "allowed"),
-    [((0, 0, 0), (0, 0, 1), 1e-3), ((0, 0, 0), (0.37, 0.56, 0.74), 2e-2), ((0.5, 0, 0), (0, 0.6, 0.8), 1e-3),
-     ((1 / 3, 0, 0), (2**0.5, 0, 1), 1e-3), ((123, 40, 0), (0, 0, 1), 0.02), ((1.25, 0, 0), (3, 4, 0), 0.02),
-     ((1.251, 0, 0), (371, 557, 743), 0.002 / 0.9997)],
-)  # fmt: skip
-def test_what_rounding_explains(point: tuple[float, ...], axis: tuple[float, ...], allowed: float) -> None:
-    """Four half units of the last digit, over L or over the length of the axis; whole directions are exact."""
-    pairs = [mg.Pair("A", "R", "frame", "arm", point=point, axis=axis, second=(0, 0, 1) if axis[2] == 0 else (1, 0, 0))]
-    m, L = mg.Mechanism("m", pairs=pairs), 100.0 if point[0] > 100 else 1.0
-    assert plausible(m, L) == pytest.approx(allowed, rel=1e-2)
 
 
 @pytest.mark.seeds(20)

@@ -341,7 +341,7 @@ def load_deck(
     couples : distance at which two opposite forces make every moment, on six further nodes around each; left out, moments act in the
         rotational freedoms 4 to 6 of the nodes. CalculiX has these at reference nodes of ``*COUPLING`` and at beams and shells; at that
         of a ``*RIGID BODY`` it drops them without a word.
-    first_node : the number of the first node.
+    first_node : the number of the first node, beyond those of a mesh.
 
     Raises
     ------

@@ -6,6 +6,7 @@ from strategies import closed_mechanism, with_drives, with_loads
 
 import mechgraph as mg
 from mechgraph.kinematics.assembly import closed_start
+from mechgraph.response.integration import LOOKS_IN_STEP, Stops, _Limit
 from mechgraph.response.motion_equations import Chart, Columns, accelerations, in_unit_inertias
 
 T = np.linspace(0.0, 0.25, 6)
@@ -119,3 +120,22 @@ def test_a_chain_of_many_rods_falls_as_one():
     assert np.abs(r.energy.balance).max() < 1e-9 * r.energy.kinetic.max()
     fall = r.link(f"l{n // 2}").pose[-1, 1, 3] - r.link(f"l{n // 2}").pose[0, 1, 3]
     assert fall == pytest.approx(-9.81 * t**2 / 2, rel=1e-6)
+
+
+class Sinking:
+    """A coordinate that is beyond its limit from the beginning on, by ever more."""
+
+    def positions(self, t):
+        return -np.asarray(t)[None]
+
+    def rates(self, t):
+        return np.zeros((2, 1, len(t)))
+
+
+def test_what_is_passed_at_once_is_met_at_the_first_look(monkeypatch):
+    """So that the least is lost: a limit that is passed, and one that no longer presses."""
+    first = LOOKS_IN_STEP[1]
+    limit = _Limit(mg.Stop("A", lower=0.0), "lower", 0, 0, 1.0, 0.0)
+    assert Stops(None, (limit,)).met(Sinking(), 0.0, 1.0) == first
+    monkeypatch.setattr(Stops, "_pressing", lambda self, motion, times: motion.positions(times)[0])
+    assert Stops(None, (limit,), (limit,)).met(Sinking(), 0.0, 1.0) == first
