@@ -4,9 +4,6 @@ import base64
 import importlib.metadata
 import inspect
 import pickle
-import signal
-import subprocess
-import sys
 import typing
 
 import numpy as np
@@ -227,19 +224,6 @@ def test_what_is_no_chain_is_refused_with_its_line(line, tmp_path):
     path.write_text(line)
     with pytest.raises(mg.FileError, match="line 1: expected a chain as save_chains writes it"):
         list(mg.load_chains(path))
-
-
-def test_a_program_that_is_ended_leaves_no_temporary_file(tmp_path):
-    code = f"""
-import os, signal
-from mechgraph.files import whole_file
-with whole_file({str(tmp_path / "x.csv")!r}) as temporary:
-    temporary.write_text("half")
-    os.kill(os.getpid(), signal.SIGTERM)
-"""
-    ended = subprocess.run([sys.executable, "-c", code], check=False)
-    assert ended.returncode == -signal.SIGTERM
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_names_of_the_package_are_the_public_ones():

@@ -11,7 +11,6 @@ from numpy.testing import assert_allclose
 from test_curves import AXIS, CENTER, T, ring
 
 import mechgraph as mg
-from mechgraph.pairs.travelling import OnSurface
 
 GRID = np.array([(i, j, 0.3 * np.sin(0.7 * i) * np.cos(0.5 * j)) for i in range(7) for j in range(8)], dtype=float)
 
@@ -393,10 +392,6 @@ def test_surfaces_that_will_not_do(given, words):
     assert words in str(error.value)
 
 
-def test_a_place_for_a_surface_counts_as_a_row():
-    assert len(OnSurface().freedoms) == 2
-
-
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
 def test_a_point_may_miss_its_surface_by_a_part_of_its_size(size):
     """Whatever the unit of length: a millionth, no more."""
@@ -428,18 +423,3 @@ def test_a_point_is_kept_to_rounding_at_any_size(size):
         pair = mg.Pair("K", "Sp" if "surface" in shape else "Sg", "a", "b", point=point, **shape)
         assert_allclose(pair.point, point, atol=1e-13 * size)
         assert pair.replace(point=pair.point) == pair
-
-
-@pytest.mark.parametrize("turned", [False, True])
-@pytest.mark.parametrize("name", list(SAMPLE))
-def test_the_frame_on_a_surface_turns_by_its_twists(name, turned):
-    """``R' = w x R`` and ``x' = v`` along both coordinates, against differences of the frame."""
-    place = OnSurface(SAMPLE[name], INSIDE.get(name, (0.7, 0.4)), turned=turned)
-    x, h = np.array([[0.05, -0.1], [0.08, 0.03]]), 1e-5
-    _, _, twists = place.here(x)
-    for j in range(2):
-        step = h * np.eye(2)[j][:, None]
-        (p0, R0, _), (_, R, _), (p1, R1, _) = (place.here(x + k * step) for k in (-1, 0, 1))
-        w = 0.5 * np.cross(R, (R1 - R0) / (2 * h), axis=0).sum(axis=1)
-        assert_allclose(twists[:3, j], w, atol=1e-8)
-        assert_allclose(twists[3:, j], (p1 - p0) / (2 * h), atol=1e-8)

@@ -2,7 +2,10 @@
 
 import csv
 import os
+import signal
 import stat
+import subprocess
+import sys
 import threading
 import tracemalloc
 from collections.abc import Callable, Iterator
@@ -272,3 +275,16 @@ def test_a_part_of_a_solution_is_that_part() -> None:
 )  # fmt: skip
 def test_cells_that_a_spreadsheet_would_evaluate(text: str, shown: str) -> None:
     assert cell(text) == shown
+
+
+def test_a_program_that_is_ended_leaves_no_temporary_file(tmp_path):
+    code = f"""
+import os, signal
+from mechgraph.files import whole_file
+with whole_file({str(tmp_path / "x.csv")!r}) as temporary:
+    temporary.write_text("half")
+    os.kill(os.getpid(), signal.SIGTERM)
+"""
+    ended = subprocess.run([sys.executable, "-c", code], check=False)
+    assert ended.returncode == -signal.SIGTERM
+    assert list(tmp_path.iterdir()) == []

@@ -3,7 +3,13 @@
 import mechanisms
 import numpy as np
 import pytest
-from strategies import closed_mechanism, motions, with_drives, with_loads
+from identities.test_motion import gripper
+from strategies import (
+    closed_mechanism,
+    motions,
+    with_drives,
+    with_loads,
+)
 
 import mechgraph as mg
 from mechgraph.kinematics import motion_path
@@ -198,3 +204,18 @@ def test_rows_are_chosen_anew_where_those_of_the_path_are_nearly_dependent():
     s = mg.solve(mg.load("bennett"), {"A": mg.Motion(angles, 10.0)})
     assert s.checks.equilibrium.max() < 3e-13
     assert s.checks.closure.max() < 1e-12
+
+
+def test_a_position_that_does_not_close_is_not_said_to_be_out_of_reach(monkeypatch):
+    """The driver came to its value: the error says that the loops are what fails."""
+    closed = motion_path.Legs._closed
+
+    def last_one_open(*args):
+        bad = closed(*args)
+        bad[-1] = True
+        return bad
+
+    monkeypatch.setattr(motion_path.Legs, "_closed", last_one_open)
+    with pytest.raises(mg.ReachError, match="is reachable, but the closure residual stays above round-off") as error:
+        mg.kinematics(gripper(), {"X": [0.0, 0.1], "A": [0.0, 0.2]})
+    assert "out of reach" not in str(error.value)

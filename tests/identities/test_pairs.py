@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from test_surfaces import INSIDE, SAMPLE
 
 import mechgraph as mg
 from mechgraph.maths import se3
 from mechgraph.pairs import pair_type as evaluation
+from mechgraph.pairs.travelling import OnSurface
 
 PITCH = 0.37
 USER_ROWS = {
@@ -399,3 +402,22 @@ def test_reactions_without_components_are_a_basis_about_marker_b(row):
     _, S, _, W = evaluated(row, x)
     assert np.abs(W.imag).max() > 1e-4
     np.testing.assert_allclose(np.einsum("ifnt,icnt->fcnt", S, W), 0, atol=1e-13)
+
+
+def test_a_place_for_a_surface_counts_as_a_row():
+    assert len(OnSurface().freedoms) == 2
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("name", list(SAMPLE))
+def test_the_frame_on_a_surface_turns_by_its_twists(name, turned):
+    """``R' = w x R`` and ``x' = v`` along both coordinates, against differences of the frame."""
+    place = OnSurface(SAMPLE[name], INSIDE.get(name, (0.7, 0.4)), turned=turned)
+    x, h = np.array([[0.05, -0.1], [0.08, 0.03]]), 1e-5
+    _, _, twists = place.here(x)
+    for j in range(2):
+        step = h * np.eye(2)[j][:, None]
+        (p0, R0, _), (_, R, _), (p1, R1, _) = (place.here(x + k * step) for k in (-1, 0, 1))
+        w = 0.5 * np.cross(R, (R1 - R0) / (2 * h), axis=0).sum(axis=1)
+        assert_allclose(twists[:3, j], w, atol=1e-8)
+        assert_allclose(twists[3:, j], (p1 - p0) / (2 * h), atol=1e-8)
