@@ -6,11 +6,11 @@ tight; where the interpolant itself has not converged (its last coefficients say
 
 import numpy as np
 import pytest
-from arclength import fold_before_the_end
 from strategies import (
     chebyshev_rate,
     chebyshev_times,
     closed_mechanism,
+    fold_before_the_end,
     motions,
     open_chain,
     pose,
