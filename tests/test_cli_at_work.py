@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from program import app, invoke
+from rich.progress import Progress
 
 import mechgraph as mg
 from mechgraph import files
-from mechgraph.cli import options
 
 ROOT = Path(__file__).resolve().parents[1]
 COMMANDS = [command.name for command in app.registered_commands]
@@ -50,34 +50,6 @@ def test_help_stays_within_the_terminal(command: str, columns: int) -> None:
 
 
 # --- options -----------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("text", "positions", "velocity", "acceleration"),
-    [
-        ("O1=0:360:90deg", np.deg2rad([0, 90, 180, 270]), 0.0, 0.0),
-        ("O1=0:1:0.25", [0, 0.25, 0.5, 0.75], 0.0, 0.0),
-        ("O1=0deg:90deg:45deg@10", np.deg2rad([0, 45]), 10.0, 0.0),
-        ("O1=10:-20:-10deg@-2@0.5", np.deg2rad([10, 0, -10]), -2.0, 0.5),
-        ("O1.Rz=30deg@60deg/s@90deg/s^2", np.deg2rad(30), np.deg2rad(60), np.deg2rad(90)),
-        ("O1 = 0.1rad", 0.1, 0.0, 0.0),
-        ("O1=0:0.3:0.1", [0, 0.1, 0.2], 0.0, 0.0),
-        ("O1=1e-1:.25:5.e-2", [0.1, 0.15, 0.2], 0.0, 0.0),
-        ("O2.Tz=-9:-8:0.5@2", [-9.0, -8.5], 2.0, 0.0),
-    ],
-)
-def test_drive_syntax(text: str, positions: list[float], velocity: float, acceleration: float) -> None:
-    name, motion = options.parse_drive(mg.load("rcsr"), text)
-    assert name in text
-    assert np.allclose(motion.position, positions, atol=1e-15)
-    assert motion.shape == np.shape(positions)
-    assert np.allclose(motion.velocity, velocity)
-    assert np.allclose(motion.acceleration, acceleration)
-
-
-def test_a_time_span_is_converted_to_the_declared_unit() -> None:
-    assert [options.duration(text, "--for", "ms") for text in ("2s", "2ms", "2")] == [2000.0, 2.0, 2.0]
-    assert options.duration("5ms", "--for") == 0.005
 
 
 # --- completion --------------------------------------------------------------------------------------------------------
@@ -138,15 +110,15 @@ def test_solve_tells_how_far_it_is() -> None:
 @pytest.mark.parametrize("arguments", [("solve", "7r"), ("respond", "windows-2", "--for", "1s", "--rate", "A0=-1")])
 def test_bars_are_shown_on_a_terminal_alone(arguments: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
     told: list[tuple[float, float | None]] = []
-    real = options.Progress.update
+    real = Progress.update
     monkeypatch.setattr(
-        options.Progress,
+        Progress,
         "update",
         lambda bar, task, **of: (told.append((of["completed"], of["total"])), real(bar, task, **of)),
     )
     assert invoke(*arguments).exit_code == 0
     assert not told
-    monkeypatch.setattr(options, "is_terminal", lambda stream: stream is sys.stderr)
+    monkeypatch.setattr("mechgraph.cli.options.is_terminal", lambda stream: stream is sys.stderr)
     result = invoke(*arguments)
     assert result.exit_code == 0
     assert told

@@ -16,10 +16,12 @@ import scipy.stats
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from lattices import LATTICES
+from planar import of_chain
 from strategies import closed_mechanism, with_drives
 
 import mechgraph as mg
 from mechgraph.determinacy import findings, snapping
+from mechgraph.determinacy.decomposition import LinkRows, _by_pattern, _by_rank
 from mechgraph.determinacy.facts import counted_ledger
 from mechgraph.determinacy.families import kind_of
 from mechgraph.determinacy.findings import plausible
@@ -401,3 +403,18 @@ def test_what_rounding_explains(point: tuple[float, ...], axis: tuple[float, ...
     pairs = [mg.Pair("A", "R", "frame", "arm", point=point, axis=axis, second=(0, 0, 1) if axis[2] == 0 else (1, 0, 0))]
     m, L = mg.Mechanism("m", pairs=pairs), 100.0 if point[0] > 100 else 1.0
     assert plausible(m, L) == pytest.approx(allowed, rel=1e-2)
+
+
+@pytest.mark.parametrize("links", [6, 8])
+def test_pattern_and_ranks_agree(links: int) -> None:
+    """On all inversions with all drivers up to symmetry, at random places."""
+    for number, chain in enumerate(list(mg.atlas(links))[:: 1 if links == 6 else 5]):
+        for group in chain.inversions:
+            m = of_chain(chain, group[0], seed=number)
+            freedoms = mg.check(m).geometry.freedoms
+            twists = np.zeros((6, 3))
+            twists[[2, 3, 4], [0, 1, 2]] = 1.0
+            for alike in chain.drivers(group[0]):
+                rows = LinkRows(freedoms.position, np.array(alike[:1]), twists)
+                links_of = {i for i in range(links) if i != group[0]}
+                assert sorted(_by_pattern(rows, links_of)) == sorted(_by_rank(rows, links_of))

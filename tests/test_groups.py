@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from planar import Builder, named, of_chain
+from planar import Builder, named
 
 import mechgraph as mg
-from mechgraph.determinacy.decomposition import LinkRows, _by_pattern, _by_rank
 
 VERSIONS = [f"D{kind}{j}" for kind, count in ((1, 1), (2, 4), (3, 2), (4, 4), (5, 8)) for j in range(count)]
 SYMBOLS = [
@@ -117,21 +116,6 @@ def test_solving_group_by_group(seed: int) -> None:
         for link in group.links:
             poses[link] = np.asarray(alone.link(link).pose)
             assert poses[link] == pytest.approx(s.link(link).pose[1], abs=1e-11)
-
-
-@pytest.mark.parametrize("links", [6, 8])
-def test_pattern_and_ranks_agree(links: int) -> None:
-    """On all inversions with all drivers up to symmetry, at random places."""
-    for number, chain in enumerate(list(mg.atlas(links))[:: 1 if links == 6 else 5]):
-        for group in chain.inversions:
-            m = of_chain(chain, group[0], seed=number)
-            freedoms = mg.check(m).geometry.freedoms
-            twists = np.zeros((6, 3))
-            twists[[2, 3, 4], [0, 1, 2]] = 1.0
-            for alike in chain.drivers(group[0]):
-                rows = LinkRows(freedoms.position, np.array(alike[:1]), twists)
-                links_of = {i for i in range(links) if i != group[0]}
-                assert sorted(_by_pattern(rows, links_of)) == sorted(_by_rank(rows, links_of))
 
 
 def test_class_and_order() -> None:

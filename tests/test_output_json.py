@@ -13,6 +13,7 @@ import tomli_w
 from program import app, invoke
 
 import mechgraph as mg
+from mechgraph.cli import options
 from mechgraph.cli.records import COMMANDS, output_schema
 from mechgraph.files import json_text, patch, plain, schema_of
 from mechgraph.model.file_format import laid_out
@@ -172,3 +173,31 @@ def test_numbers_that_json_has_not() -> None:
     assert json.loads(json_text({"a": math.nan})) == {"a": None}
     with pytest.raises(TypeError, match="no JSON Schema"):
         schema_of(np.ndarray, {})
+
+
+@pytest.mark.parametrize(
+    ("text", "positions", "velocity", "acceleration"),
+    [
+        ("O1=0:360:90deg", np.deg2rad([0, 90, 180, 270]), 0.0, 0.0),
+        ("O1=0:1:0.25", [0, 0.25, 0.5, 0.75], 0.0, 0.0),
+        ("O1=0deg:90deg:45deg@10", np.deg2rad([0, 45]), 10.0, 0.0),
+        ("O1=10:-20:-10deg@-2@0.5", np.deg2rad([10, 0, -10]), -2.0, 0.5),
+        ("O1.Rz=30deg@60deg/s@90deg/s^2", np.deg2rad(30), np.deg2rad(60), np.deg2rad(90)),
+        ("O1 = 0.1rad", 0.1, 0.0, 0.0),
+        ("O1=0:0.3:0.1", [0, 0.1, 0.2], 0.0, 0.0),
+        ("O1=1e-1:.25:5.e-2", [0.1, 0.15, 0.2], 0.0, 0.0),
+        ("O2.Tz=-9:-8:0.5@2", [-9.0, -8.5], 2.0, 0.0),
+    ],
+)
+def test_drive_syntax(text: str, positions: list[float], velocity: float, acceleration: float) -> None:
+    name, motion = options.parse_drive(mg.load("rcsr"), text)
+    assert name in text
+    assert np.allclose(motion.position, positions, atol=1e-15)
+    assert motion.shape == np.shape(positions)
+    assert np.allclose(motion.velocity, velocity)
+    assert np.allclose(motion.acceleration, acceleration)
+
+
+def test_a_time_span_is_converted_to_the_declared_unit() -> None:
+    assert [options.duration(text, "--for", "ms") for text in ("2s", "2ms", "2")] == [2000.0, 2.0, 2.0]
+    assert options.duration("5ms", "--for") == 0.005

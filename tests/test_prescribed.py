@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 from strategies import motions, solvable
 
 import mechgraph as mg
-from mechgraph.kinematics.prescribed import driven
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 WAYS = [(engine, method) for engine in ("dense", "sparse") for method in ("loop_wrench", "newton_euler", "printed")]
@@ -317,8 +316,6 @@ def test_variants_of_a_platform_that_goes_through_poses() -> None:
     for i in range(4):
         alone = mg.solve(study.variant(i), drive, actuate=legs)
         np.testing.assert_allclose(study.outputs["leg5.effort"][i], alone["leg5"].effort[:, 0], rtol=1e-8)
-    motions = driven(hexapod("U"), drive)[1]
-    assert pickle.loads(pickle.dumps(motions)).free == motions.free != ()
 
 
 def test_out_of_reach_is_told_in_the_names_that_were_typed() -> None:

@@ -8,6 +8,7 @@ import dataclasses
 import functools
 import multiprocessing
 import os
+import pickle
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +19,10 @@ import scipy.stats
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from strategies import closed_mechanism, with_drives, with_loads
+from test_prescribed import hexapod, poses
 
 import mechgraph as mg
+from mechgraph.kinematics.prescribed import driven
 from mechgraph.model.parameters import declared
 from mechgraph.variants import study as module
 from mechgraph.variants import work
@@ -776,3 +779,8 @@ def test_no_position_solved_of_a_mechanism_with_passive_freedoms(number: str, po
     s = mg.study(m, {number: [0.06, 0.061]}, ["D.effort", "A.position"], n=2, motions={"D": positions})
     assert s.status[:, -1].tolist() == ["out of reach"] * 2
     assert np.isnan(s.outputs["D.effort"][:, -1]).all()
+
+
+def test_motions_of_a_prescribed_pose_go_to_other_processes() -> None:
+    motions = driven(hexapod("U"), {"platform": mg.Motion(*poses(np.linspace(0, 1.5, 4)))})[1]
+    assert pickle.loads(pickle.dumps(motions)).free == motions.free != ()

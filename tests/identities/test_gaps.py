@@ -6,6 +6,7 @@ import mechanisms
 import numpy as np
 import pytest
 from attack import Bars, anywhere, four_bars, just_out_of_reach, nearly_folded, solved, wrapped
+from identities.test_change_points import four_bar
 from mechanisms import Z
 
 import mechgraph as mg
@@ -13,6 +14,7 @@ from mechgraph.kinematics import reach
 from mechgraph.kinematics.motion_path import DriverPath
 from mechgraph.kinematics.prescribed import DriverMotion
 from mechgraph.kinetostatics import Pipeline
+from mechgraph.maths import singular_point
 from mechgraph.maths.tolerances import PATH
 from mechgraph.outcome import Options
 
@@ -413,3 +415,20 @@ def test_a_bush_at_rest_counts_every_turn(engine: str, turns: float) -> None:
     crank = np.array([0.4, 1.0]) * 2 * np.pi * turns
     s = mg.kinematics(mg.Mechanism("bush", None, pairs, ["A"]), {"A": crank}, engine=engine)
     assert np.allclose(s["B1"].position.ravel(), -crank / np.linalg.norm(axes[1]), atol=1e-10)
+
+
+def test_positions_beside_a_change_point_are_closed_or_are_not_solved(monkeypatch):
+    """What is interpolated there is no better than its nodes: loops left open by more than closing counts are said to be."""
+    states = singular_point.Crossing.states
+
+    def off(crossing, places):
+        return states(crossing, places) + np.where(np.abs(places - crossing.place) < 1.5e-3, 1e-6, 0.0)
+
+    m, q = four_bar(1, 2, 1, 2, np.pi / 2), np.pi / 2 + np.array([-0.1, -1e-3, 0.0, 1.8e-3, 0.1])
+    monkeypatch.setattr(singular_point.Crossing, "states", off)
+    s = mg.solve(m, {"A": q}, on_reach="flag")
+    assert list(s.status) == ["ok", "loops not closed", "loops not closed", "ok", "ok"]
+    assert np.isnan(s["A"].effort[1:3]).all()
+    assert np.isnan(s["D"].position[1:3]).all()
+    with pytest.raises(mg.ReachError, match="the closure residual stays above round-off"):
+        mg.solve(m, {"A": q})

@@ -9,9 +9,6 @@ from mechanisms import Z
 from strategies import chebyshev_rate, chebyshev_times, closed_mechanism, with_drives, with_loads, with_loads_on_links
 
 import mechgraph as mg
-from mechgraph.kinematics.prescribed import DriverMotion
-from mechgraph.kinetostatics import Pipeline
-from mechgraph.outcome import Options
 
 pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 """Random loads move passive freedoms; ``test_passive_loads`` looks at what is said of it."""
@@ -453,8 +450,7 @@ def test_passive_bodies_beside_a_change_point(begin):
     at = np.array([-0.6, -1e-2, -1e-3, 0.0, 3e-5, 1e-3, 0.2]) + begin + 0.5
 
     def at_rest(q):
-        found = Pipeline(DriverMotion(m, {"A": mg.Motion(q, 1.0)}), Options(method=None)).run().trajectory
-        return mg.Solution(found)
+        return mg.kinematics(m, {"A": mg.Motion(q, 1.0)}, on_reach="flag")
 
     whole = at_rest(at)
     for pick in ([4], [1, 2, 3]):
