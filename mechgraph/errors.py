@@ -47,16 +47,6 @@ def did_you_mean(near: Sequence[str]) -> str:
     return f"did you mean {' or '.join(near)}?" if near else ""
 
 
-def unknown(what: str, name: object, known: Iterable[str], also: Iterable[str] = ()) -> str:
-    """The fault of a name that is none of the ``known`` ones: those that may be meant (of ``also``, too), and all."""
-    names, low = list(known), dict[str, str]()
-    # where there are more, a search for each of many wrong names takes too long
-    for one in [*names, *also] if len(names) <= 500 else ():
-        low.setdefault(one.lower(), one)
-    hint = did_you_mean([low[one] for one in near_names(str(name).lower(), low, 0.6)[:2]])
-    return f"unknown {what} {name!r}{hint and f'; {hint}'} ({what}s: {listed(names) or 'none'})"
-
-
 def counted(number: int, name: str) -> str:
     """``1 node of the path``, ``2 nodes of the path``."""
     first, *rest = name.split(" ", 1)

@@ -26,7 +26,7 @@ from typing import Annotated, Any, Literal, NamedTuple, ParamSpec, TypeVar, Unio
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mechgraph.errors import DeclarationError, MissingExtraError, did_you_mean, near_names, unknown
+from mechgraph.errors import DeclarationError, MissingExtraError, did_you_mean, listed, near_names
 from mechgraph.memo import ASKED, Remembers, as_asked, carried
 
 BASE_UNITS = ("length", "mass", "time")
@@ -327,6 +327,17 @@ def wrong(value: Any, what: str, wanted: str) -> str:
     """The fault of a value that is not what is ``wanted``."""
     hint = "; quantities are converted where the mechanism declares units that they fit, else give plain numbers"
     return f"{what} = {shown(value)}: expected {wanted}{hint if has_quantity(value) else ''}"
+
+
+def unknown(what: str, name: object, known: Iterable[str], also: Iterable[str] = ()) -> str:
+    """The fault of a name that is none of the ``known`` ones: those that may be meant (of ``also``, too), and all."""
+    names, low = list(known), dict[str, str]()
+    # where there are more, a search for each of many wrong names takes too long
+    for one in [*names, *also] if len(names) <= 500 else ():
+        low.setdefault(one.lower(), one)
+    text = name if isinstance(name, str) else shown(name)
+    hint = did_you_mean([low[one] for one in near_names(text.lower(), low, 0.6)[:2]])
+    return f"unknown {what} {shown(name)}{hint and f'; {hint}'} ({what}s: {listed(names) or 'none'})"
 
 
 P = ParamSpec("P")

@@ -125,6 +125,11 @@ WRONG = {
     "a study of a list": (lambda: mg.study(M, ["crank.mass"], "A.effort"), "expected a mapping"),
     "a study with a wrong sampling": (lambda: mg.study(M, {"crank.mass": [1]}, "A.effort", sampling=[]), "sampling = []"),
     "a study of 1e12 variants": (lambda: mg.study(M, {"crank.mass": [1]}, "A.effort", n=10**12), "at most"),
+    "a frame of thousands of digits": (lambda: door(frame=10**5000), "unknown link an integer of 16610 bits"),
+    "a name that is an array": (
+        lambda: mg.PairType("Q", name=np.ones(2), freedoms=["Rz"], reactions=["Fx"]),
+        "name = array([1., 1.]): expected a text",
+    ),
     "a spring of a list": (lambda: door(loads=[mg.Spring(["b"], "c", "P", (0, 0, 0), stiffness=1)]), "a = ['b']: expected a text"),
     "what is read only once": (lambda: mg.identify(M, joints=iter([1])), "joints = (1,): expected a list, each a Multiple"),
     "drivers read only once": (lambda: mg.groups(M, (x for x in [[1]])), "drives = ([1],): expected a text or a list"),

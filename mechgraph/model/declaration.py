@@ -19,7 +19,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from mechgraph.errors import DeclarationError, unknown
+from mechgraph.errors import DeclarationError
 from mechgraph.fields import (
     BY_FREEDOM,
     FACTS,
@@ -42,7 +42,7 @@ from mechgraph.model.pair import NO_POINTS, Link, Marker, Pair, largest_cosine
 from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.pairs.contact_types import travels
 from mechgraph.pairs.pair_type import PairType
-from mechgraph.quantities import BASE_UNITS, LENGTH, PURE, column, is_numeric, shown, without_units, wrong
+from mechgraph.quantities import BASE_UNITS, LENGTH, PURE, column, is_numeric, shown, unknown, without_units, wrong
 
 START = {
     "type": "object",

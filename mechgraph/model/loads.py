@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Protocol, S
 import numpy as np
 import scipy
 
-from mechgraph.errors import DeclarationError, unknown
+from mechgraph.errors import DeclarationError
 from mechgraph.fields import (
     BREAKS,
     FREEDOM_NAME,
@@ -48,6 +48,7 @@ from mechgraph.quantities import (
     is_numeric,
     real_array,
     shown,
+    unknown,
     wrong,
 )
 

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from mechgraph import methods
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table
-from mechgraph.errors import DeclarationError, MechgraphWarning, counted, unknown
+from mechgraph.errors import DeclarationError, MechgraphWarning, counted
 from mechgraph.fields import plain, same_fields
 from mechgraph.maths.se3 import Array, identity, inverse
 from mechgraph.maths.tolerances import Tolerances
@@ -47,6 +47,7 @@ from mechgraph.quantities import (
     shown,
     unit_hints,
     unit_of,
+    unknown,
     without_units,
     wrong,
 )

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from mechgraph.errors import ContentError, DeclarationError, FileError, unknown
+from mechgraph.errors import ContentError, DeclarationError, FileError
 from mechgraph.fields import (
     BY_FREEDOM,
     COEFFICIENTS,
@@ -39,7 +39,7 @@ from mechgraph.pairs.curves import Curve
 from mechgraph.pairs.pair_type import TABLE as PAIR_TABLE
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.pairs.surfaces import Surface
-from mechgraph.quantities import is_numeric, real_array, shown, wrong
+from mechgraph.quantities import is_numeric, real_array, shown, unknown, wrong
 
 __all__ = ["library_names", "library_path"]
 

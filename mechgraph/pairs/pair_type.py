@@ -370,7 +370,7 @@ class PairType:
                 parts[what] = tuple(c for item in items if (c := read_component(item, faults, what[:-1])) is not None)
         if self.efforts is None:
             parts["efforts"] = tuple(_dual_effort(f, k) for f, k in zip(freedoms, before, strict=True))
-        named = {"name": self.symbol} if self.name == "" else {}
+        named = {"name": self.symbol} if isinstance(self.name, str) and not self.name else {}
         vars(self).update(freedoms=freedoms, steps=steps, frame_before=before, **parts, **named)
         return faults
 

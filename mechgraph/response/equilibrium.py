@@ -447,7 +447,7 @@ class Linearized(Shown):
             "damping",
             "greatest amplitudes",
         )
-        count = f"{counted(len(self.freedoms), 'independent freedom')}: {listed(self.freedoms)}"
+        count = f"Independent: {counted(len(self.freedoms), 'freedom')}, {listed(self.freedoms)}"
         return Document(f"Small motions of {self.mechanism.name}", (Paragraph(f"{count}."), Table(head, rows, "rrrl")))
 
     def _told(self, shape: Mapping[str, complex]) -> list[str]:
