@@ -57,7 +57,7 @@ from mechgraph.kinematics.motion_path import FARTHEST, DriverPath, Positions, St
 from mechgraph.kinematics.passive_rest import unspun
 from mechgraph.kinematics.prescribed import Actuators, DriverMotion
 from mechgraph.kinematics.rates import PassiveMotion, PassiveMotions, are_alone, distance_to_dead_point
-from mechgraph.kinematics.reach import away_from_poles, ends_at_pole, follow
+from mechgraph.kinematics.reach import away_from_poles, follow
 from mechgraph.kinematics.solver import MotionEngineName, closure_solver, engine_for, solver_at_start
 from mechgraph.kinematics.state import ClosureSolver, Configuration
 from mechgraph.kinematics.system import System
@@ -333,12 +333,7 @@ def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exceptio
         why = "is not reachable (status 'out of reach'): no finite motion keeps the loops closed from "
         why += f"{_listed(reached.items())} (see mechgraph.check)"
     if outcome.found.left[first]:
-        why = f"is not reachable (status 'out of reach'): {outcome.found.left[first]} reaches the end of its curve or surface. {FLAG}"
-    elif pole := ends_at_pole(line.m, line.system, outcome.found, int(outcome.found.track[first])):
-        why = (
-            f"lies behind a pole of the sphere of {pole} (last position {_listed(reached.items())}); its axis cannot change "
-            "because Tu or Tv is driven, loaded or coupled. Give the surface another axis"
-        )
+        why = f"is not reachable (status 'out of reach'): {outcome.found.left[first]}. {FLAG}"
     asked = _listed(zip(line.drive.names, wanted, strict=True))
     text = f"mechanism {line.m.name!r}: position {first} ({asked}) {why}"
     if not dead:

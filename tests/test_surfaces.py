@@ -310,11 +310,25 @@ def test_a_path_over_a_pole_with_a_tolerance(off):
 
 def test_a_pole_that_is_kept_is_named_where_it_ends_the_path():
     m = over_the_pole(1e-9, loads=[mg.Effort("K.Tu", 1.0)])
-    with pytest.raises(mg.ReachError, match=r"lies behind a pole of the sphere of K .* Give the surface another axis"):
+    with pytest.raises(mg.ReachError, match=r"lies behind a pole of the sphere of K, .* give the surface another axis"):
         mg.solve(m, {"X": [0.0, -0.3, -0.8]})
     other = m.replace(pairs=[*m.pairs[:2], m.pair("K").replace(surface=mg.Surface.sphere(radius=1.0, axis=(0, 1, 0)))])
     found = mg.solve(other, {"X": [0.0, -0.3, -0.8]})["Z"].position[-1, 0]
     assert found == pytest.approx(np.sqrt(0.91) - np.sqrt(0.75), abs=1e-12)
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize("off", [9e-5, 1e-6, 1e-7, 1e-9])
+def test_beside_a_pole_that_is_kept_a_path_ends_at_one_place(off, engine):
+    """At the way 1e-4 from it, in whatever company and with either engine; farther away and right over it goes on."""
+    far = np.sqrt(1e-8 - off**2)
+    m = over_the_pole(off, loads=[mg.Effort("K.Tu", 1.0)])
+    for x in ([-0.2, -0.5 + 1.001 * far, -0.5 + 0.999 * far, -0.5, -0.9], [-0.9], [-0.5 + 0.999 * far]):
+        s = mg.solve(m, {"X": x}, engine=engine, on_reach="flag")
+        assert s.status.tolist() == ["ok" if at > -0.5 + far else "out of reach" for at in x]
+    for off in (1.1e-4, 0.0):
+        m = over_the_pole(off, loads=[mg.Effort("K.Tu", 1.0)])
+        assert mg.solve(m, {"X": [-0.2, -0.9]}, engine=engine).status.tolist() == ["ok", "ok"]
 
 
 @pytest.mark.slow

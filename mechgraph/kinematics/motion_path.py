@@ -190,7 +190,7 @@ class Positions:
     gained: Array | None = None
     spin: Array | None = None
     left: NDArray[Any] = field(default_factory=lambda: np.zeros(0, dtype=object))
-    """The freedom that leaves its range before a position, or an empty text."""
+    """What ends the path before a position at the end of a curve or surface or beside a pole, or an empty text."""
 
     def __post_init__(self) -> None:
         if not self.left.size:

@@ -60,25 +60,12 @@ def away_from_poles(m: Mechanism, system: System, found: Positions) -> Mechanism
         place, own = placed_surface(pair.type), slice(system.first_column[k], system.first_column[k + 1])
         free = pair.surface is not None and bound.isdisjoint(pair.freedom_names)
         # angle from a pole below which too many digits are lost: nearer, accelerations are off by more than 1e-12
-        if place is None or not free or not (place.to_pole(q_near[own][:2]) < 0.01).any():
+        if place is None or not free or not (_norm(place.from_pole(q_near[own][:2])) < 0.01).any():
             continue
         assert pair.surface is not None
         pairs[k] = pair.reshaped(surface=pair.surface.with_poles_far_from(place.points(q[own][:2])))
         start |= dict(zip(pair.freedom_names, _renamed(pair, pairs[k], begin[own]).tolist(), strict=True))
     return m.replace(pairs=pairs, start=start) if pairs != list(m.pairs) else None
-
-
-def ends_at_pole(m: Mechanism, system: System, found: Positions, track: int) -> str:
-    """The pair on a sphere at whose pole a track ends; empty where it does not."""
-    nodes = found.nodes_of(track)
-    for k, pair in enumerate(m.pairs if len(nodes) else ()):
-        place = placed_surface(pair.type) if pair.surface is not None else None
-        if place is not None:
-            q = system.coordinates_of(nodes.x[:, -1:])[system.first_column[k] :][:2]
-            # angle from a pole below which a path that ends there ends because of it
-            if place.to_pole(q)[0] < 1e-4:
-                return pair.name
-    return ""
 
 
 def _renamed(old: Pair, new: Pair, q: Array) -> Array:
@@ -109,18 +96,58 @@ def beyond(system: System, x: Array) -> Array:
 
 
 def end_at_ranges(path: DriverPath, found: Positions) -> None:
-    """End every track where a coordinate leaves its range, and take away its positions behind; ``found.left`` says which it is."""
+    """End every track where a coordinate leaves its range, and take away its positions behind; ``found.left`` says so."""
     system = path.system
     over = np.flatnonzero((beyond(system, found.x) > BEYOND_END).any(axis=0))
     outside = np.full(len(found.tracks.end), np.inf)
     np.minimum.at(outside, found.track[over], found.place[over])
     ends, node = range_ends(path, found.follower, found.tracks.nodes, outside)
+    if len(node):
+        first = system.limits[0][np.argmax(beyond(system, node.x), axis=0)]
+        names = [system.m.freedom_names()[i] for i in first.tolist()]
+        _cut(found, ends, node, [f"{name} reaches the end of its curve or surface" for name in names])
+
+
+def end_beside_poles(path: DriverPath, found: Positions) -> None:
+    """End every track that passes a pole of a sphere closely where ``bound_freedoms`` keep its axis; one right over a pole goes on.
+
+    Beside the pole rates grow as the inverse of the distance, so that how far a path seems to go is a matter of conditions.
+    """
+    system, nodes = path.system, found.tracks.nodes
+    bound, ends, why = system.m.bound_freedoms, np.full(len(found.tracks.end), np.inf), dict[int, str]()
+    for k, pair in enumerate(system.m.pairs):
+        place = placed_surface(pair.type) if pair.surface is not None else None
+        if place is None or bound.isdisjoint(pair.freedom_names):
+            continue
+        w = place.from_pole(system.coordinates_of(nodes.x)[system.first_column[k] :][:2])
+        if not np.isfinite(w).all():
+            continue
+        # between nodes on a line: beside a pole they are as near to each other as to it
+        begin, step = w[:, :-1], np.diff(w)
+        same = (np.diff(nodes.track) == 0) & (nodes.place[:-1] >= 0.0)
+        size = np.maximum((step * step).sum(axis=0), 1e-300)
+        foot = -(begin * step).sum(axis=0) / size
+        off, least = _norm(begin + foot * step), _norm(begin + np.clip(foot, 0.0, 1.0) * step)
+        # the ways from a pole over the radius at which accelerations keep eight digits, and which are rounding
+        for i in np.flatnonzero(same & (least < (near := 1e-4)) & (off > 1e-12)):
+            s = max(0.0, foot[i] - np.sqrt((near**2 - off[i] ** 2) / size[i]))
+            there = nodes.place[i] + s * (nodes.place[i + 1] - nodes.place[i])
+            if there < ends[track := int(nodes.track[i])]:
+                ends[track], why[track] = there, pair.name
     left = np.flatnonzero(np.isfinite(ends))
-    if not left.size:
-        return
-    first = system.limits[0][np.argmax(beyond(system, node.x), axis=0)]
-    names = [system.m.freedom_names()[i] for i in first.tolist()]
-    for i, track in enumerate(left.tolist()):
+    if left.size:
+        kept = "whose axis cannot change because Tu or Tv is driven, loaded or coupled; give the surface another axis"
+        said = [f"it lies behind a pole of the sphere of {why[track]}, {kept}" for track in left.tolist()]
+        _cut(found, ends, _nodes_at(path, found.follower, nodes, left, ends[left]), said)
+
+
+def _norm(w: Array) -> Array:
+    return np.asarray(np.sqrt((w * w).sum(axis=0)))
+
+
+def _cut(found: Positions, ends: Array, node: Nodes, names: list[str]) -> None:
+    """Take away the positions behind the ``ends (V,)`` of tracks, infinite where they have none, with a node and what to say each."""
+    for i, track in enumerate(np.flatnonzero(np.isfinite(ends)).tolist()):
         after = found.place > ends[track]
         # a later period begins behind the whole first one
         gone = (found.track == track) & (after if found.turns is None else after | (found.turns > 0))
@@ -161,14 +188,18 @@ def range_ends(path: DriverPath, follower: Follower, nodes: Nodes, outside: Arra
         low, high = np.where(over, low, middle), np.where(over, middle, high)
     ends = np.full(V, np.inf)
     ends[left] = low
-    drive = follower.paths.drive(left, low)
-    first = nodes.take(mine)
-    first = first.take(np.searchsorted(first.track, left))
-    x, on = first.x, low > 0.0
+    return ends, _nodes_at(path, follower, nodes, left, low)
+
+
+def _nodes_at(path: DriverPath, follower: Follower, nodes: Nodes, tracks: Index, place: Array) -> Nodes:
+    """One node of each of the tracks, at a place between its nodes or at its first one."""
+    drive, first = follower.paths.drive(tracks, place), nodes.take(nodes.place >= 0.0)
+    first = first.take(np.searchsorted(first.track, tracks))
+    x, on, between = first.x, place > 0.0, Interpolation(path, nodes)
     if on.any():
-        x[:, on] = between(between.find(left[on], low[on]), low[on], drive[:, on])
-    closed = follower.newton.nodes(x, drive, left, first.which, PATH.node)
-    return ends, Nodes.closed(closed, drive, left, low, sure=True)
+        x[:, on] = between(between.find(tracks[on], place[on]), place[on], drive[:, on])
+    closed = follower.newton.nodes(x, drive, tracks, first.which, PATH.node)
+    return Nodes.closed(closed, drive, tracks, place, sure=True)
 
 
 def _with_turns(path: DriverPath, follower: Follower, nodes: Nodes) -> Nodes:
@@ -298,6 +329,7 @@ def _within_ranges(path: DriverPath, requests: list[Request], total: int) -> Pos
     """All positions, each polygon up to where a coordinate leaves its range."""
     found = along_polygons(path, requests, total)
     end_at_ranges(path, found)
+    end_beside_poles(path, found)
     return found
 
 
@@ -464,6 +496,7 @@ def follow(path: DriverPath, requests: list[Request], total: int) -> Positions:
         return along_polygons_with_gaps(path, requests, total)
     found = _along_curves(path, requests, total)
     end_at_ranges(path, found)
+    end_beside_poles(path, found)
     return found
 
 

@@ -84,9 +84,9 @@ class Surface(Described):
         """The same surface by parameters that say something at a point ``p (3,)`` of it; itself where there is nothing better."""
         return self
 
-    def to_pole(self, u: Array, v: Array) -> Array:
-        """Angle ``(...)`` of places from a pole that is none of the surface but of its parameters; infinite where there is none."""
-        return np.full(np.shape(u), np.inf)
+    def from_pole(self, u: Array, v: Array) -> Array:
+        """Ways ``(2, ...)`` from a pole of the parameters that is none of the surface, over the radius; infinite without one."""
+        return np.full((2, *np.shape(u)), np.inf)
 
     def with_poles_far_from(self, p: Array) -> Surface:
         """The same surface by parameters that have their poles far from points ``(3, n)`` of it; itself where there is no better."""
@@ -299,9 +299,9 @@ class Sphere(Turned):
         near = np.linalg.norm(np.cross(self._basis[2], off)) < np.sin(0.25) * np.linalg.norm(off)
         return self.replace(axis=self._basis[0], second=self._basis[1]) if near else self
 
-    def to_pole(self, u: Array, v: Array) -> Array:
-        """From the nearer pole."""
-        return np.asarray(np.abs(np.arcsin(np.cos(v))))
+    def from_pole(self, u: Array, v: Array) -> Array:
+        """At right angles to the axis of the poles."""
+        return np.cos(v) * np.stack([np.cos(u), np.sin(u)])
 
     def with_poles_far_from(self, p: Array) -> Sphere:
         """About the axis that keeps far from the points, and from those opposite to them."""

@@ -413,10 +413,10 @@ class OnSurface(Travelling):
         """Points ``(3, ...)`` at coordinates ``(2, ...)``, in the frame of the link."""
         return self.here(x)[0]
 
-    def to_pole(self, x: Array) -> Array:
-        """Angle ``(...)`` at coordinates ``(2, ...)`` from a pole of the parameters."""
+    def from_pole(self, x: Array) -> Array:
+        """Ways ``(2, ...)`` from a pole of the parameters at coordinates ``(2, ...)``, over the radius."""
         assert self.surface is not None
-        return self.surface.to_pole(*self._parameters(x))
+        return self.surface.from_pole(*self._parameters(x))
 
     def coordinates_at(self, p: Array) -> Array:
         """Coordinates ``(2,)`` of the point of the surface that is nearest to ``p (3,)``."""
