@@ -130,6 +130,14 @@ WRONG = {
         lambda: mg.PairType("Q", name=np.ones(2), freedoms=["Rz"], reactions=["Fx"]),
         "name = array([1., 1.]): expected a text",
     ),
+    "masses that are not as many as tensors": (
+        lambda: mg.inertia.shifted(np.ones((3, 3, 3)), [1.0, 2.0], [0, 0, 1]),
+        "shifted: shape mismatch",
+    ),
+    "a film without frames": (
+        lambda: mg.show.animate(mg.kinematics(mg.load("four-bar"), {"A": 0.1}), "x.gif", frames=()),
+        "frames = (): expected one or more",
+    ),
     "a spring of a list": (lambda: door(loads=[mg.Spring(["b"], "c", "P", (0, 0, 0), stiffness=1)]), "a = ['b']: expected a text"),
     "what is read only once": (lambda: mg.identify(M, joints=iter([1])), "joints = (1,): expected a list, each a Multiple"),
     "drivers read only once": (lambda: mg.groups(M, (x for x in [[1]])), "drives = ([1],): expected a text or a list"),

@@ -276,6 +276,10 @@ def shifted(inertia: ArrayLike, mass: ArrayLike, offset: ArrayLike) -> Array:
         raise DeclarationError(
             "inertia", [f"shifted: expected {wanted}, got {', '.join(map(shown, (inertia, mass, offset)))}"]
         )
+    try:
+        np.broadcast_shapes(tensor.shape[:-2], masses.shape, away.shape[:-1])
+    except ValueError as error:
+        raise DeclarationError("inertia", [f"shifted: {error}"]) from None
     if not (np.isfinite(tensor).all() and np.isfinite(away).all()):
         raise DeclarationError("inertia", ["shifted: inertia and offset must be finite"])
     if not (np.isfinite(masses) & (masses >= 0)).all():
