@@ -253,8 +253,11 @@ class Pipeline:
         nodes = found.tracks.nodes
         here = path.at(nodes.x, nodes.drive, nodes.track)
         f = path.factored(here, nodes.which)
+        # on a track that ends sooner than the shortest trial step nothing moves but what a shaky start lets pass as rounding
+        reach = np.zeros(len(found.tracks.end))
+        np.maximum.at(reach, nodes.track, nodes.place)
         open_ = np.isin(nodes.track, nodes.track[here.closure > CLOSED])
-        closed = np.flatnonzero(~open_ & (f.condition <= PATH.singular))
+        closed = np.flatnonzero(~open_ & (f.condition <= PATH.singular) & (reach[nodes.track] > 0.003))
         if not closed.size:
             return
         some = here.part(closed)
