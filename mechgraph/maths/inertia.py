@@ -345,18 +345,26 @@ def physical_faults(inertia: Any, tol: float = 1e-9) -> list[str]:
 @door
 def symmetric(inertia: Array, tol: float = 1e-9) -> NDArray[np.bool_]:
     """Which tensors ``(3, 3, ...)`` are symmetric, to a part of their largest entries."""
+    inertia = _tensors(inertia)
     return np.asarray(
         np.abs(inertia - inertia.swapaxes(0, 1)).max(axis=(0, 1)) <= tol * np.abs(inertia).max(axis=(0, 1))
     )
 
 
+@door
 def physical(inertia: Array, tol: float = 1e-9) -> NDArray[np.bool_]:
     """Which symmetric tensors ``(3, 3, ...)`` a body can have: ``a >= 0`` and ``a + b >= c`` for principal moments a <= b <= c."""
-    if np.shape(inertia)[:2] != (3, 3):
-        raise DeclarationError("inertia", [wrong(inertia, "tensors", "an array (3, 3, ...)")])
+    inertia = _tensors(inertia)
     moments = np.linalg.eigvalsh(np.moveaxis(inertia, (0, 1), (-2, -1)))
     slack = tol * np.abs(inertia).max(axis=(0, 1))
     return np.asarray((moments[..., 0] >= -slack) & (moments[..., 0] + moments[..., 1] >= moments[..., 2] - slack))
+
+
+def _tensors(inertia: Array) -> Array:
+    array = real_array(inertia)
+    if array is None or array.shape[:2] != (3, 3) or not np.isfinite(array).all():
+        raise DeclarationError("inertia", [wrong(inertia, "tensors", "an array (3, 3, ...) of finite numbers")])
+    return array
 
 
 def _symmetric(tensor: Array) -> Array:
