@@ -145,6 +145,12 @@ def test_files_as_the_suffix_says(tmp_path: Path) -> None:
     assert "file of the mechanism" in bad("save", tmp_path / "m.toml", "--out", tmp_path / "m.toml")
 
 
+def test_letters_are_a_loop_and_a_word_of_the_description_finds_a_mechanism() -> None:
+    assert "mobility 2 for general geometry" in run("check", "RSSP").stdout
+    assert "did you mean marghitu-2-3?" in bad("check", "sarrus")
+    assert "nor letters of pairs" in bad("check", "RRX")
+
+
 def test_messages_name_the_options_of_the_command(tmp_path: Path) -> None:
     at = ("--drive", "O1=0:360:30deg")
     assert "Pass --on-reach flag to keep the reachable" in run("loads", "rcsr", "link2", *at).stderr

@@ -104,6 +104,7 @@ WRONG = {
     "an option that a call lacks": (lambda: mg.solve(M, {"A": 0.0}, on_rech="flag"), "did you mean on_reach? It takes m"),
     "a field that a copy lacks": (lambda: M.replace(load=[]), "unknown field 'load'; did you mean loads"),
     "a freedom in small letters": (lambda: mg.solve(M, {"a": 0.0}), "unknown freedom 'a'; did you mean A? (freedoms: A.Rz"),
+    "a link that is to be moved": (lambda: mg.solve(M, {"cuopler": np.eye(4)}), "unknown freedom 'cuopler'; did you mean coupler?"),
     "a link that is misspelled": (lambda: M.link("crnk"), "unknown link 'crnk'; did you mean crank? (links: frame"),
     "a base unit that is misspelled": (lambda: door(units={"lenght": "m"}), "unknown base unit 'lenght'; did you mean length?"),
     "a unit that is no text": (lambda: door(units={"length": 3}), "units: length = 3: expected the name of a unit"),

@@ -137,7 +137,34 @@ def test_links_lead_somewhere(page: Path) -> None:
         assert not anchor or anchor in anchors(place), f"{target}#{anchor}"
 
 
-@pytest.mark.parametrize("page", ["ARCHITECTURE.md", "CONTRIBUTING.md"])
+def test_the_number_of_stored_questions_is_current() -> None:
+    count = sum(len(json.loads(file.read_text("utf-8"))) for file in (ROOT / "tests" / "cases").glob("*.json"))
+    assert f"| {count} stored questions" in (ROOT / "docs" / "verified.md").read_text(encoding="utf-8")
+
+
+def test_tables_of_the_file_format_are_read(tmp_path: Path) -> None:
+    """Every block of the page of files, beside what it needs."""
+    base = 'schema = 1\nname = "page"\n' + "".join(
+        f'[[pair]]\nname = "{name}"\ntype = "R"\na = "{a}"\nb = "{b}"\npoint = [0, 0, {x}]\naxis = [0, 1, 0]\n'
+        for name, a, b, x in (
+            ("A", "frame", "crank", 0),
+            ("B", "crank", "coupler", 1),
+            ("D", "cam", "lever", 2),
+            ("F", "frame", "cam", 3),
+        )
+    )
+    page = (ROOT / "library" / "README.md").read_text(encoding="utf-8")
+    blocks = [body for kind, body in player.BLOCK.findall(page) if kind == "toml"]
+    assert len(blocks) == 8
+    for block in blocks:
+        own = {one["name"] for one in tomllib.loads(block).get("pair", ())}
+        parts = [part for part in base.split("[[pair]]\n") if not any(f'name = "{name}"' in part for name in own)]
+        file = tmp_path / "page.toml"
+        file.write_text("[[pair]]\n".join(parts) + block, encoding="utf-8")
+        assert mg.load(file).pairs
+
+
+@pytest.mark.parametrize("page", ["ARCHITECTURE.md", "CONTRIBUTING.md", "docs/verified.md", "docs/comparison.md"])
 def test_every_file_that_is_named_is_there(page: str) -> None:
     text = (ROOT / page).read_text(encoding="utf-8")
     named = set(re.findall(r"`((?:mechgraph|tests|docs|library|examples)/[^`*]*)`", text))

@@ -445,15 +445,18 @@ OverTime = Annotated[bool, typer.Option("--over-time", help=OVER_TIME)]
 
 
 def loaded(name: str) -> mg.Mechanism:
-    """A mechanism of the library, else of a file; an unknown name is answered with its near matches."""
+    """A mechanism of the library, else of a file, else a loop by its letters; an unknown name is answered with its near matches."""
     known = mg.library()
     if name in known:
         return mg.load(name)
     path = Path(name)
     if os.path.lexists(path) or path.suffix.lower() in (".toml", *READERS) or len(path.parts) > 1:
         return mg.load(path)
-    hint = did_you_mean(near_names(name.lower(), known)) or f"available: {', '.join(known)}"
-    raise mg.FileError(name, f"neither a library mechanism nor an existing file; {hint}")
+    with suppress(mg.DeclarationError):
+        return mg.chain(name)
+    near = near_names(name.lower(), known) or [one for one in known if name.lower() in mg.load(one).description.lower()]
+    hint = did_you_mean(near) or f"available: {', '.join(known)}"
+    raise mg.FileError(name, f"neither a library mechanism, an existing file, nor letters of pairs (RSSR); {hint}")
 
 
 def refuse_own_file(out: Path, mechanism: str) -> None:

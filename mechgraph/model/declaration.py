@@ -211,7 +211,7 @@ class Parts(Formatted, Once):
             return f"freedom {shown(name)}: expected a name such as 'B' or 'B.Tz'"
         k = self._place_of_named(name)
         if k is None:
-            return unknown("freedom", name, self.freedom_names(), self.pair_index)
+            return unknown("freedom", name, self.freedom_names(), (*self.pair_index, *self.link_index))
         pair = self.pairs[k]
         names = pair.freedom_names
         if name in names:
