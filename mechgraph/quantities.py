@@ -26,7 +26,15 @@ from typing import Annotated, Any, Literal, NamedTuple, ParamSpec, TypeVar, Unio
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mechgraph.errors import DeclarationError, MissingExtraError, did_you_mean, listed, near_names
+from mechgraph.errors import (
+    DeclarationError,
+    MechgraphError,
+    MissingExtraError,
+    did_you_mean,
+    listed,
+    near_names,
+    unknown,
+)
 from mechgraph.memo import ASKED, Remembers, as_asked, carried
 
 BASE_UNITS = ("length", "mass", "time")
@@ -401,10 +409,18 @@ def door(function: Callable[P, R]) -> Callable[P, R]:
         try:
             with np.errstate(**FLOATING):
                 return function(*args, **named)
+        except MechgraphError as error:
+            if asked is not None and error.args and ASIDE not in error.args[0]:
+                error.args = (f"{error.args[0]}\n  {ASIDE} {asked.changed}", *error.args[1:])
+            raise
         finally:
             ASKED.reset(token)
 
     return entered
+
+
+ASIDE = "Decided with tolerances other than the default ones:"
+"""What is said after an error that they may have made."""
 
 
 def _call_fault(error: TypeError, named: Iterable[str], signature: inspect.Signature) -> str:

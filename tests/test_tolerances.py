@@ -132,6 +132,19 @@ def test_other_tolerances_are_not_for_the_kernel(compiled) -> None:
         mg.solve(mg.load("four-bar"), engine="compiled", tolerances=SHORT)
 
 
+def test_an_error_under_other_tolerances_names_them() -> None:
+    """So that the geometry is not blamed for them; once, and nothing under the default ones."""
+    coarse = mg.Tolerances(rank={"loop": 0.9})
+    with pytest.raises(mg.DeclarationError, match="too far apart") as caught:
+        mg.solve(mg.load("rcsr"), tolerances=coarse)
+    assert str(caught.value).endswith("other than the default ones: rank.loop = 0.9 (default 1e-09)")
+    assert str(caught.value).count("other than") == 1
+    assert mg.Tolerances().changed == ""
+    with pytest.raises(mg.DeclarationError) as caught:
+        mg.solve(mg.load("rcsr"), {"X": 0.0})
+    assert "other than" not in str(caught.value)
+
+
 def test_every_number_shows_its_reason() -> None:
     text = repr(mg.Tolerances(rank={"loop": 1e-6}))
     assert "closed = 1e-14" in (mg.Tolerances.__doc__ or "")

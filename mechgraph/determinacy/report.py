@@ -644,7 +644,9 @@ def undriven_error(m: Mechanism, free: Sequence[FreeMotion]) -> IndeterminateErr
     """Freedoms are left that are neither driven nor passive."""
     report = check(m)
     own = m.freedom_names()
-    names = listed(dict.fromkeys(name for motion in free for name in motion.names if name in own), 8)  # names worth reading in a message
+    names = listed(
+        dict.fromkeys(name for motion in free for name in motion.names if name in own), 8
+    )  # names worth reading in a message
     many = len(free) > 1
     count, more = (f"{len(free)} freedoms are", f"{len(free)} drivers") if many else ("1 freedom is", "one driver")
     return IndeterminateError(

@@ -6,7 +6,7 @@ never when a module is loaded.
 """
 
 # annotations are read at run time here: they hold the reasons
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Annotated, Any, ClassVar, cast, get_type_hints
 
@@ -525,15 +525,21 @@ class Tolerances:
         """What calls go by: None where these are the default ones."""
         return None if self == DEFAULT else self
 
+    @property
+    def changed(self) -> str:
+        """The numbers that are not the default ones."""
+        return ", ".join(told for told, other, _ in self._told() if other)
+
     def __repr__(self) -> str:
-        lines = []
+        return "\n".join(f"{told}: {why}" for told, _, why in self._told())
+
+    def _told(self) -> Iterator[tuple[str, bool, str]]:
         for name, part in PARTS.items():
             mine, usual = getattr(self, name), part()
             for f, why in _reasons(part).items():
-                value = getattr(mine, f)
-                other = "" if value == getattr(usual, f) else f" (default {getattr(usual, f):g})"
-                lines.append(f"{name}.{f} = {value:g}{other}: {why}")
-        return "\n".join(lines)
+                value, default = getattr(mine, f), getattr(usual, f)
+                other = value != default
+                yield f"{name}.{f} = {value:g}{f' (default {default:g})' if other else ''}", other, why
 
 
 Tolerances.__doc__ = f"{Tolerances.__doc__}\n    All of them, with their default values:\n{_listed()}\n"
