@@ -262,10 +262,8 @@ def numbers(s: mg.Solution) -> str:
         if len(m.drives) == 1 and np.abs(effort).max() > 1e-9:
             turns = m.turns(freedom)
             unit = unit_of(m.units, MOMENT if turns else FORCE)
-            text += (
-                f" Driver {'torque' if turns else 'force'} {effort.min():.3g} to {effort.max():.3g} {unit}".rstrip()
-                + "."
-            )
+            ends = " to ".join(dict.fromkeys((f"{effort.min():.3g}", f"{effort.max():.3g}")))
+            text += f" Driver {'torque' if turns else 'force'} {ends} {unit}".rstrip() + "."
     return text
 
 
