@@ -33,7 +33,6 @@ from mechgraph.errors import (
     did_you_mean,
     listed,
     near_names,
-    unknown,
 )
 from mechgraph.memo import ASKED, Remembers, as_asked, carried
 
@@ -341,7 +340,7 @@ def unknown(what: str, name: object, known: Iterable[str], also: Iterable[str] =
     """The fault of a name that is none of the ``known`` ones: those that may be meant (of ``also``, too), and all."""
     names, low = list(known), dict[str, str]()
     # where there are more, a search for each of many wrong names takes too long
-    for one in [*names, *also] if len(names) <= 500 else ():
+    for one in [*names, *also] if len(names) <= 200 else ():
         low.setdefault(one.lower(), one)
     text = name if isinstance(name, str) else shown(name)
     hint = did_you_mean([low[one] for one in near_names(text.lower(), low, 0.6)[:2]])
