@@ -728,7 +728,7 @@ def test_a_drive_declared_at_its_dead_point_is_told_without_a_hint_that_does_not
     mg.save(gear, tmp_path / "gear.toml")
     result = invoke("solve", str(tmp_path / "gear.toml"), "--drive", "A=0:10:5deg")
     assert result.exit_code == 1
-    assert "A.Rz stands still" in result.output
+    assert "A.Rz is stationary there" in result.output
     assert "--on-reach" not in result.output
 
 
