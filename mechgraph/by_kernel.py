@@ -15,8 +15,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from mechgraph.kernel import build
-from mechgraph.kernel.path import MIDDLE, Kernel, Mask, Records
-from mechgraph.kernel.tables import START, Layout, layout, tables, why_not
+from mechgraph.kernel.tables import MIDDLE, START, Kernel, Layout, Mask, Records, layout, tables, why_not
 from mechgraph.kinematics.motion_path import in_blocks
 from mechgraph.kinematics.rates import Rates, Velocities, are_alone, expected_error
 from mechgraph.kinematics.state import ROUNDINGS, ClosureSolver, Configuration

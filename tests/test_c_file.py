@@ -14,9 +14,8 @@ from program import invoke
 
 import mechgraph as mg
 from mechgraph.compiled.c_file import source_text, write_c
-from mechgraph.compiled.fmu import description, variables
+from mechgraph.compiled.fmu import description, variables, write_tables
 from mechgraph.compiled.tabled import STATUSES, tabled
-from mechgraph.compiled.write import write_tables
 from mechgraph.kernel import build, compiler
 
 ROOT = Path(__file__).resolve().parents[1]

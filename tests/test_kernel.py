@@ -23,7 +23,7 @@ from strategies import closed_mechanism, motions, with_drives, with_loads, with_
 import mechgraph as mg
 from mechgraph import by_kernel
 from mechgraph.kernel import build, tables
-from mechgraph.kernel.path import pointer
+from mechgraph.kernel.tables import pointer
 from mechgraph.kinematics.prescribed import DriverMotion
 from mechgraph.kinetostatics import Pipeline
 from mechgraph.outcome import Options

@@ -17,8 +17,8 @@ import mechgraph as mg
 from mechgraph import show as pictures
 from mechgraph.cli import options as opt
 from mechgraph.cli import records
+from mechgraph.compiled.fmu import WRITTEN, InputsName, write_tables
 from mechgraph.compiled.tabled import tabled
-from mechgraph.compiled.write import WRITTEN, InputsName, write_tables
 from mechgraph.document import Document, Table
 from mechgraph.equations.formulation import FORMATS as WRITINGS
 from mechgraph.errors import counted

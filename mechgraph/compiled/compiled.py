@@ -11,8 +11,8 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from mechgraph.compiled.fmu import InputsName, write_tables
 from mechgraph.compiled.tabled import STATUSES, Tabled, tabled
-from mechgraph.compiled.write import InputsName, write_tables
 from mechgraph.errors import DeclarationError, listed
 from mechgraph.kernel import build
 from mechgraph.kernel.tables import START

@@ -1,4 +1,4 @@
-"""A mechanism as a functional mock-up unit: co-simulation by FMI 2.0, motion of the drives in, efforts, positions and reactions out.
+"""What a mechanism in the tables is written as: C, or a functional mock-up unit. The unit: co-simulation by FMI 2.0, motion of the drives in, efforts, positions and reactions out.
 
 The equations are those of kinetostatics: what is set as ``q``, ``v``, ``a`` of the drives holds when the step ends. Or efforts of the
 drives go in, held over a step, and the unit integrates the motion that they produce.
@@ -16,15 +16,15 @@ import zipfile
 from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple, get_args
 from xml.sax.saxutils import quoteattr
 
-from mechgraph.compiled.c_file import header_text, identifier, source_text
+from mechgraph.compiled.c_file import header_text, identifier, source_text, write_c
 from mechgraph.compiled.tabled import STATUSES, Tabled
-from mechgraph.errors import visible
-from mechgraph.files import whole_file, write_whole
+from mechgraph.errors import DeclarationError, visible
+from mechgraph.files import Format, format_of, whole_file, write_whole
 from mechgraph.kernel import build, compiler
-from mechgraph.quantities import unit_of
+from mechgraph.quantities import option_faults, unit_of
 
 SLAVE = Path(__file__).with_name("fmu.c")
 COMPONENTS = ("Mx", "My", "Mz", "Fx", "Fy", "Fz")
@@ -175,3 +175,34 @@ def _system() -> str:
     if machine in ("x86_64", "amd64"):
         return f"{SYSTEMS.get(sys.platform, 'linux')}64"
     return f"{machine}-{SYSTEMS.get(sys.platform, 'linux')}"
+
+
+WRITTEN = (
+    Format("C99, with a header beside it", (".c",), write_c),
+    Format("FMI 2.0 for co-simulation", (".fmu",), write_fmu),
+)
+
+
+InputsName = Literal["motion", "efforts"]
+"""What is given of the drives."""
+
+
+def write_tables(
+    tables: Tabled, path: str | os.PathLike[str], name: str | None = None, inputs: InputsName = "motion"
+) -> None:
+    """Write the mechanism as the suffix of ``path`` says; symbols begin with ``name``, else with the name of the file.
+
+    Raises
+    ------
+    DeclarationError
+        where ``name`` is no identifier of C, ``inputs`` no such word, or efforts are given and there are passive freedoms: nothing would
+        hold these; FileError; MissingExtraError for a unit where there is no C compiler.
+    """
+    faults = option_faults({"inputs": (inputs, get_args(InputsName))})
+    if inputs == "efforts" and tables.layout.shapes["holds"][0]:
+        faults.append(
+            "inputs = 'efforts': there are passive freedoms, which no motion under efforts holds; use inputs='motion', or mg.respond"
+        )
+    if faults:
+        raise DeclarationError(f"write {tables.m.name!r}", faults)
+    format_of(path, WRITTEN).write(tables.under_efforts() if inputs == "efforts" else tables, path, name)
