@@ -13,9 +13,8 @@ import pytest
 from program import invoke
 
 import mechgraph as mg
-from mechgraph.compiled.c_file import source_text, write_c
 from mechgraph.compiled.fmu import description, variables, write_tables
-from mechgraph.compiled.tabled import STATUSES, tabled
+from mechgraph.compiled.tabled import STATUSES, source_text, tabled, write_c
 from mechgraph.kernel import build, compiler
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -1,7 +1,8 @@
-"""What a mechanism in the tables is written as: C, or a functional mock-up unit. The unit: co-simulation by FMI 2.0, motion of the drives in, efforts, positions and reactions out.
+"""What a mechanism in the tables is written as: C, or a functional mock-up unit for co-simulation by FMI 2.0.
 
-The equations are those of kinetostatics: what is set as ``q``, ``v``, ``a`` of the drives holds when the step ends. Or efforts of the
-drives go in, held over a step, and the unit integrates the motion that they produce.
+Of a unit, motion of the drives goes in, and efforts, positions and reactions come out. The equations are those of kinetostatics: what is
+set as ``q``, ``v``, ``a`` of the drives holds when the step ends. Or efforts of the drives go in, held over a step, and the unit
+integrates the motion that they produce.
 """
 
 from __future__ import annotations
@@ -19,8 +20,7 @@ from pathlib import Path
 from typing import Literal, NamedTuple, get_args
 from xml.sax.saxutils import quoteattr
 
-from mechgraph.compiled.c_file import header_text, identifier, source_text, write_c
-from mechgraph.compiled.tabled import STATUSES, Tabled
+from mechgraph.compiled.tabled import STATUSES, Tabled, header_text, identifier, source_text, write_c
 from mechgraph.errors import DeclarationError, visible
 from mechgraph.files import Format, format_of, whole_file, write_whole
 from mechgraph.kernel import build, compiler

@@ -49,8 +49,7 @@ import scipy
 from mechgraph import by_kernel
 from mechgraph.force.loads import Site, inertia_wrenches
 from mechgraph.kernel import build
-from mechgraph.kernel.loads import in_tables
-from mechgraph.kernel.tables import Integers, layout, pointer, tables, why_not
+from mechgraph.kernel.tables import Integers, in_tables, layout, pointer, tables, why_not
 from mechgraph.kinematics.layout import Tree
 from mechgraph.kinematics.motion_path import BLOCK
 from mechgraph.kinematics.rates import PassiveMotion, PassiveMotions, Rates, Velocities
