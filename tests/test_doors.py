@@ -142,6 +142,14 @@ WRONG = {
         lambda: mg.show.animate(mg.kinematics(mg.load("four-bar"), {"A": 0.1}), "x.gif", frames=()),
         "frames = (): expected one or more",
     ),
+    "a film without frames, by an array": (
+        lambda: mg.show.animate(mg.kinematics(mg.load("four-bar"), {"A": 0.1}), "x.gif", frames=np.zeros(0, dtype=int)),
+        "expected one or more",
+    ),
+    "a frame of a row that is no number to write": (
+        lambda: mg.PairType("Q", freedoms=["Rz"], reactions=[mg.Component("Fx", (0, 0, 0, 1, 0, 0), frame=10**5000)]),
+        "there is no frame an integer of 16610 bits",
+    ),
     "a spring of a list": (lambda: door(loads=[mg.Spring(["b"], "c", "P", (0, 0, 0), stiffness=1)]), "a = ['b']: expected a text"),
     "what is read only once": (lambda: mg.identify(M, joints=iter([1])), "joints = (1,): expected a list, each a Multiple"),
     "drivers read only once": (lambda: mg.groups(M, (x for x in [[1]])), "drives = ([1],): expected a text or a list"),

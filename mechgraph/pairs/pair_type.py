@@ -493,7 +493,9 @@ def _row_faults(row: PairType) -> list[str]:
     legal = {0, *np.cumsum([len(g) for g in row.factors]).tolist()}
     for c in (*(row.reactions or ()), *row.efforts):
         if c.frame not in legal:
-            faults.append(f"component {c.name}: there is no frame {c.frame}; frames of this row: {sorted(legal)}")
+            faults.append(
+                f"component {c.name}: there is no frame {shown(c.frame)}; frames of this row: {sorted(legal)}"
+            )
     if row.f > 6:
         faults.append(f"freedoms: {row.f} given, a pair has at most 6")
     if faults:

@@ -452,7 +452,7 @@ def _chosen(found: Scene, frames: int | Sequence[int] | None) -> list[int]:
         return np.linspace(0, count - 1, n).round().astype(int).tolist()
     places = {int(p): t for t, p in enumerate(found.positions)}
     bad = [p for p in frames if p not in places]
-    if bad or not frames:
+    if bad or not len(frames):
         fault = (
             f"frames: position {bad[0]} was not solved, or is none" if bad else wrong(frames, "frames", "one or more")
         )
