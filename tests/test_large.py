@@ -25,7 +25,7 @@ from mechgraph.kinematics.solver import engine_for
 from mechgraph.kinematics.sparse_system import LoopSystem
 from mechgraph.kinematics.state import ClosureRows, Configuration
 from mechgraph.kinematics.system import System
-from mechgraph.maths.sparse import BlockTriangular, SparseFactors
+from mechgraph.maths.linear import BlockTriangular, SparseFactors
 from mechgraph.model.parameters import parameters
 
 AGREE = 1e-9

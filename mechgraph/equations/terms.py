@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from mechgraph.document import Document, Equation, Paragraph, Shown, Table, latex_words, plain
 from mechgraph.errors import DeclarationError, counted
 from mechgraph.files import cell, csv_of
+from mechgraph.maths.linear import unique_solution
 from mechgraph.maths.se3 import Array
-from mechgraph.maths.sparse import unique_solution
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.pairs.factors import Component, Freedom
 from mechgraph.quantities import place_among, wrong

@@ -31,26 +31,20 @@ from mechgraph.kinematics.sparse_system import Elimination, Factored, LoopSystem
 from mechgraph.kinematics.state import ClosureRows, ClosureSolver, Configuration, ReducedRows, lengths_of
 from mechgraph.maths.linear import (
     RANK_TOLERANCE,
+    BlockFactor,
     Choice,
     ChosenSystem,
+    Pattern,
+    SparseFactors,
     choose,
     complement,
     parabola_is_regular,
     rank_of,
     scaled_norm,
+    singular_ratio,
 )
 from mechgraph.maths.se3 import Array, Index
-from mechgraph.maths.sparse import BlockFactor, Pattern, SparseFactors, singular_ratio
 from mechgraph.maths.tolerances import PATH, RANKS
-
-TRIES = 8
-"""Choices tried for a batch at most."""
-
-
-def independent(here: Configuration, Z: Array) -> bool:
-    """Whether the rates ``Z (F, d, T)`` for unit rates of the fixed columns meet all rows: the fixed columns move independently."""
-    left = [np.abs(here.closure_rates(Z[:, i])).max(initial=0.0) for i in range(Z.shape[1])]
-    return max(left, default=0.0) <= PATH.independent * max(1.0, float(np.abs(Z).max(initial=0.0)))
 
 
 @dataclass(frozen=True)
@@ -270,7 +264,7 @@ class DenseSolver:
         which = self.chosen(here, np.full(here.T, -1))
         f = self.factored(here, which)
         free = self.forms[int(which[0])].choice.held.size
-        return not free and bool((f.condition < PATH.doubtful).all()) and independent(here, f.sensitivity())
+        return not free and bool((f.condition < PATH.doubtful).all()) and here.meets_all_rows(f.sensitivity())
 
     def begun(self, here: Configuration) -> DenseSolver:
         """See the protocol in ``kinematics.state``."""
@@ -300,7 +294,7 @@ class DenseSolver:
             if left.size:
                 fits = self._serves(number, here.part(left))
                 which[left[fits]], left = number, left[~fits]
-        for _ in range(TRIES):
+        for _ in range(8):  # choices tried for a batch at most
             poorness = self._poorness(here, which)
             poor = np.flatnonzero(poorness > 1.0)
             if not poor.size:
@@ -308,12 +302,10 @@ class DenseSolver:
             worst = int(poor[np.argmax(poorness[poor])])
             self.forms.append(form_at(here.J[:, :, worst], self.fixed, None, own_scale(here, worst)))
             new = len(self.forms) - 1
-            same_rank = np.array(
-                [len(self.forms[i].choice.cols) == len(self.forms[new].choice.cols) for i in which[poor]]
-            )
+            counts = [len(form.choice.cols) for form in self.forms]
+            same_rank = np.array([counts[i] == counts[new] for i in which[poor]])
             trial = self._poorness(here.part(poor), np.full(poor.size, new))
             better = poor[same_rank & (trial < PATH.better * poorness[poor])]
-            which = which.copy()
             which[better] = new
             if not better.size:
                 self.forms.pop()
@@ -324,7 +316,7 @@ class DenseSolver:
         """The number of a form for one position: one of the last where that fits as well, or one made there."""
         J = here.J[:, :, t]
         made = form_at(J, self.fixed, self.keep, own_scale(here, t))
-        for i in range(len(self.forms) - 1, max(-1, len(self.forms) - 1 - TRIES), -1):
+        for i in reversed(range(max(0, len(self.forms) - 8), len(self.forms))):
             known = self.forms[i]
             if known.choice.same(made.choice) and (known.turn is None or _fits(known, J)):
                 return i
@@ -535,7 +527,7 @@ class SparseSolver:
         """See the protocol in ``kinematics.state``."""
         which = self.chosen(here, np.full(here.T, -1))
         form = self.forms[int(which[0])]
-        return form.regular and not form.held and independent(here, self.factored(here, which).sensitivity())
+        return form.regular and not form.held and here.meets_all_rows(self.factored(here, which).sensitivity())
 
     def begun(self, here: Configuration) -> SparseSolver:
         """See ``ClosureSolver``."""

@@ -39,8 +39,8 @@ import scipy
 
 from mechgraph.graph.linkgraph import labels_of_bipartite, members
 from mechgraph.kinematics.state import ClosureRows, Configuration, ReducedRows
+from mechgraph.maths.linear import BlockFactor, BlockTriangular, Factors, Pattern, SparseFactor, SparseFactors
 from mechgraph.maths.se3 import Array, Index, Mask
-from mechgraph.maths.sparse import BlockFactor, BlockTriangular, Factors, Pattern, SparseFactor, SparseFactors
 from mechgraph.maths.tolerances import MOTIONS, RANKS
 
 

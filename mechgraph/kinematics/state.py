@@ -39,9 +39,9 @@ import scipy
 from mechgraph.graph.linkgraph import LinkGraph
 from mechgraph.kinematics.layout import ScrewTable, entries_of, run_sums
 from mechgraph.kinematics.system import System
+from mechgraph.maths.linear import LeastNorm
 from mechgraph.maths.se3 import Array, Index, Mask, compose, cross, cross_twist, finite_twist, move_twist, multiplied
-from mechgraph.maths.sparse import LeastNorm
-from mechgraph.maths.tolerances import RANKS
+from mechgraph.maths.tolerances import PATH, RANKS
 from mechgraph.model.couplings import Axes, Contact, Lines
 from mechgraph.pairs import pair_type as evaluation
 
@@ -324,6 +324,11 @@ class Configuration:
     def closure_rates(self, dq: Array) -> Array:
         """``J q' (n_rows, T)`` for rates ``dq (F, T)``, without forming ``J``."""
         return _stacked([part.rates(self, dq) for part in self.system.position_rows])
+
+    def meets_all_rows(self, Z: Array) -> bool:
+        """Whether the rates ``Z (F, d, T)`` for unit rates of the fixed columns meet all rows: the fixed columns move independently."""
+        left = [np.abs(self.closure_rates(Z[:, i])).max(initial=0.0) for i in range(Z.shape[1])]
+        return max(left, default=0.0) <= PATH.independent * max(1.0, float(np.abs(Z).max(initial=0.0)))
 
     def closure_bias(self, pairs: Array) -> Array:
         """Velocity part ``(n_rows, T)`` of the closure accelerations ``J q'' + bias`` from that of the pairs (``bias``, ``(6, P, T)``)."""

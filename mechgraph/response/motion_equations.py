@@ -56,8 +56,8 @@ from mechgraph.kinematics.rates import PassiveMotion, PassiveMotions, Rates, Vel
 from mechgraph.kinematics.solver import closure_rank, closure_solver
 from mechgraph.kinematics.state import ClosureSolver, Configuration, FactoredClosure
 from mechgraph.kinematics.system import System
+from mechgraph.maths.linear import Factors
 from mechgraph.maths.se3 import Array, Index, cross, rotate, rotate_back
-from mechgraph.maths.sparse import Factors
 from mechgraph.maths.tolerances import PATH, RESPONSE
 from mechgraph.model.loads import Load
 

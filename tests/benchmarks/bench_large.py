@@ -30,7 +30,7 @@ from mechgraph.kinematics.assembly import assembled
 from mechgraph.kinematics.sparse_system import LoopSystem
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import indexed
-from mechgraph.maths.sparse import SparseFactors
+from mechgraph.maths.linear import SparseFactors
 
 SIZES = [10, 100, 1_000, 10_000, 100_000]
 
