@@ -137,7 +137,7 @@ WRONG = {
     ),
     "tensors that are none": (lambda: mg.inertia.physical([["x"] * 3] * 3), "expected real numbers"),
     "tensors with a tolerance that is none": (lambda: mg.inertia.physical(np.eye(3), tol={}), "tol = {}"),
-    "tensors of another shape": (lambda: mg.inertia.symmetric([[1, 2], [3, 4]]), "tensors = [[1, 2], [3, 4]]: expected an array"),
+    "tensors of another shape": (lambda: mg.inertia.physical([[1, 2], [3, 4]]), "tensors = [[1, 2], [3, 4]]: expected an array"),
     "a film without frames": (
         lambda: mg.show.animate(mg.kinematics(mg.load("four-bar"), {"A": 0.1}), "x.gif", frames=()),
         "frames = (): expected one or more",

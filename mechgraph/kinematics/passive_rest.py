@@ -45,9 +45,10 @@ def unspun(path: DriverPath, found: Positions, passive: tuple[PassiveMotion, ...
         # where the freedom that holds a motion hardly does, it turns fast: parts of such a step are foretold one after the other
         for _ in range(8):
             carried = _Carried(path, found, *parts_of_steps(path, found, parts), passive)
-            if carried.sure.all():
+            more = _nearer(carried, parts)
+            if more is parts:
                 break
-            parts = _nearer(carried, parts)
+            parts = more
     else:
         carried = PassiveSteps(path, Interpolation(path, nodes), found.follower, passive)
     x, status = found.x.copy(), found.status.copy()
@@ -100,12 +101,16 @@ def _with_bends(path: DriverPath, found: Positions) -> Nodes:
 
 def _nearer(carried: _Carried, nodes: Nodes) -> Nodes:
     """The nodes, and in every step that is not as foretold one more, at the last point of the rule up to which it is."""
+    if carried.sure.all():
+        return nodes
     interpolation, follower = carried.interpolation, carried.follower
     steps = np.arange(len(interpolation.left))
     closed, track, _ = at_points(interpolation, follower, rule(), steps)
     near = (closed.done & (closed.correction <= PATH.correction)).reshape(len(steps), -1)
     good = np.cumprod(near, axis=1).sum(axis=1)
     some = np.flatnonzero((good > 0) & (good < near.shape[1]))
+    if not some.size:
+        return nodes
     at, left, right = some * near.shape[1] + good[some] - 1, interpolation.left[some], interpolation.right[some]
     place = nodes.place[left] + 0.5 * (rule().points[good[some] - 1] + 1.0) * (nodes.place[right] - nodes.place[left])
     track, drive = track[at], follower.paths.drive(track[at], place)

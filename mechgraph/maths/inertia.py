@@ -343,15 +343,6 @@ def physical_faults(inertia: Any, tol: float = 1e-9) -> list[str]:
 
 
 @door
-def symmetric(inertia: Array, tol: float = 1e-9) -> NDArray[np.bool_]:
-    """Which tensors ``(3, 3, ...)`` are symmetric, to a part of their largest entries."""
-    inertia = _tensors(inertia)
-    return np.asarray(
-        np.abs(inertia - inertia.swapaxes(0, 1)).max(axis=(0, 1)) <= tol * np.abs(inertia).max(axis=(0, 1))
-    )
-
-
-@door
 def physical(inertia: Array, tol: float = 1e-9) -> NDArray[np.bool_]:
     """Which symmetric tensors ``(3, 3, ...)`` a body can have: ``a >= 0`` and ``a + b >= c`` for principal moments a <= b <= c."""
     inertia = _tensors(inertia)
