@@ -4,6 +4,8 @@ import base64
 import importlib.metadata
 import inspect
 import pickle
+import subprocess
+import sys
 import typing
 
 import numpy as np
@@ -305,3 +307,20 @@ def test_named_points_are_outputs_of_studies():
 def test_a_planar_model_all_of_which_is_unique_is_green(tmp_path):
     run("report", "four-bar", "-o", tmp_path / "page.html")
     assert "All that a planar model has is unique" in (tmp_path / "page.html").read_text(encoding="utf-8")
+
+
+def test_without_matplotlib_a_picture_names_the_extra():
+    code = """
+import sys
+sys.modules["matplotlib"] = None  # as where it is not installed
+import mechgraph as mg
+from mechgraph import show
+from mechgraph.cli import app
+for call in (lambda: show.draw_graph(mg.load("four-bar")), lambda: show.draw_skeleton(mg.load("four-bar"))):
+    try:
+        call()
+    except mg.MissingExtraError as error:
+        print(error)
+"""
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout == 2 * "matplotlib is not installed. Run: pip install 'mechgraph[plot]'\n"

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from mechgraph.errors import ContentError, DeclarationError, FileError
+from mechgraph.errors import ContentError, DeclarationError, FileError, did_you_mean, near_names
 from mechgraph.fields import (
     BY_FREEDOM,
     COEFFICIENTS,
@@ -361,9 +361,10 @@ def load(name: str | os.PathLike[str]) -> Mechanism:
     text = os.fsdecode(name)
     is_path = text.endswith(".toml") or os.sep in text or not isinstance(name, str)
     if not is_path and text not in library_names():
+        hint = did_you_mean(near_names(text, library_names())[:2])
         raise FileError(
             text,
-            f"neither a library mechanism nor an existing .toml file (library: {', '.join(library_names())})",
+            f"neither a library mechanism nor an existing .toml file{hint and f'; {hint}'} (library: {', '.join(library_names())})",
         )
     path = Path(text) if is_path else library_path(text)
     data = toml_of(path, text_of(path, "TOML"))

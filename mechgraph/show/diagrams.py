@@ -25,7 +25,6 @@ from mechgraph.show.canvas import (
     INK,
     MUTED,
     PALETTE,
-    Arrangement,
     Axes,
     FlatPainter,
     axis_label,
@@ -274,6 +273,8 @@ class _Canvas:
 
     def finish(self, legend: Sequence[tuple[str, str]]) -> None:
         """Put everything in its place."""
+        from mechgraph.show.arrangement import Arrangement  # not above: matplotlib is an extra
+
         painter = FlatPainter(self.ax, np.eye(3))
         taken = np.concatenate(self._taken)
         free = np.column_stack([taken, np.zeros(len(taken))])

@@ -26,7 +26,6 @@ from mechgraph.show.canvas import (
     LOAD,
     MUTED,
     REACTION,
-    Arrangement,
     Axes,
     Dpi,
     FlatPainter,
@@ -75,7 +74,7 @@ def draw_skeleton(
 
     Links are rods between two pairs, plates between more; a circle with a dot is a mass center. Pair symbols follow from the
     freedoms: a drum rotates (with a thread: screw), a guide translates, a ball is spherical, a cross of pins universal, a square a
-    weld. Driven freedoms have an arrow; springs, dampers, forces and moments are drawn where they act. A planar mechanism is drawn in
+    weld. Driven freedoms have an arrow in their positive sense; springs, dampers, forces and moments are drawn where they act. A planar mechanism is drawn in
     its plane.
 
     Parameters
@@ -305,6 +304,8 @@ class Drawing:
         ``extent``: points that fill the axes, those at this position where left out; ``places``: where names stood before, which is
         where they are put again if they can.
         """
+        from mechgraph.show.arrangement import Arrangement  # not above: matplotlib is an extra
+
         painter, samples = self.painter, self._samples(t)
         bare(self.ax)
         arranged = Arrangement(
