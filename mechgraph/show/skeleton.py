@@ -74,8 +74,8 @@ def draw_skeleton(
 
     Links are rods between two pairs, plates between more; a circle with a dot is a mass center. Pair symbols follow from the
     freedoms: a drum rotates (with a thread: screw), a guide translates, a ball is spherical, a cross of pins universal, a square a
-    weld. Driven freedoms have an arrow in their positive sense; springs, dampers, forces and moments are drawn where they act. A planar mechanism is drawn in
-    its plane.
+    weld. Driven freedoms have an arrow in their positive sense; springs, dampers, forces and moments are drawn where they act.
+    A planar mechanism is drawn in its plane.
 
     Parameters
     ----------
