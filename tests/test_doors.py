@@ -314,8 +314,7 @@ def test_without_matplotlib_a_picture_names_the_extra():
 import sys
 sys.modules["matplotlib"] = None  # as where it is not installed
 import mechgraph as mg
-from mechgraph import show
-from mechgraph.cli import app
+from mechgraph import cli, show
 for call in (lambda: show.draw_graph(mg.load("four-bar")), lambda: show.draw_skeleton(mg.load("four-bar"))):
     try:
         call()
