@@ -215,7 +215,7 @@ LIMITS = (
     "position has no meaning, and it was given the initial velocities, and a spectral radius and Newton tolerance that on these "
     "four gave less error than its defaults (a dozen settings tried); where constraints are redundant its default solver stops "
     "(`matrix is not factorized!`), so another was set. Written by people who know mechgraph better. Simulation in time, "
-    "for which the two are made, has a table of its own (see Motion in time)."
+    "for which the two are made, has a table of its own (see [Motion in time](#motion-in-time))."
 )
 
 
