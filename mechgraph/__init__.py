@@ -56,13 +56,14 @@ from mechgraph.modes.branches import Branches, branches
 from mechgraph.pairs.contact_types import Hertz
 from mechgraph.pairs.curves import Curve
 from mechgraph.pairs.factors import Bookkeeping, Component, Freedom
+from mechgraph.pairs.journal import Journal
 from mechgraph.pairs.pair_type import PairType, pair_types
 from mechgraph.pairs.surfaces import Surface
 from mechgraph.quantities import with_clear_calls
 from mechgraph.response.equilibrium import equilibrium, linearize
 from mechgraph.response.respond import Response, respond
 from mechgraph.result.free_body import FreeBody, free_body
-from mechgraph.result.over_time import OverTime, over_time
+from mechgraph.result.over_time import OverTime, film_of, over_time
 from mechgraph.result.solution import Solution
 from mechgraph.variants.study import Study, study
 
@@ -75,7 +76,7 @@ __all__ = [
     "Compiled", "Component", "ContentError", "Coupling", "Curve", "Damper", "DeadPointError", "DeclarationError",
     "Decomposition", "DeterminacyReport", "Drive", "Effort", "Event", "Families", "FileError", "ForceLaw",
     "ForceTable", "Formulation", "FreeBody", "Freedom", "Gravity", "Group", "Hertz", "Identity", "IndeterminateError",
-    "Link", "Marker", "Mechanism", "MechgraphError", "MechgraphWarning", "MissingExtraError", "Motion",
+    "Journal", "Link", "Marker", "Mechanism", "MechgraphError", "MechgraphWarning", "MissingExtraError", "Motion",
     "MultipleJoint", "OverTime", "Pair", "PairType", "Rack", "ReachError", "Response", "ResponseError",
     "ResponseSetup", "ShapeError", "Solution", "Spring", "SpurGears", "Stop", "Structure", "Study", "StudyError",
     "Surface", "SystemGroup", "Tolerances", "TorsionSpring", "Transmission", "WormGear", "Wrench", "assemble",
@@ -110,6 +111,7 @@ methods.TABLE |= {
     "view": _view,
     "draw_assemblies": _draw_assemblies,
     "draw_branches": _draw_branches,
+    "film": film_of,
 }
 
 

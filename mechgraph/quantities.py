@@ -43,7 +43,7 @@ Dimension = tuple[int, int, int]
 PURE, LENGTH, MASS, TIME = (0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)
 ACCELERATION, FORCE, MOMENT, ENERGY, POWER = (1, 0, -2), (1, 1, -2), (2, 1, -2), (2, 1, -2), (2, 1, -3)
 INERTIA, PRESSURE, FORCE_PER_LENGTH = (2, 1, 0), (-1, 1, -2), (0, 1, -2)
-FORCE_PER_VELOCITY, MOMENT_PER_RATE = (0, 1, -1), (2, 1, -1)
+FORCE_PER_VELOCITY, MOMENT_PER_RATE, PRESSURE_TIME = (0, 1, -1), (2, 1, -1), (-1, 1, -1)
 
 KNOWN: dict[str, dict[str, float]] = {
     "length": {

@@ -398,6 +398,7 @@ def drawn_doors(folder: Path) -> list[Door]:
         ("show.hodograph", show.hodograph, (s, None), {"of": "velocity", "ax": None}),
         ("show.margin_curve", show.margin_curve, (s,), {"over": None, "ax": None}),
         ("show.point_path", show.point_path, (s, None), {"ax": None}),
+        ("show.film_orbit", show.film_orbit, (s, "A", mg.Journal(1.0, 1.0, 0.001, 0.01)), {"ax": None}),
         ("show.polar_force", show.polar_force, (s, "A"), {"on": "a", "ax": None}),
         ("show.reaction_curve", show.reaction_curve, (s, "A"), {"moment": True, **curve}),
         ("show.reaction_ranges", show.reaction_ranges, (s,), {"moment": True, "ax": None}),
@@ -499,6 +500,17 @@ def further_doors(folder: Path) -> list[Door]:
             ),
             ((1.0, 2.0),),
             {"poisson": (0.3, 0.3), "groove_radius": 0.2, "length": None},
+        ),
+        (
+            "Journal",
+            lambda *a, **k: m.replace(
+                pairs=[
+                    *m.pairs,
+                    mg.Pair("N", "R", "frame", "coupler", point=(0, 0, 0), axis=Z, film=mg.Journal(*a, **k)),
+                ]
+            ),
+            (1.0, 1.0, 0.001, 0.01),
+            {},
         ),
         ("Curve", mg.Curve, (), frame),
         (

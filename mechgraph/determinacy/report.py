@@ -651,8 +651,8 @@ def undriven_error(m: Mechanism, free: Sequence[FreeMotion]) -> IndeterminateErr
     count, more = (f"{len(free)} freedoms are", f"{len(free)} drivers") if many else ("1 freedom is", "one driver")
     would_do = f" (such as {listed(report.suggested_drives, 4)})" if report.suggested_drives else ""
     return IndeterminateError(
-        f"mechanism {m.name!r}: {count} neither driven nor passive (moving: {names}){here_only(report.passive_here_only)}; add {more}{would_do}, "
-        "or change a pair",
+        f"mechanism {m.name!r}: {count} neither driven nor passive (moving: {names}){here_only(report.passive_here_only)}; "
+        f"add {more}{would_do}, or change a pair",
         report,
     )
 

@@ -23,6 +23,7 @@ from mechgraph.model.response_setup import Event, ResponseSetup, Stop
 from mechgraph.pairs.contact_types import Hertz
 from mechgraph.pairs.factors import Bookkeeping, Component, Freedom
 from mechgraph.pairs.given import CURVES, Function
+from mechgraph.pairs.journal import Journal
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.pairs.surfaces import SURFACES, ByFunction
 from mechgraph.quantities import BASE_UNITS, LENGTH
@@ -132,6 +133,7 @@ TABLES_OF_FILE: dict[str, FileTable] = {
     "pair": _table(Pair, words="A kinematic pair from link a to link b."),
     "marker": _table(Marker, words="A marker frame in a link's own frame."),
     "hertz": _table(Hertz, words="What the pressure in a contact takes: materials and shapes of its elements."),
+    "film": _table(Journal, words="The oil film of a journal bearing."),
     **{f"curve {kind}": _table(curve) for kind, curve in WRITABLE.items()},
     **{f"surface {kind}": _table(surface) for kind, surface in WRITABLE_SURFACES.items()},
     **{f"coupling {kind}": _table(coupling) for kind, coupling in COUPLINGS.items()},

@@ -46,6 +46,7 @@ from mechgraph.pairs.contact_types import (
     surface_faults,
 )
 from mechgraph.pairs.curves import Curve
+from mechgraph.pairs.journal import Journal, film_faults
 from mechgraph.pairs.pair_type import TABLE, PairType
 from mechgraph.pairs.surfaces import Surface
 from mechgraph.quantities import INERTIA, LENGTH, MASS, is_numeric, shown, wrong
@@ -267,6 +268,8 @@ class Pair(Described):
         Radius [length] of a roller on the curve or a ball on the surface; ``point`` is its center.
     surface : Surface, optional
         Surface in the frame of link a on which the marker of Sp travels; ``point`` is a place on it.
+    film : Journal, optional
+        Oil film of a journal bearing: link a is the bearing, link b the journal. ``Solution.film`` evaluates it.
 
     Raises
     ------
@@ -331,6 +334,7 @@ class Pair(Described):
     surface: Annotated[
         Surface | None, NESTED("surface on link a on which the center of a sphere travels, of Sp", table="surface")
     ] = None
+    film: Annotated[Journal | None, NESTED("oil film of a journal bearing, of R or C", table="film")] = None
     contact: ClassVar[PlacedRow | None] = None
     asked_point: ClassVar[Any] = None
     """The point as it was given, where the pair travels on a curve or surface and ``point`` is the nearest place on it."""
@@ -404,7 +408,7 @@ class Pair(Described):
     @property
     def says_more(self) -> bool:
         """Whether it says more than its type and where it sits."""
-        said = (self.pitch, self.lead, self.radius, self.hertz, self.curve, self.curve_b, self.roller, self.surface)
+        said = (self.pitch, self.lead, self.radius, self.hertz, self.film, *self.curves.values())
         return any(one is not None for one in said) or self.closed is not Pair.closed
 
     @property
@@ -462,6 +466,7 @@ class Pair(Described):
             found.append(f"{where}joins link {self.a!r} to itself; a pair joins two links")
         curved = [*shape_faults_of(self, where, tol)]
         found += [*self._pitch_faults(where), *contact_faults(self, where), *curved]
+        found += [] if self.film is None else film_faults(self, where)
         most = largest_cosine(tol) if self.type.square_second else 1 - SHAPES.parallel
         if self.contact is not None or not curved:  # a curve or surface that is at fault says no markers
             found += self._form_faults(where)

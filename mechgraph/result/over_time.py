@@ -7,6 +7,7 @@ the values, periodic over a whole cycle.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -17,14 +18,20 @@ import scipy
 from numpy.typing import ArrayLike
 
 from mechgraph.document import Block, Document, Heading, Paragraph, Shown, Table
-from mechgraph.errors import DeclarationError
+from mechgraph.errors import DeclarationError, MechgraphWarning
 from mechgraph.fields import vector_fault
 from mechgraph.files import read_off
 from mechgraph.maths.se3 import Array
-from mechgraph.quantities import ENERGY, FORCE, MOMENT, POWER, TIME, door, unit_of
+from mechgraph.pairs.journal import ACROSS, TURN, Journal, film_faults
+from mechgraph.quantities import ENERGY, FORCE, MOMENT, POWER, TIME, door, unit_of, wrong
+from mechgraph.result.film import FilmResult, Loaded
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import bracket, number, with_unit
 
+FEWEST = 8
+"""Positions of which the cycle of a film must have at least so many: its load is a spline through them."""
+NOISE = 1e-10
+"""Part of the largest coordinate or rate of a mechanism (lengths over its own) that counts as rounding."""
 SAME_TIME = 1e-6
 """Part of the duration by which drivers may disagree about the time of a position."""
 
@@ -119,7 +126,15 @@ def _cycle(s: Solution, row: _Row) -> Cycle:
     if turned < SAME_TIME or left > step * (1 + SAME_TIME):
         return Cycle(t, 0.0, False, turned)
     ended = left < SAME_TIME
-    back = all(_returned(values, name, s, ended) for name, both in row.freedoms.items() for values in both)
+    unit = {name: 1.0 if s.whole.turns(name) else s._values.radius for name in row.freedoms}
+    largest = np.max(
+        [[np.abs(values).max() / unit[name] for values in both] for name, both in row.freedoms.items()], axis=0
+    )
+    back = all(
+        _returned(values, name, s, ended, noise=NOISE * unit[name] * size)
+        for name, both in row.freedoms.items()
+        for values, size in zip(both, largest, strict=True)
+    )
     if not back:
         return Cycle(t, 0.0, False, turned)
     gap = 0.0 if ended else 2 * np.pi * left / float(abs(v[0] + v[-1]) / 2)
@@ -132,8 +147,10 @@ def _runs(q: Array, v: Array) -> bool:
     return bool(way and (np.diff(q) * way > 0).all() and (v * way > 0).all())
 
 
-def _returned(values: Array, name: str, s: Solution, ended: bool) -> bool:
-    """Whether the last value of a coordinate or rate leads back to the first, up to whole turns and rounds of closed curves."""
+def _returned(values: Array, name: str, s: Solution, ended: bool, noise: float) -> bool:
+    """Whether the last value of a coordinate or rate leads back to the first, up to whole turns and rounds of closed curves; what is less
+    than ``noise`` does.
+    """
     gap = float(values[-1] - values[0])
     period = s.whole.period(name)
     if np.isfinite(period):
@@ -142,8 +159,8 @@ def _returned(values: Array, name: str, s: Solution, ended: bool) -> bool:
     # so many of its largest steps may part the last value of a coordinate from the first where the end of a cycle is left out
     # part of the range of a coordinate (at least 1 rad for a turn) within which it is back where it was
     returned = 1e-6
-    return abs(gap) <= (
-        returned * max(size, 1e-300) if ended else 2.0 * float(np.abs(np.diff(values)).max()) + returned * size
+    return abs(gap) <= noise + (
+        returned * size if ended else 2.0 * float(np.abs(np.diff(values)).max()) + returned * size
     )
 
 
@@ -470,3 +487,54 @@ class _Rows:
         return Figures(
             name, unit, peak, at, least, greatest, self.integral(values) / duration, rms, np.abs(rms - coarse)
         )
+
+
+# --- oil film ----------------------------------------------------------------------------------------------------------
+
+
+def film_of(s: Solution, pair: str, journal: Journal | None) -> FilmResult:
+    """The film of a pair, see ``Solution.film``."""
+    about = f"film of {pair!r}"
+    p = s.whole.pairs[s.whole.place_of_pair(pair)]
+    journal = p.film if journal is None else journal
+    found = (
+        [] if isinstance(journal, Journal) else [wrong(journal, "film", "mg.Journal(...), here or as the pair's film=")]
+    )
+    found += film_faults(p, "")
+    if not s.has_forces:
+        found.append("the solution has no forces; use mechgraph.solve")
+    if len(s.batch) != 1 or s.batch[-1] < FEWEST:
+        found.append(f"the solution has positions {s.batch}; expected one row of at least {FEWEST}")
+    if not found and not (s.status == "ok").all():
+        found.append("some positions were not solved; solve those that are reachable")
+    if found:
+        raise DeclarationError(about, found)
+    assert journal is not None
+    result = s[p.name]
+    load = -np.stack([result.components[name] for name in ACROSS], axis=-1)
+    for j, name in enumerate(ACROSS):
+        if not np.isfinite(load[:, j]).all():
+            found.append(
+                f"{name} of {p.name} is not unique; remove the redundancy (see mechgraph.check), or pass redundant='minimum_norm'"
+            )
+    if found:
+        raise DeclarationError(about, found)
+    (cycle,) = cycles_of(s)
+    turn = [f.twist for f in p.type.freedoms].index(TURN)
+    if not journal.is_short:
+        warnings.warn(
+            f"{about}: length / diameter = {journal.length / (2 * journal.radius):.3g}; from 0.7 on a film carries less than the short "
+            "bearing says",
+            MechgraphWarning,
+            stacklevel=3,
+        )
+    out = FilmResult(
+        s._values, p.name, journal, Loaded(cycle.t, cycle.gap, cycle.closed, load, result.velocity[:, turn])
+    )
+    if cycle.closed and not out.closed:
+        warnings.warn(
+            f"{about}: no closed orbit was found; the one returned starts in the middle of the bearing",
+            MechgraphWarning,
+            stacklevel=3,
+        )
+    return out

@@ -21,6 +21,7 @@ from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import CHECKS, PATH
 from mechgraph.model.loads import Law
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.pairs.journal import Journal
 from mechgraph.quantities import BASE_UNITS, items_of, place_among, unit_of, wrong
 from mechgraph.result.contacts import (
     ContactResult,
@@ -32,6 +33,7 @@ from mechgraph.result.contacts import (
     overlaps,
     place_of_contact,
 )
+from mechgraph.result.film import FilmResult
 from mechgraph.result.summary import solution_data, summary
 from mechgraph.result.trajectory import Trajectory
 from mechgraph.result.values import (
@@ -457,6 +459,45 @@ class Solution(Shown):
         True
         """
         return ContactResult(self._values, place_of_contact(self._values, pair))
+
+    def film(self, pair: str, journal: Journal | None = None) -> FilmResult:
+        """Return what the loads of a cycle do to the oil film of a journal bearing: orbit, least film, pressure, friction.
+
+            de/dt = (c^2 / (eta R L^3)) H(e)^-1 W + (w_b - w_a) / 2 x e
+
+        The load W on the journal is the force Fx, Fy of the pair, against its sign; the orbit is the periodic one where the positions make
+        a whole cycle. The film does not act back.
+
+        Parameters
+        ----------
+        pair : str
+            Name of a pair that turns about z and bears Fx and Fy: link a is the bearing, link b the journal.
+        journal : Journal, optional
+            The film. Default: the pair's ``film=``.
+
+        Returns
+        -------
+        FilmResult
+            ``orbit (T, 2)`` on link a, ``film``, ``min``, ``at``, ``pressure``, ``torque``, ``power``, ``closed``.
+
+        Raises
+        ------
+        DeclarationError
+            No film, no forces, a load that is not unique, no times.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> import numpy as np
+        >>> crank = mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=(0, 0, 1))
+        >>> m = mg.Mechanism("rotor", [mg.Link("frame"), mg.Link("crank", 1.0, (0.01, 0, 0))], [crank], ["A"])
+        >>> s = mg.solve(m, {"A": mg.Motion(np.linspace(0, 2 * np.pi, 24, endpoint=False), velocity=100.0)})
+        >>> film = s.film("A", mg.Journal(radius=0.02, length=0.02, clearance=2e-5, viscosity=0.02))
+        >>> film.closed, film.orbit.shape
+        (True, (24, 2))
+        """
+        found: FilmResult = methods.call("film", self, pair, journal)
+        return found
 
     def load(self, index: int) -> LoadResult:
         """Return what a load does: wrenches on links, power, and the coordinate of a force law.

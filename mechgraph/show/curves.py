@@ -16,7 +16,8 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import indexed
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import RANKS
-from mechgraph.quantities import door, shown, unit_of
+from mechgraph.pairs.journal import Journal
+from mechgraph.quantities import LENGTH, door, shown, unit_of
 from mechgraph.response.respond import Response
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import MaterialPoint
@@ -574,6 +575,65 @@ def polar_force(s: Solution, pair: str, *, on: Literal["a", "b"] = "a", ax: Axes
     ax.tick_params(colors=MUTED)
     ax.set_rlabel_position(100)
     ax.yaxis.set_major_locator(MaxNLocator(4))
+    return ax
+
+
+def film_orbit(s: Solution, pair: str, journal: Journal | None = None, *, ax: Axes = None) -> Any:
+    """Draw the orbit of a journal in its clearance circle, with the place and direction of the least film.
+
+    Parameters
+    ----------
+    s : Solution
+        A solution with forces over a cycle.
+    pair : str
+        Name of the pair of the bearing.
+    journal : Journal, optional
+        The film. Default: the pair's ``film=``.
+    ax : Axes, optional
+        Axes of matplotlib. Default: new ones.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    DeclarationError
+        As of ``Solution.film``.
+    MissingExtraError
+        Without matplotlib.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> import numpy as np
+    >>> from mechgraph import show
+    >>> s = mg.solve(
+    ...     mg.load("four-bar"), {"A": mg.Motion(np.linspace(0, 2 * np.pi, 48, endpoint=False), velocity=30.0)}
+    ... )
+    >>> ax = show.film_orbit(s, "B", mg.Journal(radius=0.02, length=0.02, clearance=2e-5, viscosity=0.05))
+    """
+    film = s.film(pair, journal)
+    p, units = s.mechanism.pair(pair), s.mechanism.units
+    ax = new_axes((5.6, 5.6)) if ax is None else ax
+    turn = np.linspace(0, 2 * np.pi, 181)
+    ax.plot(np.cos(turn), np.sin(turn), color=MUTED, lw=1.2)
+    for ring in (0.25, 0.5, 0.75):
+        ax.plot(ring * np.cos(turn), ring * np.sin(turn), color=MUTED, lw=0.4)
+    ends = np.concatenate([film.orbit, film.orbit[:1]]) if film.closed else film.orbit
+    ax.plot(*ends.T, color=REACTION, lw=1.8)
+    least = film.orbit[np.argmin(film.film)]
+    ax.plot(*np.stack([least, least / max(np.hypot(*least), 1e-300)]).T, color=INK, lw=1.0)
+    ax.plot(*least, "o", ms=7, mfc="white", mec=REACTION, mew=1.8)
+    ax.set_aspect("equal")
+    unit = unit_of(units, LENGTH)
+    ax.set_title(
+        f"orbit of {said(p.b)} in its clearance, seen on {said(p.a)}\nleast film {film.min:.4g} {unit} at {film.at}",
+        color=INK, fontsize=10,
+    )  # fmt: skip
+    ax.set_xlabel("eccentricity ratio along x of the marker", color=INK)
+    ax.set_ylabel("along y", color=INK)
+    ax.tick_params(colors=MUTED)
     return ax
 
 

@@ -1,0 +1,180 @@
+"""The oil film of a journal bearing over a cycle: orbit of the journal, least film, pressure, friction.
+
+    de/dt = (c^2 / (eta R L^3)) H(e)^-1 W(t) + (w_b - w_a) / 2 x e,   e(T) = e(0)
+
+with the load W on the journal and the eccentricity e on link a (see ``mechgraph.pairs.journal``). The orbit that closes is found by
+Newton's method on the map of one cycle.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import scipy
+
+from mechgraph.document import Document, Paragraph, Shown
+from mechgraph.maths.se3 import Array
+from mechgraph.pairs.journal import Journal
+from mechgraph.quantities import FORCE, LENGTH, MOMENT, POWER, PRESSURE, unit_of
+from mechgraph.result.trajectory import Trajectory
+from mechgraph.result.values import bracket, ranges
+from mechgraph.result.views import PositionLabels
+
+RELATIVE, ABSOLUTE = 1e-9, 1e-11
+"""Tolerances of the integration of an orbit."""
+WALL = 1.0 - 1e-9
+"""The largest eccentricity ratio at which a film is evaluated."""
+ORBIT_GAP = 1e-8
+"""Eccentricity ratio by which the end of an orbit that closes may miss its beginning."""
+ROUNDS = 40
+"""Cycles by which an orbit is led until it closes."""
+
+
+class Loaded(NamedTuple):
+    """What loads a film: times ``t (T,)``, the ``gap`` to the beginning of the next cycle where that is left out, whether it is a cycle,
+    the load on the journal ``(T, 2)`` along x and y of the marker on link a, the ``speed (T,)`` of link b relative to it.
+    """
+
+    t: Array
+    gap: float
+    is_cycle: bool
+    load: Array
+    speed: Array
+
+
+class FilmResult(Shown):
+    """The film of one journal bearing over the positions ``(T,)`` of a cycle; see the properties."""
+
+    def __init__(self, values: Trajectory, pair: str, journal: Journal, loaded: Loaded) -> None:
+        self._values, self.pair, self.journal, self._loaded = values, pair, journal, loaded
+
+    @property
+    def load(self) -> Array:
+        """Load ``(T, 2)`` on the journal along x and y of the marker on link a."""
+        return self._loaded.load
+
+    @cached_property
+    def _orbit(self) -> tuple[Array, bool]:
+        """The orbit ``(2, T)``, and whether it closes."""
+        return _orbit_of(self.journal, self._loaded)
+
+    @property
+    def orbit(self) -> Array:
+        """Eccentricity ratios ``(T, 2)`` along x and y of the marker on link a."""
+        return self._orbit[0].T
+
+    @property
+    def closed(self) -> bool:
+        """Whether the orbit is the periodic one of a whole cycle; else it starts in the middle of the bearing."""
+        return self._orbit[1]
+
+    @property
+    def eccentricity(self) -> Array:
+        """Sizes ``(T,)`` of the eccentricity ratios."""
+        return np.asarray(np.hypot(*self._orbit[0]))
+
+    @property
+    def film(self) -> Array:
+        """Least film ``(T,)`` around the bearing [length], ``c (1 - e)``."""
+        return self.journal.clearance * (1.0 - self.eccentricity)
+
+    @property
+    def min(self) -> float:
+        """The least film over the positions [length]."""
+        return float(self.film.min())
+
+    @property
+    def at(self) -> str:
+        """The position of the least film: driver values, or time."""
+        return PositionLabels(self._values).name(int(np.argmin(self.film)))
+
+    @property
+    def pressure(self) -> Array:
+        """Greatest pressure ``(T,)``."""
+        return self.journal.pressure(self._orbit[0], self.load.T)
+
+    @property
+    def torque(self) -> Array:
+        """Friction torque ``(T,)`` on link b, against a positive rotation of it relative to link a."""
+        return self.journal.torque(self._orbit[0], self.load.T, self._loaded.speed)
+
+    @property
+    def power(self) -> Array:
+        """Power ``(T,)`` lost in the film: shear, and pressing the oil out."""
+        return self.journal.power(self._orbit[0], self.load.T, self._loaded.speed)
+
+    def document(self) -> Document:
+        """Ranges over the positions, and what the model leaves out."""
+        units = self._values.mechanism.units
+        rows = [
+            ("load" + bracket(unit_of(units, FORCE)), np.hypot(*self.load.T)),
+            ("eccentricity ratio", self.eccentricity),
+            ("least film" + bracket(unit_of(units, LENGTH)), self.film),
+            ("greatest pressure" + bracket(unit_of(units, PRESSURE)), self.pressure),
+            ("friction torque" + bracket(unit_of(units, MOMENT)), self.torque),
+            ("power lost" + bracket(unit_of(units, POWER)), self.power),
+        ]
+        words = (
+            "Short bearing, half film"
+            + ("" if self.closed else "; no closed orbit: it starts in the middle of the bearing")
+            + (
+                ""
+                if self.journal.is_short
+                else "; longer than 0.7 diameters, where a film carries less than this model says"
+            )
+            + ". The film does not act back on the motion; oil that is missing where the film opens again is left out."
+        )
+        labels = PositionLabels(self._values)
+        return Document(f"Oil film of {self.pair}", (Paragraph(words), ranges(rows, labels.name)))
+
+
+def _orbit_of(journal: Journal, loaded: Loaded) -> tuple[Array, bool]:
+    """The orbit ``(2, T)``; of a cycle the one that closes, and whether it does."""
+    t = loaded.t
+    ends: Literal["periodic", "not-a-knot"] = "periodic" if loaded.is_cycle else "not-a-knot"
+    values = np.concatenate([loaded.load.T, loaded.speed[None]])
+    if loaded.gap:
+        t = np.append(t, t[-1] + loaded.gap)
+        values = np.concatenate([values, values[:, :1]], axis=1)
+    elif loaded.is_cycle:
+        values[:, -1] = values[:, 0]
+    drawn: Any = scipy.interpolate.CubicSpline(t, values, axis=1, bc_type=ends)
+
+    def rates(time: float, x: Array) -> Array:
+        e, now = x.reshape(2, -1), drawn(time)
+        # trial steps of the integrator may pass the wall, where the film lets nothing by
+        e = e / np.maximum(1.0, np.hypot(*e) / WALL)
+        same = np.ones(e.shape[1])
+        return journal.rates(e, now[:2, None] * same, now[2] * same).ravel()
+
+    def led(e: Array, places: Array | None = None) -> Array:
+        """Where eccentricities ``(2, n)`` are led to, ``(2, n)``, or over the times ``places``, ``(2, n, T)``."""
+        found = scipy.integrate.solve_ivp(
+            rates,
+            (t[0], t[-1]),
+            e.ravel(),
+            method="LSODA",
+            t_eval=[t[-1]] if places is None else places,
+            rtol=RELATIVE,
+            atol=ABSOLUTE,
+        )
+        out = found.y.reshape(2, e.shape[1], -1)
+        return out[..., -1] if places is None else out
+
+    e, closed = np.zeros(2), False
+    step = 1e-4
+    aside = step * np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])  # differences of the map of a cycle
+    for _ in range(ROUNDS) if loaded.is_cycle else ():
+        ends_at = led(e[:, None] + aside)
+        missed = ends_at[:, 0] - e
+        closed = bool(np.abs(missed).max() < ORBIT_GAP)
+        if closed:
+            break
+        slope = (ends_at[:, 1:] - ends_at[:, :1]) / step
+        new = e + np.linalg.lstsq(np.eye(2) - slope, missed)[0]
+        e = new if np.hypot(*new) < 1.0 - step else ends_at[:, 0]
+    if not closed:
+        e = np.zeros(2)
+    return led(e[:, None], loaded.t)[:, 0], closed
