@@ -58,6 +58,7 @@ from mechgraph.pairs.curves import Curve
 from mechgraph.pairs.factors import Bookkeeping, Component, Freedom
 from mechgraph.pairs.journal import Journal
 from mechgraph.pairs.pair_type import PairType, pair_types
+from mechgraph.pairs.seats import Misfit, Stiffness
 from mechgraph.pairs.surfaces import Surface
 from mechgraph.quantities import with_clear_calls
 from mechgraph.response.equilibrium import equilibrium, linearize
@@ -76,9 +77,9 @@ __all__ = [
     "Compiled", "Component", "ContentError", "Coupling", "Curve", "Damper", "DeadPointError", "DeclarationError",
     "Decomposition", "DeterminacyReport", "Drive", "Effort", "Event", "Families", "FileError", "ForceLaw",
     "ForceTable", "Formulation", "FreeBody", "Freedom", "Gravity", "Group", "Hertz", "Identity", "IndeterminateError",
-    "Journal", "Link", "Marker", "Mechanism", "MechgraphError", "MechgraphWarning", "MissingExtraError", "Motion",
+    "Journal", "Link", "Marker", "Mechanism", "MechgraphError", "MechgraphWarning", "Misfit", "MissingExtraError", "Motion",
     "MultipleJoint", "OverTime", "Pair", "PairType", "Rack", "ReachError", "Response", "ResponseError",
-    "ResponseSetup", "ShapeError", "Solution", "Spring", "SpurGears", "Stop", "Structure", "Study", "StudyError",
+    "ResponseSetup", "ShapeError", "Solution", "Spring", "SpurGears", "Stiffness", "Stop", "Structure", "Study", "StudyError",
     "Surface", "SystemGroup", "Tolerances", "TorsionSpring", "Transmission", "WormGear", "Wrench", "assemble",
     "assemblies", "atlas", "branches", "chain", "check", "compile", "equilibrium", "formulate", "free_body", "groups",
     "identify", "inertia", "kinematics", "library", "linearize", "load", "load_chains", "multiple_joints",

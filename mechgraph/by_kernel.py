@@ -239,6 +239,7 @@ def gives_forces(line: Started) -> bool:
     """Whether the kernel gives the forces that are asked for; it knows no line along which gears touch each other."""
     return (
         line.options.method == "loop_wrench"
+        and line.options.redundant != "elastic"
         and line.acting is line.columns
         and not any(isinstance(c, Contact) for c in line.m.couplings)
     )

@@ -282,9 +282,9 @@ class Pipeline:
 
 
 ReachName = Literal["raise", "flag"]
-RedundantName = Literal["nan", "minimum_norm"]
+RedundantName = Literal["nan", "minimum_norm", "elastic"]
 ON_REACH: tuple[ReachName, ...] = ("raise", "flag")
-REDUNDANT: tuple[RedundantName, ...] = ("nan", "minimum_norm")
+REDUNDANT: tuple[RedundantName, ...] = ("nan", "minimum_norm", "elastic")
 SOLVED = (Status.OK.value, Status.CHANGE_POINT.value, Status.ACTUATORS_REST.value)
 """Outcomes that are no reason to raise."""
 DEAD = (
@@ -532,9 +532,10 @@ def solve(
         One unknown wrench per loop; all reaction components and efforts at once; or the system that ``formulate(m)`` prints (slowest).
     loads : iterable of load, optional
         Replace the declared loads.
-    redundant : {"nan", "minimum_norm"}
+    redundant : {"nan", "minimum_norm", "elastic"}
         Value of components that are not unique: NaN, or the least ``sum |F|^2 + |M / L|^2``, moments about the pair points. The latter
-        assumes equal stiffness of all pairs, rigid links and no preload.
+        assumes equal stiffness of all pairs, rigid links and no preload. ``"elastic"``: as the ``stiffness=`` and ``misfit=`` of the pairs
+        split them, ``(N^T C N) x = N^T (misfit - C l0)``; what only rigid components share stays NaN.
     on_reach : {"raise", "flag"}
         Unreachable positions: raise, or return NaN rows and ``Solution.status``.
     engine : {"auto", "dense", "sparse", "compiled"}

@@ -104,7 +104,7 @@ class Outcome:
             line.drive.t,
             line.acting,
             q,
-            line.options.redundant == "nan",
+            line.options.redundant != "minimum_norm",
             line.passive if line.options.method else (),
             line.drive.shown,
             line.drive.names,

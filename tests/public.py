@@ -512,6 +512,22 @@ def further_doors(folder: Path) -> list[Door]:
             (1.0, 1.0, 0.001, 0.01),
             {},
         ),
+        *(
+            (
+                kind.__name__,
+                lambda *a, kind=kind, **k: m.replace(
+                    pairs=[
+                        *m.pairs,
+                        mg.Pair(
+                            "N", "W", "frame", "coupler", point=(0, 0, 0), **{kind.__name__.lower(): kind(*a, **k)}
+                        ),
+                    ]
+                ),
+                (),
+                dict.fromkeys(("Fx", "Fy", "Fz", "Mx", "My", "Mz"), 1.0),
+            )
+            for kind in (mg.Stiffness, mg.Misfit)
+        ),
         ("Curve", mg.Curve, (), frame),
         (
             "Curve.line",

@@ -407,7 +407,7 @@ def test_a_freedom_that_nothing_drives(free_chain: Path) -> None:
     result = run("solve", free_chain)
     assert result.exit_code == 1
     assert "neither driven nor passive" in result.stderr
-    assert "add one driver, or change a pair" in result.stderr
+    assert "add one driver (such as A.Rz), or change a pair" in result.stderr
 
 
 def test_out_writes_the_table(tmp_path: Path) -> None:

@@ -414,8 +414,8 @@ TOLERANCE = "Accuracy of directions [rad] and distances (relative to L), e.g. 1e
 Tolerance = Annotated[float | None, option("--tol", TOLERANCE, "TOL")]
 Bookkeeping = Annotated[Literal["lee", "minimal"], typer.Option(help="Choice of unknowns.")]
 Method = Annotated[Literal["loop_wrench", "newton_euler", "printed"], typer.Option(help="How the forces are solved.")]
-REDUNDANT = "Indeterminate reactions: NaN or the minimum-norm solution."
-Redundant = Annotated[Literal["nan", "minimum_norm"], typer.Option(help=REDUNDANT)]
+REDUNDANT = "Indeterminate reactions: NaN, the minimum-norm solution, or split by the stiffness of the pairs."
+Redundant = Annotated[Literal["nan", "minimum_norm", "elastic"], typer.Option(help=REDUNDANT)]
 OnReach = Annotated[
     Literal["raise", "flag"], option("--on-reach", "Unreachable positions: stop, or flag and continue.")
 ]

@@ -28,7 +28,7 @@ from mechgraph.determinacy.findings import (
 from mechgraph.determinacy.finite_motion import FiniteMotion, finite_motion
 from mechgraph.determinacy.mobility import Freedoms, Generic, freedoms_at, generic
 from mechgraph.determinacy.pair_changes import LARGEST_FOR_SETS, Effect, advice
-from mechgraph.determinacy.uniqueness import SelfStress, Uniqueness, uniqueness
+from mechgraph.determinacy.uniqueness import MisfitSum, SelfStress, Uniqueness, misfit_sums, uniqueness
 from mechgraph.equations.build import BOOKKEEPINGS, BookkeepingName, formulate
 from mechgraph.equations.terms import Ledger, LedgerRow
 from mechgraph.errors import Budget, DeclarationError
@@ -508,6 +508,22 @@ class Facts(GraphFacts):
         Those that connect loops are left out where they are more than ``determinacy.uniqueness.CONNECTING``.
         """
         return self.reactions.states if self.reactions else ()
+
+    @property
+    def misfits(self) -> tuple[MisfitSum, ...]:
+        """Errors of seats that must cancel or lock in forces, one condition a self-stress: notes for a drawing.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> hinges = [
+        ...     mg.Pair(k, "R", "frame", "door", point=(0, 0, z), axis=(0, 0, 1)) for k, z in (("A", 0), ("B", 1))
+        ... ]
+        >>> print(mg.check(mg.Mechanism("door", pairs=hinges, drives=["A"])).misfits[-1].text)
+        these errors must cancel: A.Fz - B.Fz
+        """
+        g = self.geometry
+        return misfit_sums(self.mechanism, self.self_stresses, float(g.system.par.L)) if g else ()
 
     @property
     def determinate(self) -> bool:

@@ -17,7 +17,7 @@ and named. Pairs of one type with the same components in doubt are decomposed to
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -31,6 +31,7 @@ from mechgraph.kinematics.solver import PROBES, SEED, ClosureRank, EngineName, c
 from mechgraph.kinematics.state import Configuration, ContactLines
 from mechgraph.maths.se3 import Array, Index, null_space
 from mechgraph.maths.tolerances import STRESSES
+from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.pairs.factors import Component
 
@@ -175,6 +176,57 @@ class SelfStress:
 
     def __repr__(self) -> str:
         return f"SelfStress({self.text!r})"
+
+
+@dataclass(frozen=True)
+class MisfitSum:
+    """Errors of seats that must cancel, ``sum c_i misfit_i = 0``, or else lock in forces: one condition a self-stress.
+
+    coefficients : by ``pair.component``, the largest of a force 1; of a moment, whose misfit is an angle, a length.
+    force_per_unit : force in the component with coefficient 1 for a sum of one, as the stiffness of the pairs says while all other sums
+        are zero; NaN where no stiffness takes part.
+    """
+
+    coefficients: Mapping[str, float]
+    force_per_unit: float
+
+    @property
+    def text(self) -> str:
+        """The note for a drawing."""
+        line = " ".join(
+            f"{'-' if c < 0 else '+'} {'' if abs(abs(c) - 1) < 5e-4 else f'{abs(c):.3g} '}{name}"
+            for name, c in self.coefficients.items()
+        ).removeprefix("+ ")
+        known = np.isfinite(self.force_per_unit)
+        return f"these errors must cancel: {line}" + (
+            f"; one unit of it locks in {self.force_per_unit:.4g}" if known else ""
+        )
+
+    def __repr__(self) -> str:
+        return f"MisfitSum({self.text!r})"
+
+
+def misfit_sums(m: Mechanism, states: Sequence[SelfStress], L: float) -> tuple[MisfitSum, ...]:
+    """The conditions of a basis of self-stresses; ``L`` the length by which their moments are divided."""
+    names = list(dict.fromkeys(name for state in states for name in state.components))
+    N = np.array([[state.components.get(name, 0.0) for name in names] for state in states])
+    arm = np.array([L if name.rpartition(":")[2].startswith("M") else 1.0 for name in names])
+    soft, loose = np.zeros(len(names)), np.zeros(len(names), dtype=bool)
+    for j, name in enumerate(names):
+        pair, _, component = name.rpartition(":")
+        seat = m.pair(pair).stiffness
+        k = np.inf if seat is None else seat.by_component.get(component, np.inf)
+        soft[j], loose[j] = (0.0, True) if k == 0.0 else (arm[j] ** 2 / k, False)
+    borne, force = np.flatnonzero(~N[:, loose].any(axis=1)), np.full(len(states), np.nan)
+    strain = (N[borne] * soft) @ N[borne].T
+    if borne.size and np.linalg.matrix_rank(strain, hermitian=True) == len(borne):
+        force[borne] = np.diag(np.linalg.inv(strain))
+    return tuple(
+        MisfitSum(
+            {name.replace(":", "."): float(c * a) for name, c, a in zip(names, row, arm, strict=True) if c}, float(f)
+        )
+        for row, f in zip(N, force, strict=True)
+    )
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import numpy as np
 import scipy
 
 from mechgraph.errors import DeclarationError
+from mechgraph.force.elastic import elastic_split
 from mechgraph.force.loads import Site, inertia_wrenches, kinetic_power
 from mechgraph.force.reactions import (
     METHODS,
@@ -112,6 +113,8 @@ class BlockForces:
     ``balance (T,)`` and ``power (T,)`` the residuals of equilibrium and power, ``largest`` the largest term of each; ``holds`` and
     ``hold_terms (p, T)`` of the passive motions. ``multipliers (n, T)`` of the closure rows behind those of
     the loops with ``multiplier_stress (n, s, T)``, of which ``coupled_stress (F, s, T)`` are the efforts in freedoms.
+    Where stiffness splits reactions: those that misfits lock in ``locked (6, P, T)``, and those of a misfit of one in every component
+    that is not rigid ``of_misfit (6, P, k, T)``.
     """
 
     reactions: Array
@@ -131,6 +134,8 @@ class BlockForces:
     largest: tuple[float, float]
     holds: Array
     hold_terms: Array
+    locked: Array | None = None
+    of_misfit: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -193,6 +198,8 @@ def forces_of_block(
         (wrench, term),
         holds,
         hold_terms,
+        found.locked,
+        found.of_misfit,
     )
 
 
@@ -205,6 +212,8 @@ class _FreeForces:
     stress: Stress
     multipliers: Array
     coupled: Array
+    locked: Array | None = None
+    of_misfit: Array | None = None
 
 
 def _least_on_flanks(
@@ -261,6 +270,10 @@ def _least(
 ) -> _FreeForces:
     """Reactions and efforts of least norm; where self-stresses are random ones only if that is asked for."""
     totals, multipliers = wrenches.totals, wrenches.multipliers
+    if task.redundant == "elastic" and not f.complete:
+        every = f.self_stresses(every=True)
+        others = -every[6 * here.system.graph.n_loops :]
+        wrenches = replace(wrenches, stress=here.pair_wrenches(every), multiplier_stress=others)
     stress = _stress(here, wrenches, f, task)
     s = stress.wrenches.shape[2]
     if s and not f.complete and task.redundant == "minimum_norm":
@@ -270,6 +283,8 @@ def _least(
         totals = totals + lines.relief(others, flank) if lines else totals
         multipliers = multipliers - others
     found = _found(here, totals, multipliers, stress)
+    if s and task.redundant == "elastic":
+        return _elastic(here, found)
     if not (s and f.complete):
         return found
     y = least_multiples(here, found.reactions, found.efforts, multipliers, stress)
@@ -280,6 +295,26 @@ def _least(
         stress,
         multipliers,
         row_efforts(here, multipliers[:, None])[:, 0],
+    )
+
+
+def _elastic(here: Configuration, found: _FreeForces) -> _FreeForces:
+    """Reactions and efforts as stiffness splits them; the self-stresses that stay unknown."""
+    split, stress = elastic_split(here, found.reactions, found.stress), found.stress
+
+    def of(multiples: Array) -> Array:
+        return np.asarray(np.einsum("cpit,it->cpt", stress.wrenches, multiples))
+
+    multipliers = found.multipliers + np.einsum("nit,it->nt", stress.multipliers, split.y)
+    mixed = (np.einsum("nit,ijt->njt", part, split.left) for part in (stress.efforts, stress.multipliers))
+    return _FreeForces(
+        found.reactions + of(split.y),
+        found.efforts + np.einsum("fit,it->ft", stress.efforts, split.y),
+        Stress(np.einsum("cpit,ijt->cpjt", stress.wrenches, split.left), *mixed),
+        multipliers,
+        row_efforts(here, multipliers[:, None])[:, 0],
+        of(split.locked),
+        np.einsum("cpit,ikt->cpkt", stress.wrenches, split.unit[:, split.soft]),
     )
 
 
@@ -297,7 +332,7 @@ def _acting(here: Configuration, task: ForceTask) -> Index:
 
 def _stress(here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: ForceTask) -> Stress:
     """The self-stresses of total wrenches, orthonormal where they are all there are."""
-    split = orthonormal_stress if f.complete else split_stress
+    split = orthonormal_stress if f.complete or task.redundant == "elastic" else split_stress
     return split(here, wrenches.stress, wrenches.multiplier_stress, _acting(here, task))
 
 

@@ -454,7 +454,7 @@ def least_under_signs(
 
     def tried(flank: Array) -> tuple[Array, float] | None:
         A, b = _norm(here, wrenches, lines, acting, flank)
-        y = _least_above(A, b, flank[free, None] * change[free], -flank[free] * own[free] - STRESSES.rounding * size)
+        y = least_above(A, b, flank[free, None] * change[free], -flank[free] * own[free] - STRESSES.rounding * size)
         return None if y is None else (y, float(np.linalg.norm(A @ y + b)))
 
     flank = np.where(own < 0.0, -1.0, 1.0)
@@ -487,7 +487,7 @@ def _norm(
     return whole[:, :-1], whole[:, -1]
 
 
-def _least_above(A: Array, b: Array, G: Array, h: Array) -> Array | None:
+def least_above(A: Array, b: Array, G: Array, h: Array) -> Array | None:
     """``y`` with ``G y >= h`` that makes ``|A y + b|`` least; None where there is none. A has full column rank."""
     Q, R = np.linalg.qr(A)
     shift = Q.T @ b

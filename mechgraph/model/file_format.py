@@ -25,6 +25,7 @@ from mechgraph.pairs.factors import Bookkeeping, Component, Freedom
 from mechgraph.pairs.given import CURVES, Function
 from mechgraph.pairs.journal import Journal
 from mechgraph.pairs.pair_type import PairType
+from mechgraph.pairs.seats import Misfit, Stiffness
 from mechgraph.pairs.surfaces import SURFACES, ByFunction
 from mechgraph.quantities import BASE_UNITS, LENGTH
 
@@ -133,6 +134,8 @@ TABLES_OF_FILE: dict[str, FileTable] = {
     "pair": _table(Pair, words="A kinematic pair from link a to link b."),
     "marker": _table(Marker, words="A marker frame in a link's own frame."),
     "hertz": _table(Hertz, words="What the pressure in a contact takes: materials and shapes of its elements."),
+    "stiffness": _table(Stiffness, words="Stiffness of a pair by its reaction components."),
+    "misfit": _table(Misfit, words="Misfit of the seat of a pair by its reaction components."),
     "film": _table(Journal, words="The oil film of a journal bearing."),
     **{f"curve {kind}": _table(curve) for kind, curve in WRITABLE.items()},
     **{f"surface {kind}": _table(surface) for kind, surface in WRITABLE_SURFACES.items()},

@@ -48,6 +48,7 @@ from mechgraph.pairs.contact_types import (
 from mechgraph.pairs.curves import Curve
 from mechgraph.pairs.journal import Journal, film_faults
 from mechgraph.pairs.pair_type import TABLE, PairType
+from mechgraph.pairs.seats import SEATS, Misfit, Stiffness, seat_faults
 from mechgraph.pairs.surfaces import Surface
 from mechgraph.quantities import INERTIA, LENGTH, MASS, is_numeric, shown, wrong
 
@@ -270,6 +271,9 @@ class Pair(Described):
         Surface in the frame of link a on which the marker of Sp travels; ``point`` is a place on it.
     film : Journal, optional
         Oil film of a journal bearing: link a is the bearing, link b the journal. ``Solution.film`` evaluates it.
+    stiffness, misfit : mapping of str to float, optional
+        Reaction component -> stiffness [force / length, moment] or misfit [length, rad] of the seat, for ``redundant="elastic"``: what is
+        left out is rigid and in its place, a stiffness of 0 carries nothing.
 
     Raises
     ------
@@ -335,6 +339,12 @@ class Pair(Described):
         Surface | None, NESTED("surface on link a on which the center of a sphere travels, of Sp", table="surface")
     ] = None
     film: Annotated[Journal | None, NESTED("oil film of a journal bearing, of R or C", table="film")] = None
+    stiffness: Annotated[
+        Stiffness | None, NESTED("of the seat by reaction components", table="stiffness", default="rigid")
+    ] = None
+    misfit: Annotated[Misfit | None, NESTED("of the seat by reaction components", table="misfit", default="none")] = (
+        None
+    )
     contact: ClassVar[PlacedRow | None] = None
     asked_point: ClassVar[Any] = None
     """The point as it was given, where the pair travels on a curve or surface and ``point`` is the nearest place on it."""
@@ -342,6 +352,10 @@ class Pair(Described):
     def __post_init__(self) -> None:
         self.read_numbers()
         put = partial(object.__setattr__, self)
+        for what, kind in SEATS.items():
+            given = getattr(self, what)
+            if isinstance(given, Mapping):
+                put(what, kind(**given))
         put("type", row_of(self.type, self.curve, self.surface))
         if self.curve is not None or self.surface is not None:
             try:
@@ -408,7 +422,16 @@ class Pair(Described):
     @property
     def says_more(self) -> bool:
         """Whether it says more than its type and where it sits."""
-        said = (self.pitch, self.lead, self.radius, self.hertz, self.film, *self.curves.values())
+        said = (
+            self.pitch,
+            self.lead,
+            self.radius,
+            self.hertz,
+            self.film,
+            self.stiffness,
+            self.misfit,
+            *self.curves.values(),
+        )
         return any(one is not None for one in said) or self.closed is not Pair.closed
 
     @property
@@ -467,6 +490,7 @@ class Pair(Described):
         curved = [*shape_faults_of(self, where, tol)]
         found += [*self._pitch_faults(where), *contact_faults(self, where), *curved]
         found += [] if self.film is None else film_faults(self, where)
+        found += seat_faults(self, where)
         most = largest_cosine(tol) if self.type.square_second else 1 - SHAPES.parallel
         if self.contact is not None or not curved:  # a curve or surface that is at fault says no markers
             found += self._form_faults(where)

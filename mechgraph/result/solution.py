@@ -575,6 +575,19 @@ class Solution(Shown):
         return self._values.shaking()
 
     @property
+    def misfit_sensitivity(self) -> dict[str, dict[str, Array]]:
+        """Change of a component for a misfit of one: ``s.misfit_sensitivity["A.Fz"]["B.Fz"]``, ``(...)``; ``redundant="elastic"``.
+
+            dl / dmisfit = N (N^T C N)^-1 N^T
+
+        Raises
+        ------
+        DeclarationError
+            Where stiffness does not split the reactions.
+        """
+        return self._values.misfit_sensitivity()
+
+    @property
     def passive_effort(self) -> dict[str, Array]:
         """What keeps passive bodies from spinning (or sliding) in space: a couple about the axis, or a force, by the report's name.
 

@@ -57,7 +57,7 @@ MOVED = ("x", "dq", "ddq", "closure")
 """What is kept of the motion at every position."""
 KEPT = (
     "reactions", "efforts", "given", "loads", "hold", "stress", "stress_efforts", "coupled", "multipliers", "multiplier_stress",
-    "coupled_stress", "shaking", "balance", "power", "holds", "hold_terms",
+    "coupled_stress", "shaking", "balance", "power", "holds", "hold_terms", "locked", "of_misfit",
 )  # fmt: skip
 """Fields of ``BlockForces`` that are kept for every position."""
 
@@ -582,20 +582,64 @@ class Trajectory:
         labels = labels_of(self.whole.pairs[pair], driven)
         return {name: self._out(~part) for (_, name), part in zip(labels, loose, strict=True)}
 
+    def locked_in(self, pair: int) -> dict[str, Array]:
+        """What misfits lock in of the components, by name, ``(...)``; zero where stiffness does not split reactions."""
+        known = self._kept.get("locked", 0.0 * self._force("reactions"))
+        row, unit, found = self._components_of(pair, known[:, pair][:, None])
+        return {name: self._out(part) for name, part in zip(row.component_names, unit * found[:, 0], strict=True)}
+
+    def deflections(self, pair: int) -> dict[str, Array]:
+        """Small motions of link b against link a along the components of a pair with a seat, ``misfit - l / k``."""
+        p = self.whole.pairs[pair]
+        soft = {} if p.stiffness is None else p.stiffness.by_component
+        off = {} if p.misfit is None else p.misfit.by_component
+        out = {}
+        for name, value in self.components(pair).items():
+            k = soft.get(name, np.inf)
+            out[name] = off.get(name, 0.0) - value / k if k else np.full(value.shape, np.nan)
+        return out
+
+    def misfit_sensitivity(self) -> dict[str, dict[str, Array]]:
+        """Change of every component ``"A.Fz"`` for a misfit of one in every component that is not rigid, ``(...)`` each."""
+        if "of_misfit" not in self._kept:
+            raise DeclarationError(
+                f"misfits of {self.whole.name!r}",
+                ["reactions are not split by stiffness; solve(..., redundant='elastic')"],
+            )
+        causes: list[tuple[str, float]] = []
+        for g in self._system.groups:
+            for c, name in enumerate(g.row.component_names):
+                for k in g.pairs:
+                    p = self.whole.pairs[k]
+                    if p.stiffness is not None and p.stiffness.by_component.get(name, 0.0) > 0:
+                        couple = g.row.reactions is not None and g.row.reactions[c].is_couple
+                        causes.append((f"{p.name}.{name}", 1.0 if couple else 1.0 / self._L))
+        out: dict[str, dict[str, Array]] = {}
+        for k, p in enumerate(self.whole.pairs):
+            row, unit, found = self._components_of(k, self._kept["of_misfit"][:, k])
+            for name, part in zip(row.component_names, unit[..., None] * found, strict=True):
+                out[f"{p.name}.{name}"] = {
+                    cause: self._out(per * values) for (cause, per), values in zip(causes, part, strict=True)
+                }
+        return out
+
     def _components(self, pair: int) -> tuple[PairType, Array, Array]:
         """The type of a pair, its components ``(6 - f, T)`` in the user's units and what self-stresses have in them ``(6 - f, s, T)``."""
         self._force("reactions")
+        states = np.concatenate([self._of("reactions")[:, pair][:, None], self._of("stress")[:, pair]], axis=1)
+        row, unit, found = self._components_of(pair, states)
+        return row, unit * found[:, 0], found[:, 1:]
+
+    def _components_of(self, pair: int, states: Array) -> tuple[PairType, Array, Array]:
+        """The type of a pair, factors ``(6 - f, 1)`` to the user's units, components ``(6 - f, n, T)`` of its wrenches ``(6, n, T)``."""
         number, i = self._system.place_of(pair)
         row = self._system.groups[number].row
-        states = np.concatenate([self._of("reactions")[:, pair][:, None], self._of("stress")[:, pair]], axis=1)
 
         def components(block: BlockMotion) -> Array:
             return PairFrames(block.here).components_of(number, i, states[..., block.places])
 
-        found = self._evaluated(components)
         couples = [c.is_couple for c in row.reactions or ()] or [False] * (6 - row.f)
-        unit = np.where(couples, self._L**2, self._L)[:, None]
-        return row, unit * found[:, 0], found[:, 1:]
+        return row, np.where(couples, self._L**2, self._L)[:, None], self._evaluated(components)
 
     def efforts(self, pair: int) -> tuple[Array, Array]:
         """What the drive supplies, and what springs, dampers and given efforts do, ``(..., f)`` each."""

@@ -266,6 +266,19 @@ class PairResult(Shown):
         return self._values.components(self._index)
 
     @property
+    def locked_in(self) -> dict[str, Array]:
+        """What misfits lock in of the components, without any load, ``(...)`` by name; ``solve(..., redundant="elastic")``."""
+        return self._values.locked_in(self._index)
+
+    @property
+    def deflection(self) -> dict[str, Array]:
+        """Small motion ``(...)`` of link b against link a along the components, ``misfit - reaction / stiffness``, a turn for a moment.
+
+        NaN for a component of stiffness 0, which says nothing of it.
+        """
+        return self._values.deflections(self._index)
+
+    @property
     def unique(self) -> dict[str, Array]:
         """Which components are unique, and ``effort`` (or ``effort Tz``) of driven freedoms: ``(...)``, true or false.
 

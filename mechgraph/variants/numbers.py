@@ -551,7 +551,9 @@ def _alike(m: Mechanism, other: Mechanism) -> bool:
     points = [[link.points for link in one.links] for one in (m, other)]
     if dict(m.start) != dict(other.start) or m.drives != other.drives or points[0] != points[1]:
         return False
-    kept = [[(p.type, p.closed, p.radius, p.hertz, p.film) for p in one.pairs] for one in (m, other)]
+    kept = [
+        [(p.type, p.closed, p.radius, p.hertz, p.film, p.stiffness, p.misfit) for p in one.pairs] for one in (m, other)
+    ]
     if kept[0] != kept[1]:
         return False
     for one, two in zip(m.loads, other.loads, strict=True):
