@@ -201,7 +201,8 @@ class FieldFormat:
     """One field: its kind, its meaning in a sentence, and its dimension (``slide`` and ``turn`` differ where a freedom decides).
 
     ``degrees``: may be given in degrees under its name with ``_deg`` added; ``minimum``: smallest number; ``choices``: the texts
-    allowed; ``of``: of the name of a point, the field that names its link; ``key``: its name in files where it is another; ``table``:
+    allowed; ``of``: of the name of a point, the field that names its link; ``normal``: of a vector, whether in a
+    plane it stands on that (a moment); ``key``: its name in files where it is another; ``table``:
     the table of the file that it holds; ``single``: of the name of a freedom, whether it must not be part of a rotation; ``default``:
     in words, where the value does not say it; ``held_in``: the array of ``Declared`` that holds the number, and the factor, where the
     array has another name than the field; ``rules``: more of its schema.
@@ -215,6 +216,7 @@ class FieldFormat:
     minimum: float | None = None
     choices: tuple[str, ...] = ()
     of: str = ""
+    normal: bool = False
     key: str = ""
     table: str = ""
     single: bool = True
@@ -569,7 +571,7 @@ DIRECTION = FieldKind(
 )
 TENSOR = FieldKind(
     "3 × 3",
-    {"type": "array", "items": _VECTOR, "minItems": 3, "maxItems": 3},
+    {"anyOf": [{"type": "array", "items": _VECTOR, "minItems": 3, "maxItems": 3}, {"type": "number"}]},
     None,
     (3, 3),
     True,

@@ -419,7 +419,7 @@ def _whole_numbers(tables: Tabled) -> Iterator[str]:
     """The table of what the mechanism is made of, part by part as the comment of the kernel says."""
     known = tables.I.tolist()
     pairs, factors, columns, _, loops, steps, couplings, terms, drives, unknowns, loads = known[2:13]
-    passives, moved = known[len(COUNTS) - 2 : len(COUNTS)]
+    passives, moved = known[16:18]
     parts = [
         ("counts", len(COUNTS)), ("first factor of every pair", pairs + 1), ("kinds of factors", factors), ("their first columns", factors),
         ("their first state numbers", factors), ("their places among the factor numbers", factors),
@@ -466,7 +466,7 @@ def _numbers(tables: Tabled) -> Iterator[str]:
 
 COUNTS = (
     "format", "links", "pairs", "factors", "columns", "states", "loops", "steps", "couplings", "terms", "drives", "unknowns", "loads",
-    "frame", "factor numbers", "load numbers", "passive motions", "links in them",
+    "frame", "factor numbers", "load numbers", "passive motions", "links in them", "first component of loops", "rows of a loop",
 )  # fmt: skip
 """What stands at the head of the table."""
 

@@ -533,7 +533,7 @@ class _Maker:
             tuple(on),
             contours,
             free,
-            6 * contours + len(mine.couplings) - free,
+            self.rows.position.graph.width * contours + len(mine.couplings) - free,
             klass,
             order,
         ), links

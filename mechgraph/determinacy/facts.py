@@ -33,7 +33,7 @@ from mechgraph.equations.build import BOOKKEEPINGS, BookkeepingName, formulate
 from mechgraph.equations.terms import Ledger, LedgerRow
 from mechgraph.errors import Budget, DeclarationError
 from mechgraph.force.block import hold_names
-from mechgraph.graph.linkgraph import GraphParts, LinkGraph, parts_of
+from mechgraph.graph.linkgraph import GraphParts, LinkGraph, link_graph, parts_of
 from mechgraph.kinematics.assembly import at_position
 from mechgraph.kinematics.solver import EngineName
 from mechgraph.kinematics.system import System
@@ -120,8 +120,8 @@ class GraphFacts:
 
     @property
     def equation_count(self) -> int:
-        """Number of closure equations: six a loop, one a coupling."""
-        return 6 * self.graph.n_loops + len(self.mechanism.couplings)
+        """Number of closure equations: six a loop (in the plane three), one a coupling."""
+        return self.graph.loop_rows + len(self.mechanism.couplings)
 
     @property
     def mobility_by_count(self) -> int:
@@ -163,11 +163,11 @@ def counted_ledger(m: Mechanism, bookkeeping: str) -> Ledger:
     """The ledger counted from the pair table: must agree with that of the formulation."""
     rows: dict[str, LedgerRow] = {}
     for pair in m.pairs:
-        unknowns, equations = pair.type.unknowns_and_equations if bookkeeping == "lee" else (6 - pair.type.f, 0)
+        unknowns, equations = pair.type.unknowns_and_equations if bookkeeping == "lee" else (pair.type.held, 0)
         old = rows.get(pair.type.symbol, LedgerRow(0, 0, 0))
         rows[pair.type.symbol] = LedgerRow(old.count + 1, old.unknowns + unknowns, old.equations + equations)
     rows["driver"] = LedgerRow(len(m.drives), len(m.drives), 0)
-    rows["link"] = LedgerRow(len(m.links) - 1, 0, 6 * (len(m.links) - 1))
+    rows["link"] = LedgerRow(len(m.links) - 1, 0, m.once(link_graph).width * (len(m.links) - 1))
     return Ledger(bookkeeping, rows)
 
 

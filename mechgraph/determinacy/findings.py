@@ -323,7 +323,16 @@ def loop_facts(
             rank = rank_of(singular_values(position.rows.S[:, columns]))
         pairs = tuple(name for name, _ in loop)
         freedoms = sum(freedom_count[p] for p in pairs)
-        out.append(LoopData(loop, chain, pairs, freedoms, rank, None if rank is None else 6 - rank))
+        out.append(
+            LoopData(
+                loop,
+                chain,
+                pairs,
+                freedoms,
+                rank,
+                None if position is None or rank is None else position.graph.width - rank,
+            )
+        )
     return tuple(out)
 
 

@@ -619,10 +619,10 @@ def _closing_rows(placed: PlacedPairs, change: Array, states: Array, rank: int) 
     system = placed.changed(change)
     here = Configuration(system, _closed(system, states, rank))
     stress = np.linalg.svd(here.J.transpose(2, 0, 1))[0][:, :, rank:]
-    C, n = np.zeros((here.T, system.n_rows, change.size)), system.graph.n_loops
+    C, n = np.zeros((here.T, system.n_rows, change.size)), system.graph.loop_rows
     twists = np.einsum("lp,ipct->ilpct", system.graph.loop_matrix, placed.carried(change, here))
     twists[3:] += cross(twists[:3], np.broadcast_to(here.middles[:, :, None, None], twists[:3].shape))
-    C[:, : 6 * n] = twists.transpose(4, 1, 0, 2, 3).reshape(here.T, 6 * n, change.size)
+    C[:, :n] = twists[system.graph.span].transpose(4, 1, 0, 2, 3).reshape(here.T, n, change.size)
     r = np.einsum("tmk,mt->tk", stress, here.residual)
     return r.ravel(), np.einsum("tmk,tmn->tkn", stress, C).reshape(r.size, -1)
 

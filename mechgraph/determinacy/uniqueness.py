@@ -48,7 +48,7 @@ class Components:
         self._driven[driven] = True
         owner = np.repeat(np.arange(len(widths)), widths)
         efforts = np.bincount(owner[self._driven], minlength=len(widths))
-        self.first = np.concatenate([[0], np.cumsum(6 - widths + efforts)]).astype(np.intp)
+        self.first = np.concatenate([[0], np.cumsum(self.system.graph.width - widths + efforts)]).astype(np.intp)
         self.count = int(self.first[-1])
 
     @cached_property
@@ -59,7 +59,7 @@ class Components:
     @property
     def efforts(self) -> Index:
         """Places of the driver efforts, which stand last in their pair."""
-        last = self.first[1:] - self.first[:-1] - (6 - np.diff(self.system.first_column))
+        last = self.first[1:] - self.first[:-1] - (self.system.graph.width - np.diff(self.system.first_column))
         some = np.flatnonzero(last)
         return np.concatenate(
             [np.arange(self.first[k + 1] - last[k], self.first[k + 1]) for k in some.tolist()] or [some]
@@ -81,13 +81,13 @@ class Components:
 
     @cached_property
     def _rows(self) -> list[Array]:
-        """For every group the inverses of ``[W, E]`` at the pair points ``(n, 6, 6)``."""
+        """For every group the inverses of ``[W, E]`` at the pair points ``(n, width, width)``."""
         return [inverse[:, 0] for inverse in PairFrames(self.configuration).dual]
 
     def _spread(self, g: int, pairs: Index, values: Array, out: Array, at: Index) -> None:
-        """Components ``values (6, n, ...)`` of pairs of group ``g``, driven efforts last, into ``out`` from the rows ``at (n,)`` on."""
+        """Components ``values (width, n, ...)`` of pairs of group ``g``, driven efforts last, into ``out`` from the rows ``at (n,)`` on."""
         group = self.system.groups[g]
-        plain = 6 - group.row.f
+        plain = group.row.held
         for j in range(plain):
             out[at + j] = values[j]
         place = at + plain
@@ -99,7 +99,7 @@ class Components:
 
     def table(self, wrenches: Array) -> Array:
         """Parts ``(count, s)`` in total pair wrenches ``(6, P, s, 1)``."""
-        local = at_pair_points(self.configuration, wrenches)[..., 0]
+        local = at_pair_points(self.configuration, wrenches)[self.system.graph.span, ..., 0]
         out = np.zeros((self.count, wrenches.shape[2]))
         for g, (group, inverse) in enumerate(zip(self.system.groups, self._rows, strict=True)):
             values = np.einsum("nij,jns->ins", inverse, local[:, group.pairs])
@@ -132,12 +132,14 @@ class Components:
         return out
 
     def _along(self, pairs: Index, wrenches: Array, loop: Index, at: Index) -> Array:
-        """Parts ``(all places, 6)`` in wrenches ``(6, 6 states, steps)`` of pairs in loops, each from its place ``at`` on."""
-        s = self.system
-        out = np.zeros((int(at[-1] + np.diff(self.first)[pairs[-1]]), 6))
+        """Parts ``(all places, width)`` in wrenches ``(width, width states, steps)`` of pairs in loops, each from its place ``at`` on."""
+        s, span = self.system, self.system.graph.span
+        out = np.zeros((int(at[-1] + np.diff(self.first)[pairs[-1]]), s.graph.width))
         points = (self.configuration.pair_points[:, pairs] - self.configuration.middles[:, loop])[:, :, 0]
-        local = wrenches.copy()
-        local[:3] -= np.cross(points[:, None], wrenches[3:], axis=0)
+        whole = np.zeros((6, *wrenches.shape[1:]))
+        whole[span] = wrenches
+        whole[:3] -= np.cross(points[:, None], whole[3:], axis=0)
+        local = whole[span]
         group = np.empty(len(s.m.pairs), dtype=np.intp)
         for g, members in enumerate(s.groups):
             group[members.pairs] = g
@@ -625,7 +627,7 @@ def uniqueness(
     few = closure.count - closure.rank <= 48
     probes = closure.orthonormal_stress() if few else closure.random_stress(np.random.default_rng(SEED), PROBES)
     coefficients = np.abs(here.system.coupling_matrix[:, :, 0]).max(axis=1, initial=0.0)
-    multipliers = probes[6 * here.system.graph.n_loops :]
+    multipliers = probes[here.system.graph.loop_rows :]
     states = _on_every_flank(here, probes)
     table = np.concatenate([components.table(one) for one in states], axis=1)
     return Uniqueness(components, closure, table, np.tile(coefficients[:, None] * multipliers, len(states)), probes)
@@ -633,7 +635,7 @@ def uniqueness(
 
 def pair_states(here: Configuration, rows: Array) -> Array:
     """Total pair wrenches ``(6, P, s, 1)`` of loop wrenches, the first of ``rows (rows, s)``: ``w = C^T x``."""
-    return here.pair_wrenches(rows[: 6 * here.system.graph.n_loops, :, None])
+    return here.pair_wrenches(rows[: here.system.graph.loop_rows, :, None])
 
 
 def _on_every_flank(here: Configuration, rows: Array) -> list[Array]:
@@ -644,5 +646,5 @@ def _on_every_flank(here: Configuration, rows: Array) -> list[Array]:
 def relieved_states(here: Configuration, rows: Array, flank: float) -> Array:
     """The same less what gears transmit that touch each other on one flank (sign 1 or -1), ``(6, P, s, 1)``."""
     states, lines = pair_states(here, rows), ContactLines(here)
-    multipliers = -rows[6 * here.system.graph.n_loops :, :, None]
+    multipliers = -rows[here.system.graph.loop_rows :, :, None]
     return states - lines.relief(multipliers, np.full((len(multipliers), here.T), flank)) if lines else states

@@ -73,7 +73,7 @@ class _Draft:
 
     def carry(self, act: list[Term], unknown: int, screw: int, coupling: tuple[int, int] | None = None) -> None:
         made = self.screws[screw]
-        parts = (*range(3 * bool(made.dual)), *range(3, 3 + 3 * bool(made.real)))
+        parts = [part for part in range(6)[self.m.span] if (made.dual if part < 3 else made.real)]
         act += [Term(unknown, 1.0, screw, part, coupling) for part in parts]
 
 
@@ -185,7 +185,7 @@ def _touch(draft: _Draft, g: int, coupling: BaseCoupling, unknown: int) -> None:
     gears = [(m.pairs[first.pair], -first.sense, -1.0), (m.pairs[last.pair], last.sense, 1.0)]
     for pair, side, sign in gears:
         link = pair.b if side > 0 else pair.a
-        terms = [Term(unknown, sign, len(draft.screws) - 1, part) for part in range(6)]
+        terms = [Term(unknown, sign, len(draft.screws) - 1, part) for part in range(6)[m.span]]
         draft.touched.setdefault(link, []).append((sign, exerted, terms))
     draft.block((exerted, "=", draft.unknowns[unknown].symbol, line), "coupling", coupling.name)
 
@@ -211,7 +211,7 @@ def _exert(
 
 
 def _equilibrium(draft: _Draft, words: MotionWords | None) -> list[ScalarEquation]:
-    """Six equations for every moving link: three of force, three of moment about the origin."""
+    """Six equations for every moving link: three of force, three of moment about the origin; of the plane two and one."""
     m, names = draft.m, draft.names
     touched = {link for load in m.loads for link in load.links(m)}
     at_link: dict[str, list[tuple[int, float]]] = {link.name: [] for link in m.links}
@@ -247,8 +247,8 @@ def _equilibrium(draft: _Draft, words: MotionWords | None) -> list[ScalarEquatio
                 terms[t.part].append(t)
         draft.block((*summed(printed), "=", "0"), "link", link.name)
         for what, letter, offset in (("force", "F", 3), ("moment", "M", 0)):
-            for i, axis in enumerate(AXES):
-                part = offset + i
+            for part in sorted({*range(6)[m.span]} & {*range(offset, offset + 3)}):
+                axis = AXES[part % 3]
                 symbols = [(Symbol(letter, place, "vector", axis=axis), array) for place, array in known]
                 equations.append(
                     ScalarEquation(
@@ -346,9 +346,9 @@ def formulate(
     """Generate the equations of a mechanism as named unknowns and equations; needs no geometry.
 
     For every moving link ``sum of reactions + inertia + applied + efforts of drivers and couplings = 0`` (six scalar equations about
-    the global origin), in Lee's bookkeeping with the conditions of the pairs, and the closure equations of position, velocity and
-    acceleration (``Formulation.closure``). The multiplier of a coupling ``g`` is ``M_C(g)``, or ``F_C(g)`` if all its freedoms are
-    translations.
+    the global origin, in a plane three), in Lee's bookkeeping with the conditions of the pairs, and the closure equations of position,
+    velocity and acceleration (``Formulation.closure``). The multiplier of a coupling ``g`` is ``M_C(g)``, or ``F_C(g)`` if all its
+    freedoms are translations.
 
     Parameters
     ----------

@@ -221,7 +221,7 @@ class MotionWords:
         for i, loop in enumerate(self.graph.loops):
             terms = [term for k, sign in loop for term in self.relative(k, which, sign)]
             blocks.append(Block((*summed(terms), "=", "0"), KINDS[which], self.loop_name(i)))
-            equations += [self._loop_row(which, i, part) for part in range(6)]
+            equations += [self._loop_row(which, i, part) for part in range(6)[self.m.span]]
         for g, coupling in enumerate(self.m.couplings):
             blocks.append(Block((*summed(self.coupled(g, which)), "=", "0"), KINDS[which], coupling.name))
             places = [self.m.freedom(freedom) for freedom in coupling.freedoms]
@@ -349,7 +349,7 @@ class MotionWords:
             for j, f in enumerate(self.freedoms[k]):
                 K, H = self.influence(link, k, j)
                 still = f.slides and not link.mass
-                for part in () if still else range(6 if link.mass else 3):
+                for part in () if still else range(6 if link.mass else 3)[self.m.span]:
                     terms[part].append(Term(self.first[k] + j, -float(sign), first + len(screws), part))
                 screws.append(Screw("freedoms", k, j, (mass, K) if link.mass else (), () if still else (H,), index))
         return screws, terms

@@ -251,7 +251,7 @@ def _kept_on_flanks(
         one = np.array([t])
         alone = here.part(one)
         x = f.part(one, alone).self_stresses(every=True)
-        change = -x[6 * here.system.graph.n_loops :]
+        change = -x[here.system.graph.loop_rows :]
         own = Wrenches(totals[..., one], alone.pair_wrenches(x), multipliers[:, one], change)
         y, flank[:, t] = least_under_signs(alone, own, ContactLines(alone), _acting(here, task))
         totals[..., t] += own.stress[..., 0] @ y
@@ -278,7 +278,7 @@ def _least(
     s = stress.wrenches.shape[2]
     if s and not f.complete and task.redundant == "minimum_norm":
         x = _least_multipliers(here, totals, multipliers, f, _acting(here, task), lines, flank)
-        others = x[6 * here.system.graph.n_loops :]
+        others = x[here.system.graph.loop_rows :]
         totals = totals + here.pair_wrenches(x[:, None])[:, :, 0]
         totals = totals + lines.relief(others, flank) if lines else totals
         multipliers = multipliers - others

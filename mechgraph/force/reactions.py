@@ -119,11 +119,11 @@ class PairFrames:
     """Components of reaction wrenches in the frames of the pair table, by the dual basis of ``[W, E]``."""
 
     def __init__(self, here: Configuration) -> None:
-        self.here = here
+        self.here, self.span = here, here.system.graph.span
 
     @cached_property
     def dual(self) -> list[Array]:
-        """For every group the inverse of ``[W, E]`` at the pair points, ``(n, T, 6, 6)``."""
+        """For every group the inverse of ``[W, E]`` at the pair points, ``(n, T, width, width)``."""
         here = self.here
         out = []
         for g, W in zip(here.system.groups, here.W, strict=True):
@@ -131,16 +131,16 @@ class PairFrames:
             basis = np.concatenate([W, E], axis=1)
             points = here.pair_points[:, None, g.pairs]
             local = np.concatenate([basis[:3] - cross(points, basis[3:]), basis[3:]])
-            out.append(np.linalg.inv(local.transpose(2, 3, 0, 1)))
+            out.append(np.linalg.inv(local[self.span].transpose(2, 3, 0, 1)))
         return out
 
     def components(self, wrenches: Array) -> list[Array]:
         """For every group the components ``(6 - f, n, ..., T)`` of reaction wrenches ``(6, P, ..., T)``."""
-        local = at_pair_points(self.here, wrenches)
+        local = at_pair_points(self.here, wrenches)[self.span]
         out = []
         for g, inverse in zip(self.here.system.groups, self.dual, strict=True):
             values = np.einsum("ijnt,jn...t->in...t", batch_last(inverse), local[:, g.pairs])
-            out.append(values[: 6 - g.row.f])
+            out.append(values[: g.row.held])
         return out
 
     def components_of(self, number: int, i: int, wrenches: Array) -> Array:
@@ -150,9 +150,9 @@ class PairFrames:
         basis = np.concatenate([here.W[number][:, :, i], here.E[:, g.columns[:, i]]], axis=1)
         point = here.pair_points[:, int(g.pairs[i])]
         local = np.concatenate([basis[:3] - cross(point[:, None], basis[3:]), basis[3:]])
-        inverse = np.linalg.inv(np.moveaxis(local, 2, 0))
-        shifted = shift_wrench(wrenches, point.reshape(3, *(1,) * (wrenches.ndim - 2), here.T))
-        return np.asarray(np.einsum("ijt,j...t->i...t", batch_last(inverse), shifted)[: 6 - g.row.f])
+        inverse = np.linalg.inv(np.moveaxis(local[self.span], 2, 0))
+        shifted = shift_wrench(wrenches, point.reshape(3, *(1,) * (wrenches.ndim - 2), here.T))[self.span]
+        return np.asarray(np.einsum("ijt,j...t->i...t", batch_last(inverse), shifted)[: g.row.held])
 
 
 @dataclass(frozen=True)
@@ -193,7 +193,7 @@ def loop_wrench(problem: ForceProblem) -> Wrenches:
     x = problem.solver.solve_transposed(rhs[:, None])
     tree += here.pair_wrenches(x)[:, :, 0]
     null = problem.solver.self_stresses()
-    loops = 6 * here.system.graph.n_loops
+    loops = here.system.graph.loop_rows
     # J^T x is minus the effort that a row exerts in a freedom
     return Wrenches(tree, here.pair_wrenches(null), -x[loops:, 0], -null[loops:])
 
@@ -202,7 +202,7 @@ def row_efforts(here: Configuration, multipliers: Array) -> Array:
     """Efforts ``(F, k, T)`` that multipliers ``(n, k, T)`` of the rows behind those of the loops exert in the freedoms."""
     if not len(multipliers):
         return np.zeros((here.system.n_freedoms, *multipliers.shape[1:]))
-    loops = np.zeros((6 * here.system.graph.n_loops, *multipliers.shape[1:]))
+    loops = np.zeros((here.system.graph.loop_rows, *multipliers.shape[1:]))
     return here.row_efforts(np.concatenate([loops, multipliers]))
 
 
@@ -212,7 +212,7 @@ def tree_wrenches(here: Configuration, loads: Array) -> Array:
 
 
 def newton_euler(problem: ForceProblem) -> Wrenches:
-    """All reaction components and driver efforts: six equations for every moving link, in the minimal bookkeeping.
+    """All reaction components and driver efforts: six equations (in the plane three) for every moving link, in the minimal bookkeeping.
 
     Redundant systems through independent rows and columns.
     """
@@ -233,7 +233,7 @@ Solve = Callable[[Formulation, State, int], tuple[Array, Array | None]]
 def _by_equations(problem: ForceProblem, bookkeeping: BookkeepingName, solve: Solve) -> Wrenches:
     """The wrenches from the equations of a formulation; positions at which different freedoms are held are solved separately."""
     here = problem.here
-    n = here.system.n_rows - 6 * here.system.graph.n_loops
+    n = here.system.n_rows - here.system.graph.loop_rows
     parts = []
     for held, at in problem.solver.by_held():
         mine = here if at.size == here.T else here.part(at)
@@ -264,7 +264,7 @@ def _components_and_efforts(problem: ForceProblem, held: Index, bookkeeping: Boo
         totals = totals + lines.through(multipliers, flank)
     if null is None:
         loops = problem.solver.self_stresses()
-        stress, multiplier_stress = here.pair_wrenches(loops), -loops[6 * here.system.graph.n_loops :]
+        stress, multiplier_stress = here.pair_wrenches(loops), -loops[here.system.graph.loop_rows :]
     else:
         stress, multiplier_stress = _pair_totals(f, state, null)
         stress = stress + lines.through(multiplier_stress, flank) if lines else stress
@@ -401,7 +401,8 @@ def reaction_map(here: Configuration, t: int) -> scipy.sparse.csr_array:
     loop, pair, sign = s.graph.loop_steps
     points = here.pair_points[:, :, t]
     about = (points[:, pair] - here.middles[:, loop, t])[:, None]
-    w = shift_wrench(np.einsum("ij,n->ijn", np.eye(6), sign), about)
+    width = s.graph.width
+    w = shift_wrench(np.einsum("ij,n->ijn", np.eye(6)[:, s.graph.span], sign), about)
     owner = np.repeat(np.arange(len(s.m.pairs)), np.diff(s.first_column))
     E = shift_wrench(here.E[:, :, t], points[:, owner])
     S = here.S[:, :, t]
@@ -414,7 +415,7 @@ def reaction_map(here: Configuration, t: int) -> scipy.sparse.csr_array:
         effort = np.einsum("ifn,ijn->fjn", S[:, columns], w[:, :, mine])
         w[:, :, mine] -= np.einsum("ifn,fjn->ijn", E[:, columns], effort)
     rows = np.broadcast_to(6 * pair + np.arange(6)[:, None, None], w.shape)
-    cols = np.broadcast_to(6 * loop + np.arange(6)[None, :, None], w.shape)
+    cols = np.broadcast_to(width * loop + np.arange(width)[None, :, None], w.shape)
     return scipy.sparse.csr_array((w.ravel(), (rows.ravel(), cols.ravel())), shape=(6 * len(s.m.pairs), s.n_rows))
 
 
@@ -428,10 +429,10 @@ def effort_map(here: Configuration, t: int, acting: Index) -> scipy.sparse.csr_a
     values = here.S[:, acting[place], t]
     values[3:] += cross(values[:3], here.middles[:, loop[step], t])
     values *= sign[step]
-    shape = (6, len(step))
-    rows, cols = np.broadcast_to(place, shape), 6 * loop[step] + np.arange(6)[:, None]
+    values, width = values[s.graph.span], s.graph.width
+    rows, cols = np.broadcast_to(place, values.shape), width * loop[step] + np.arange(width)[:, None]
     efforts = scipy.sparse.csr_array((values.ravel(), (rows.ravel(), cols.ravel())), shape=(len(acting), s.n_rows))
-    others = s.n_rows - 6 * len(s.graph.loops)
+    others = s.n_rows - s.graph.loop_rows
     return scipy.sparse.csr_array(
         scipy.sparse.vstack([efforts, -scipy.sparse.eye_array(others, s.n_rows, k=s.n_rows - others)])
     )
@@ -521,7 +522,7 @@ def user_state(rates: Rates, coordinates: Array, loads: Array, applied: Array, f
     here = rates.here
     s, par = here.system, here.system.par
     inner = internal_state(here, loads, flank)
-    scale = np.broadcast_to(s.row_scale, (s.n_rows, 1))[6 * s.graph.n_loops :]
+    scale = np.broadcast_to(s.row_scale, (s.n_rows, 1))[s.graph.loop_rows :]
     rows = [p.type for p in s.m.pairs]
     couples = [[c.is_couple for c in row.reactions or ()] for row in rows]
     efforts = [[c.is_couple for c in row.efforts] for row in rows]

@@ -13,6 +13,7 @@ import scipy
 from numpy.typing import NDArray
 
 from mechgraph.errors import counted
+from mechgraph.maths.se3 import IN_PLANE, IN_SPACE
 from mechgraph.memo import of_graph
 from mechgraph.model.mechanism import Mechanism
 
@@ -91,6 +92,7 @@ class LinkGraph:
         from parent to child.
     chords : the pairs outside the tree, one a loop.
     loop_steps : a short cycle basis; loop, pair and sign of all steps of all loops, one after the other.
+    planar : whether loops close, and links are in balance, in the x-y plane alone.
     """
 
     n_links: int
@@ -100,6 +102,7 @@ class LinkGraph:
     steps: Index
     chords: Index
     loop_steps: tuple[Index, Index, NDArray[np.float64]]
+    planar: bool = False
 
     def __repr__(self) -> str:
         return f"LinkGraph({self.n_links} links, {len(self.a)} pairs, {counted(self.n_loops, 'loop')})"
@@ -108,6 +111,26 @@ class LinkGraph:
     def n_loops(self) -> int:
         """Number of loops."""
         return len(self.chords)
+
+    @property
+    def span(self) -> slice:
+        """The components of a twist that every loop closes, of a wrench that every link balances: all six, or Rz Tx Ty (Mz Fx Fy)."""
+        return IN_PLANE if self.planar else IN_SPACE
+
+    @property
+    def width(self) -> int:
+        """Number of closure rows of a loop, and of equations of a link: 6, in the plane 3."""
+        return int(self.span.stop - self.span.start)
+
+    @property
+    def turns(self) -> int:
+        """How many of them are turns (moments): 3, in the plane 1; they stand first."""
+        return 3 - int(self.span.start)
+
+    @property
+    def loop_rows(self) -> int:
+        """Number of closure rows of all loops."""
+        return self.width * self.n_loops
 
     @cached_property
     def ends(self) -> tuple[tuple[int, int], ...]:
@@ -173,7 +196,7 @@ def network(m: Mechanism) -> nx.MultiGraph[str]:
 @of_graph
 def link_graph(m: Mechanism) -> LinkGraph:
     """Tree, chords and loops of a mechanism."""
-    return _graph(len(m.links), *m.pair_ends, m.link_index[m.frame])
+    return _graph(len(m.links), *m.pair_ends, m.link_index[m.frame], m.planar)
 
 
 def graph_of_ends(n_links: int, ends: Sequence[tuple[int, int]], frame: int) -> LinkGraph:
@@ -182,7 +205,7 @@ def graph_of_ends(n_links: int, ends: Sequence[tuple[int, int]], frame: int) -> 
     return _graph(n_links, a, b, frame)
 
 
-def _graph(n_links: int, a: Index, b: Index, frame: int) -> LinkGraph:
+def _graph(n_links: int, a: Index, b: Index, frame: int, planar: bool = False) -> LinkGraph:
     edges = _Edges(n_links, a, b)
     depth = [-1] * n_links
     depth[frame] = 0
@@ -200,7 +223,7 @@ def _graph(n_links: int, a: Index, b: Index, frame: int) -> LinkGraph:
     chords = np.delete(np.arange(len(a)), tree)
     height = np.array(depth)
     closing = chords[np.argsort(height[a[chords]] + height[b[chords]], kind="stable")]
-    return LinkGraph(n_links, a, b, frame, steps, chords, _short_loops(n_links, a, b, tree, closing))
+    return LinkGraph(n_links, a, b, frame, steps, chords, _short_loops(n_links, a, b, tree, closing), planar)
 
 
 class _Edges:
@@ -313,7 +336,8 @@ class GraphParts:
 def parts_of(m: Mechanism, graph: LinkGraph) -> GraphParts:
     """Matching and parts from the graph and the freedoms of the pairs, by maximum flow from unknowns to equations."""
     P, N = len(m.pairs), graph.n_links
-    supply = np.array([6 - p.type.f for p in m.pairs], dtype=np.intp)
+    width = graph.width
+    supply = np.array([width - p.type.f for p in m.pairs], dtype=np.intp)
     np.add.at(supply, [m.freedom(drive.freedom)[0] for drive in m.drives], 1)
     pair = np.repeat(np.arange(P), 2)
     link = np.stack([graph.a, graph.b], axis=1).ravel()
@@ -323,7 +347,7 @@ def parts_of(m: Mechanism, graph: LinkGraph) -> GraphParts:
     source, sink = P + N, P + N + 1
     rows = np.concatenate([np.full(P, source), pair, P + links])
     columns = np.concatenate([np.arange(P), P + link, np.full(len(links), sink)])
-    capacity = np.concatenate([supply, np.full(len(pair), 12), np.full(len(links), 6)]).astype(np.int32)
+    capacity = np.concatenate([supply, np.full(len(pair), 2 * width), np.full(len(links), width)]).astype(np.int32)
     network = scipy.sparse.csr_array((capacity, (rows, columns)), shape=(P + N + 2, P + N + 2))
     result = scipy.sparse.csgraph.maximum_flow(network, source, sink)
     flow = scipy.sparse.csr_array(result.flow)
@@ -331,7 +355,7 @@ def parts_of(m: Mechanism, graph: LinkGraph) -> GraphParts:
     serves = np.asarray(flow[pair, P + link]).ravel() > 0
     everywhere, back = (pair, P + link), (P + link[serves], pair[serves])
     over = _alternating(P + N, everywhere, back, np.flatnonzero(used < supply))
-    under = _alternating(P + N, everywhere[::-1], back[::-1], P + links[filled[links] < 6])
+    under = _alternating(P + N, everywhere[::-1], back[::-1], P + links[filled[links] < width])
     names, pair_names = m.link_names(), [p.name for p in m.pairs]
     return GraphParts(
         structural_rank=int(result.flow_value),
@@ -340,7 +364,7 @@ def parts_of(m: Mechanism, graph: LinkGraph) -> GraphParts:
         free_links=tuple(names[i - P] for i in under if i >= P),
         free_pairs=tuple(pair_names[k] for k in under if k < P),
         spare_unknowns=int((supply - used).sum()),
-        spare_equations=int(6 * len(links) - filled.sum()),
+        spare_equations=int(width * len(links) - filled.sum()),
     )
 
 

@@ -45,7 +45,7 @@ enum { ITERATIONS = 8, MOST_STEPS = 20000, MOST_TURNS = 8, POINTS = 8, TOLD = 8,
 /* --- tables and memory ------------------------------------------------------------------------------------------------------------- */
 
 typedef struct {
-  int links, pairs, factors, columns, states, loops, steps, couplings, terms, drives, unknowns, loads, frame_link, rows, stresses, passives, held;
+  int links, pairs, factors, columns, states, loops, steps, couplings, terms, drives, unknowns, loads, frame_link, rows, stresses, passives, held, part, height;
   const int *first, *kind, *column, *state, *number, *ends, *walk, *chord, *loop_first, *loop_pair, *loop_sign, *owner, *column_state,
       *is_length, *place, *effort_factor, *effort_at_b, *dual, *drive, *unknown, *term_first, *term_column, *passive_first, *passive_link, *turns, *load;
   const double *unit, *origin, *start, *start_coordinates, *frame, *marker_a, *marker_b, *factor_number, *effort, *mass, *center,
@@ -84,7 +84,8 @@ static void read_tables(const int *I, const double *P, Model *m) {
   m->links = I[MGK_LINKS], m->pairs = I[MGK_PAIRS], m->factors = I[MGK_FACTORS], m->columns = I[MGK_COLUMNS];
   m->states = I[MGK_STATES], m->loops = I[MGK_LOOPS], m->steps = I[MGK_STEPS], m->couplings = I[MGK_COUPLINGS];
   m->terms = I[MGK_TERMS], m->drives = I[MGK_DRIVES], m->unknowns = I[MGK_UNKNOWNS], m->loads = I[MGK_LOADS];
-  m->frame_link = I[MGK_FRAME], m->passives = I[MGK_PASSIVES], m->held = 6 * m->loops + m->couplings;
+  m->frame_link = I[MGK_FRAME], m->passives = I[MGK_PASSIVES], m->part = I[MGK_FIRST_PART], m->height = I[MGK_LOOP_ROWS];
+  m->held = m->height * m->loops + m->couplings;
   m->rows = m->held + m->passives, m->stresses = m->rows - m->unknowns;
   const int p = m->pairs, f = m->factors, c = m->columns, n = m->links, *i = I + MGK_HEAD;
   m->first = i, i += p + 1, m->kind = i, i += f, m->column = i, i += f, m->state = i, i += f, m->number = i, i += f;
@@ -141,6 +142,7 @@ static size_t lay_out(const Model *m, double *memory, Work *w) {
   int head[MGK_HEAD] = {0};
   head[MGK_LINKS] = m->links, head[MGK_PAIRS] = m->pairs, head[MGK_COLUMNS] = m->columns, head[MGK_STATES] = m->states;
   head[MGK_LOOPS] = m->loops, head[MGK_COUPLINGS] = m->couplings, head[MGK_UNKNOWNS] = m->unknowns, head[MGK_PASSIVES] = m->passives;
+  head[MGK_LOOP_ROWS] = m->height;
   mgk_record(head, places);
   TAKE(record, places[MGK_PARTS]);
 #undef TAKE
@@ -149,7 +151,7 @@ static size_t lay_out(const Model *m, double *memory, Work *w) {
 
 int mgk_record(const int *I, int *places) {
   const int c = I[MGK_COLUMNS], n = I[MGK_LINKS], p = I[MGK_PAIRS], k = I[MGK_COUPLINGS], q = I[MGK_PASSIVES];
-  const int s = 6 * I[MGK_LOOPS] + k + q - I[MGK_UNKNOWNS];
+  const int s = I[MGK_LOOP_ROWS] * I[MGK_LOOPS] + k + q - I[MGK_UNKNOWNS];
   const int lengths[MGK_PARTS] = {I[MGK_STATES], c, c, c, 1, 2, 3 * p, 6 * p, c, c, 6 * n, 6 * p * s, c * s, c, k, k * s, c * s, 6, 1, 1, q ? 6 * n : 0, q, q};
   places[0] = 0;
   FOR(i, MGK_PARTS) places[i + 1] = places[i] + lengths[i];
@@ -404,7 +406,7 @@ static magnitude evaluate(const Model *m, Work *w, const double *x) {
   w->reach = reach;
   FOR(l, m->loops) {
     const int k = m->chord[l];
-    double P[12], Q[12], *e = w->residual + 6 * l;
+    double P[12], Q[12], e[6];
     product(w->pose + 12 * m->ends[2 * k], m->marker_a + 12 * k, P);
     along_pair(m, w, k, 1, x, P);
     product(w->pose + 12 * m->ends[2 * k + 1], m->marker_b + 12 * k, Q);
@@ -421,12 +423,13 @@ static magnitude evaluate(const Model *m, Work *w, const double *x) {
     }
     /* a turn of more than a right angle has a small sine as well */
     const magnitude x_axes = REAL_PART(P[0] * Q[0] + P[4] * Q[4] + P[8] * Q[8]);
-    if (x_axes < 0.0 || REAL_PART(P[1] * Q[1] + P[5] * Q[5] + P[9] * Q[9]) < 0.0) e[0] = INFINITY;
+    if (x_axes < 0.0 || REAL_PART(P[1] * Q[1] + P[5] * Q[5] + P[9] * Q[9]) < 0.0) e[m->part] = INFINITY;
+    memcpy(w->residual + m->height * l, e + m->part, m->height * sizeof(double));
     worst = raised(worst, size_of(e, 6));
     w->closure = raised(w->closure, raised(fabs(sqrt(dot(e, e, 3))), fabs(sqrt(dot(e + 3, e + 3, 3)))));
   }
   FOR(k, m->couplings) {
-    double *e = w->residual + 6 * m->loops + k;
+    double *e = w->residual + m->height * m->loops + k;
     *e = -m->constant[k];
     for (int i = m->term_first[k]; i < m->term_first[k + 1]; i++) *e += m->coefficient[i] * x[m->column_state[m->term_column[i]]];
     worst = raised(worst, fabs(*e)), w->closure = raised(w->closure, fabs(*e));
@@ -452,13 +455,13 @@ static void fill(const Model *m, const double *S, const double *middle, const do
         cross(twist + 6 * c, motion + 3 * l, more);
         FOR(r, 3) s[3 + r] += more[r];
       }
-      FOR(r, 6) out[(6 * l + r) * u + m->place[c]] += sign * s[r];
+      FOR(r, m->height) out[(m->height * l + r) * u + m->place[c]] += sign * s[m->part + r];
     }
   }
   if (motion) return;
   FOR(k, m->couplings) for (int i = m->term_first[k]; i < m->term_first[k + 1]; i++) {
     const int j = m->place[m->term_column[i]];
-    if (j >= 0) out[(6 * m->loops + k) * u + j] = m->coefficient[i];
+    if (j >= 0) out[(m->height * m->loops + k) * u + j] = m->coefficient[i];
   }
 }
 
@@ -534,13 +537,14 @@ static void row_sums(const Model *m, Work *w, const double *dq, const double *pa
     pairs = w->pair_twist;
   }
   FOR(l, m->loops) {
-    double sum[6] = {0};
+    double sum[6] = {0}, about[6];
     for (int i = m->loop_first[l]; i < m->loop_first[l + 1]; i++)
       FOR(r, 6) sum[r] += m->loop_sign[i] * pairs[6 * m->loop_pair[i] + r];
-    twist_about(sum, w->middle + 3 * l, out + 6 * l);
+    twist_about(sum, w->middle + 3 * l, about);
+    memcpy(out + m->height * l, about + m->part, m->height * sizeof(double));
   }
   FOR(k, m->couplings) {
-    double *sum = out + 6 * m->loops + k;
+    double *sum = out + m->height * m->loops + k;
     *sum = 0.0;
     if (dq) for (int i = m->term_first[k]; i < m->term_first[k + 1]; i++) *sum += m->coefficient[i] * dq[m->term_column[i]];
   }
@@ -993,8 +997,8 @@ static void hold(const Model *m, Work *w, double *wrenches, double *efforts, dou
 /* Pair wrenches of multipliers of the loops: w = C^T x, added. */
 static void add_loops(const Model *m, const Work *w, const double *x, double *pairs) {
   FOR(l, m->loops) {
-    double f[6];
-    memcpy(f, x + 6 * l, sizeof f);
+    double f[6] = {0};
+    memcpy(f + m->part, x + m->height * l, m->height * sizeof(double));
     wrench_moved(f, w->middle + 3 * l, 1.0);
     for (int i = m->loop_first[l]; i < m->loop_first[l + 1]; i++)
       FOR(r, 6) pairs[6 * m->loop_pair[i] + r] += m->loop_sign[i] * f[r];
@@ -1034,7 +1038,7 @@ static int self_stresses(const Model *m, Work *w, double *multiplier_stress, dou
     }
     FOR(i, c) if (effort[i] != 0.0) FOR(r, 6) stress[6 * m->owner[i] + r] -= w->E[6 * i + r] * effort[i];
     at_points(m, w, stress, -1.0);
-    FOR(i, k) multiplier_stress[s * k + i] = -null[6 * m->loops + i];
+    FOR(i, k) multiplier_stress[s * k + i] = -null[m->height * m->loops + i];
     largest = raised(largest, fabs(sqrt(dot(stress, stress, p))));
   }
   at_points(m, w, w->reaction, -1.0);
@@ -1120,7 +1124,7 @@ static int forces(const Model *m, Work *w, const double *x, double *record, cons
   }
   solve_transposed(m, w, right, w->row_value);
   add_loops(m, w, w->row_value, w->total);
-  FOR(k, m->couplings) w->multiplier[k] = -w->row_value[6 * m->loops + k];
+  FOR(k, m->couplings) w->multiplier[k] = -w->row_value[m->height * m->loops + k];
   memcpy(w->reaction, w->total, (size_t)6 * m->pairs * sizeof(double));
   FOR(c, m->columns) {
     w->tau[c] = dot(w->S + 6 * c, w->total + 6 * m->owner[c], 6);

@@ -27,14 +27,16 @@
 #define MECHGRAPH_KERNEL_H
 #include <stddef.h>
 
-#define MGK_FORMAT 2
+#define MGK_FORMAT 3
 
 /* The counts at the head of I. */
 enum {
   MGK_IS_FORMAT, MGK_LINKS, MGK_PAIRS, MGK_FACTORS, MGK_COLUMNS, MGK_STATES, MGK_LOOPS, MGK_STEPS, MGK_COUPLINGS, MGK_TERMS,
   MGK_DRIVES, MGK_UNKNOWNS, MGK_LOADS, MGK_FRAME, MGK_FACTOR_NUMBERS, MGK_LOAD_NUMBERS,
-  MGK_PASSIVES, MGK_PASSIVE_LINKS, MGK_HEAD
+  MGK_PASSIVES, MGK_PASSIVE_LINKS, MGK_FIRST_PART, MGK_LOOP_ROWS, MGK_HEAD
 };
+
+/* Every loop closes MGK_LOOP_ROWS components of a twist, from MGK_FIRST_PART on: all six from 0 on, in the plane Rz Tx Ty from 2 on. */
 
 /* Kinds of factors: a turn about x, y or z (number: its pitch), a slide along x, y or z, a rotation (four state numbers), a constant pose. */
 enum { MGK_TURN = 0, MGK_SLIDE = 3, MGK_ROTATION = 6, MGK_POSE = 7 };
@@ -60,7 +62,7 @@ enum {
   MGK_NOT_PASSIVE = 9   /* a passive motion moves other links here, or is not told from another one */
 };
 
-/* Parts of a record, in order, for one position (condition: that number, and how far links reach, by which rounding counts); s = 6 loops + couplings + passives - unknowns self-stresses. */
+/* Parts of a record, in order, for one position (condition: that number, and how far links reach, by which rounding counts); s = rows of loops + couplings + passives - unknowns self-stresses. */
 enum {
   MGK_X, MGK_COORDINATES, MGK_DQ, MGK_DDQ, MGK_CLOSURE, MGK_CONDITION, MGK_POINTS, MGK_REACTIONS, MGK_EFFORTS, MGK_GIVEN, MGK_BODY_LOADS, MGK_STRESS,
   MGK_STRESS_EFFORTS, MGK_COUPLED, MGK_MULTIPLIERS, MGK_MULTIPLIER_STRESS, MGK_COUPLED_STRESS, MGK_SHAKING, MGK_BALANCE, MGK_POWER,

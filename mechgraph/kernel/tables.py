@@ -27,7 +27,7 @@ from mechgraph.pairs.factors import ConstantScrew, Factor, Freedom, Rotation
 
 Integers = NDArray[np.int32]
 
-FORMAT = 2
+FORMAT = 3
 PARTS = (
     "x", "coordinates", "dq", "ddq", "closure", "condition", "points", "reactions", "efforts", "given", "loads", "stress", "stress_efforts",
     "coupled", "multipliers", "multiplier_stress", "coupled_stress", "shaking", "balance", "power",
@@ -95,7 +95,7 @@ def why_not(system: System) -> str | None:
         if not all(map(_keeps_its_line, row.freedoms)):
             name = m.pairs[int(np.flatnonzero(system.type_of == number)[0])].name
             return f"pair {name!r} ({row.symbol}) has a freedom whose axis moves with the pitch"
-    rows = 6 * system.graph.n_loops + len(m.couplings)
+    rows = system.graph.loop_rows + len(m.couplings)
     if rows > ROWS_OF_KERNEL:
         return f"it has {rows} closure rows; expected at most {ROWS_OF_KERNEL}"
     return None
@@ -157,7 +157,7 @@ def layout(system: System, drives: Index, passive: Sequence[PassiveMotion]) -> L
     ends = np.stack([s.a, s.b], axis=1)
     moved = [link for motion in passive for link in motion.links]
     head = [FORMAT, len(s.m.links), len(s.m.pairs), len(steps), s.n_freedoms, s.n_state, g.n_loops, len(pair), K, len(term_columns),
-            len(drives), len(unknown), 0, g.frame, int(numbers[-1]), 0, len(passive), len(moved)]  # fmt: skip
+            len(drives), len(unknown), 0, g.frame, int(numbers[-1]), 0, len(passive), len(moved), g.span.start, g.width]  # fmt: skip
     parts = [
         head, first, [step.kind for _, step in steps], columns[:-1], states[:-1], numbers[:-1], ends.ravel(), tree.ravel(), g.chords,
         np.searchsorted(loop, np.arange(g.n_loops + 1)), pair, sign, s.pair_of_freedom, s.single_rows, s.is_length, place, *effort_factor,
@@ -223,7 +223,7 @@ def _coupling_rows(s: System) -> list[CouplingRows]:
 def _record(s: System, unknowns: int, passives: int) -> tuple[dict[str, slice], dict[str, tuple[int, ...]]]:
     """The places and shapes of the parts of a record."""
     c, n, p, k = s.n_freedoms, len(s.m.links), len(s.m.pairs), len(s.m.couplings)
-    stresses = 6 * s.graph.n_loops + k + passives - unknowns
+    stresses = s.graph.loop_rows + k + passives - unknowns
     shapes: dict[str, tuple[int, ...]] = dict.fromkeys(PARTS, (c,))
     shapes |= {
         "x": (s.n_state,),

@@ -517,6 +517,7 @@ class Entries:
     column: Index
     sign: Array
     first: Index
+    width: int = 6
 
     @cached_property
     def loops(self) -> Place:
@@ -529,10 +530,10 @@ class Entries:
         return self.sign[:, None]
 
     def places(self, n_columns: int) -> Index | None:
-        """Places ``(6, entries)`` of the entries in a matrix of six rows a loop, by rows; None where they fill one loop in order."""
+        """Places ``(width, entries)`` of the entries in a matrix with ``width`` rows a loop; None where they fill one loop in order."""
         if len(self.first) == 2 and np.array_equal(self.column, np.arange(n_columns)):
             return None
-        return (6 * self.loop + np.arange(6)[:, None]) * n_columns + self.column
+        return (self.width * self.loop + np.arange(self.width)[:, None]) * n_columns + self.column
 
 
 def entries_of(graph: LinkGraph, first_column: Index) -> Entries:
@@ -542,7 +543,7 @@ def entries_of(graph: LinkGraph, first_column: Index) -> Entries:
     step = np.repeat(np.arange(len(loop)), width)
     within = np.arange(len(step)) - np.repeat(np.cumsum(width) - width, width)
     first = np.searchsorted(loop[step], np.arange(graph.n_loops + 1))
-    return Entries(loop[step], first_column[pair[step]] + within, sign[step], first.astype(np.intp))
+    return Entries(loop[step], first_column[pair[step]] + within, sign[step], first.astype(np.intp), graph.width)
 
 
 class Places:

@@ -103,13 +103,13 @@ def own_scale(here: Configuration, t: int) -> tuple[Array, Array] | None:
     None where all loops are of about the length L: a position may take a loop far beyond that.
     """
     s = here.system
-    size = lengths_of(s.graph, here.pair_points[:, :, t], here.middles[:, :, t])
+    graph, size = s.graph, lengths_of(s.graph, here.pair_points[:, :, t], here.middles[:, :, t])
     # factor by which a loop is smaller or larger than L from which on its rows are taken over its own size
     own_size = 2.0
     if not ((size * own_size < 1.0) | (size > own_size)).any():
         return None
     rows, columns = np.ones(s.n_rows), np.ones(s.n_freedoms)
-    rows[: 6 * len(size)].reshape(-1, 2, 3)[:, 1] = 2.0 ** np.round(-np.log2(size))[:, None]
+    rows[: graph.loop_rows].reshape(-1, graph.width)[:, graph.turns :] = 2.0 ** np.round(-np.log2(size))[:, None]
     unit = np.abs(rows[:, None] * here.J[:, s.is_length, t]).max(axis=0, initial=0.0)
     columns[s.is_length] = 2.0 ** np.round(-np.log2(np.where(unit > 0.0, unit, 1.0)))
     return rows, columns
@@ -736,9 +736,9 @@ class ClosureRank:
 
     @cached_property
     def local(self) -> tuple[Index, Array, Index]:
-        """Loops with self-stresses of their own ``(n,)``, their wrenches ``(6, 6, n)`` of which the first few count, and how many."""
+        """Loops with self-stresses of their own ``(n,)``, their wrenches ``(width, width, n)`` of which some count, and how many."""
         some, wrenches = self.reduced.local_stress()
-        return some, wrenches, 6 - self.reduced.kept[some]
+        return some, wrenches, self.reduced.width - self.reduced.kept[some]
 
     def connecting(self, shares: Array) -> Array:
         """Self-stresses ``(rows, k)`` that connect loops, for shares ``(shared, k)``; none has a part in the local ones."""
@@ -748,7 +748,7 @@ class ClosureRank:
         """Random self-stresses ``(rows, count)``, each with a part of every one; of size one in the measure of their loops."""
         r = self.reduced
         kept = self._solution.stresses(rng.normal(size=(self.shared, count)))
-        dropped = rng.normal(size=(6 * r.loops - int(r.kept.sum()), count))
+        dropped = rng.normal(size=(r.width * r.loops - int(r.kept.sum()), count))
         size = np.maximum(np.abs(kept).max(axis=0, initial=0.0), 1.0)
         return r.multipliers(kept / size, dropped / size)
 
@@ -756,14 +756,14 @@ class ClosureRank:
         """All self-stresses ``(rows, count - rank)``, orthonormal in the measure of the loops."""
         r = self.reduced
         kept = np.linalg.qr(self._solution.stresses(np.eye(self.shared)))[0]
-        own = 6 * r.loops - int(r.kept.sum())
+        own = r.width * r.loops - int(r.kept.sum())
         dropped = np.concatenate([np.zeros((own, self.shared)), np.eye(own)], axis=1)
         return r.multipliers(np.concatenate([kept, np.zeros((len(kept), own))], axis=1), dropped)
 
     @cached_property
     def sets(self) -> tuple[tuple[int, tuple[int, ...]], ...]:
         """(number of self-stresses, loops) of every set of loops that self-stresses can connect."""
-        own = 6 - self.reduced.kept
+        own = self.reduced.width - self.reduced.kept
         connected = self._connected_blocks() if self.shared else []
         taken = np.zeros(len(own), dtype=bool)
         out = []

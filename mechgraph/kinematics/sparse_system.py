@@ -11,7 +11,7 @@ Source: George and Heath, Solution of sparse linear least squares problems using
 
 The closure equations of a large mechanism as one square sparse system: reduced loop by loop, bordered, factored.
 
-The six rows of a loop are taken with its own unit of length, and turned so that those without any pivot in that
+The rows of a loop are taken with its own unit of length, and turned so that those without any pivot in that
 loop alone (its local redundancy) fall away. A motion within a single loop (the spin of a coupler between spheres) gets a row that
 holds it. A matching of the remaining rows to the free columns leaves some columns and rows unmatched; each is bordered by a random row
 or column, placed at the loop where it lies. What results,
@@ -327,8 +327,11 @@ class LoopSystem(ReducedRows):
         self._m, self._n = self.height, int(self._free.sum())
         place = np.cumsum(self._free) - 1
         more = scipy.sparse.coo_array(self._more(self.rows))
-        rows = [(starts[e.loop][None] + np.arange(6)[:, None])[self._live], int(starts[-1]) + more.row.astype(np.intp)]
-        cols = [np.broadcast_to(place[e.column], (6, len(e.loop)))[self._live], more.col.astype(np.intp)]
+        rows = [
+            (starts[e.loop][None] + np.arange(self.width)[:, None])[self._live],
+            int(starts[-1]) + more.row.astype(np.intp),
+        ]
+        cols = [np.broadcast_to(place[e.column], (self.width, len(e.loop)))[self._live], more.col.astype(np.intp)]
         data = [np.zeros(0)]
         self._motions = 0
         for null, columns in self._motions_of_single_loops() if self.borders is None else ():
@@ -457,10 +460,11 @@ class LoopSystem(ReducedRows):
         """``J (rows, free columns)`` in turned rows and columns of unit size; rows behind those of the loops as they are."""
         e = self.entries
         place = np.cumsum(self._free) - 1
-        live = np.broadcast_to(self._free[e.column], (6, len(e.loop)))
-        rows = (6 * e.loop + np.arange(6)[:, None])[live]
-        cols = np.broadcast_to(place[e.column], (6, len(e.loop)))[live]
-        shape = (6 * len(self.kept), int(self._free.sum()))
+        w = self.width
+        live = np.broadcast_to(self._free[e.column], (w, len(e.loop)))
+        rows = (w * e.loop + np.arange(w)[:, None])[live]
+        cols = np.broadcast_to(place[e.column], (w, len(e.loop)))[live]
+        shape = (w * len(self.kept), int(self._free.sum()))
         J = scipy.sparse.csr_array((self._turned_blocks(there)[live], (rows, cols)), shape=shape)
         return scipy.sparse.csr_array(scipy.sparse.vstack([J, self._more(there)]))
 
@@ -472,11 +476,11 @@ class LoopSystem(ReducedRows):
     @property
     def turned_rows(self) -> scipy.sparse.csr_array:
         """Multipliers of the closure rows for unit ones of the turned rows (wrenches of size ``unit``), ``(rows, rows)``."""
-        n = len(self.kept)
+        n, w = len(self.kept), self.width
         blocks = self.unit * self.unit_wrenches()
-        rows = np.broadcast_to(6 * np.arange(n) + np.arange(6)[:, None, None], blocks.shape)
-        cols = np.broadcast_to(6 * np.arange(n) + np.arange(6)[None, :, None], blocks.shape)
-        loops = scipy.sparse.csr_array((blocks.ravel(), (rows.ravel(), cols.ravel())), shape=(6 * n, 6 * n))
+        rows = np.broadcast_to(w * np.arange(n) + np.arange(w)[:, None, None], blocks.shape)
+        cols = np.broadcast_to(w * np.arange(n) + np.arange(w)[None, :, None], blocks.shape)
+        loops = scipy.sparse.csr_array((blocks.ravel(), (rows.ravel(), cols.ravel())), shape=(w * n, w * n))
         return scipy.sparse.csr_array(scipy.sparse.block_diag([loops, scipy.sparse.eye_array(self.rows.further)]))
 
     def _columns(self, y: Array) -> Array:
@@ -513,8 +517,10 @@ class LoopSystem(ReducedRows):
         """
         e, T = self.entries, len(rows.S)
         free = self._turned_blocks(rows)
-        dropped = ~(np.arange(6) < self.kept[:, None])
-        local = np.zeros((len(self.kept), 6, count))  # zero in the kept rows; fixed columns are zero in the blocks
+        dropped = ~(np.arange(self.width) < self.kept[:, None])
+        local = np.zeros(
+            (len(self.kept), self.width, count)
+        )  # zero in the kept rows; fixed columns are zero in the blocks
         local[dropped] = rng.normal(size=(int(dropped.sum()), count))
         power = np.empty((len(e.column), count, T))
         for loops, at in self._by_width:

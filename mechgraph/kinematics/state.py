@@ -17,8 +17,8 @@ linear relation, reactions are those of the contact.
 
 The rows of the closure equations by loops: entries, the measure of every loop, and the rows of a loop reduced to independent ones.
 
-The six rows of a loop, about its own middle, are taken over its own length, columns of unit size, and turned by a singular value
-decomposition so that those that depend on the others (the redundancy of that loop alone) come last:
+The rows of a loop (six, in a plane three), about its own middle, are taken over its own length, columns of unit size, and turned by a
+singular value decomposition so that those that depend on the others (the redundancy of that loop alone) come last:
 
     U_l^T M_l J_l D = [K_l; 0].
 
@@ -209,13 +209,13 @@ class Configuration:
 
     @cached_property
     def W(self) -> list[Array]:
-        """For every group the reaction wrenches ``(6, 6 - f, n, T)``."""
+        """For every group the reaction wrenches ``(6, components, n, T)``."""
         s = self.system
         whole = self._wrenches(s.reaction_table, s.reaction_numbers)
         out, at = [], 0
         for number, g in enumerate(s.groups):
             if g.row.reactions is None:
-                out.append(evaluation.reciprocal(self.S[:, g.columns], self.frames[number][-1]))
+                out.append(evaluation.reciprocal(self.S[:, g.columns], self.frames[number][-1], g.row.normal))
                 continue
             count = len(g.row.reactions) * len(g.pairs)
             own = whole[:, at : at + count].reshape(6, len(g.row.reactions), len(g.pairs), self.T)
@@ -266,7 +266,7 @@ class Configuration:
 
     @property
     def loop_errors(self) -> Array:
-        """Closure errors of the loops about their middles, stacked ``(6 loops, T)``."""
+        """Closure errors of the loops about their middles, stacked ``(loop rows, T)``."""
         s = self.system
         return self._about_middles(_summed(s.loops_of_chords, self.chord_errors))
 
@@ -276,12 +276,13 @@ class Configuration:
         return _summed(self.system.graph.loop_averages, self.pair_points)
 
     def _about_middles(self, twists: Array) -> Array:
-        """Twists ``(6, loops, T)`` about the internal origin taken about the middle of their loop, in place; stacked ``(6 loops, T)``.
+        """Twists ``(6, loops, T)`` about the internal origin taken about the middle of their loop, in place; stacked ``(loop rows, T)``.
 
         So the rows of a loop are as good anywhere: about a fixed point their condition would grow with the square of its distance.
         """
         twists[3:] += cross(twists[:3], self.middles)
-        return twists.swapaxes(0, 1).reshape(6 * self.system.graph.n_loops, self.T)
+        graph = self.system.graph
+        return twists[graph.span].swapaxes(0, 1).reshape(graph.loop_rows, self.T)
 
     @cached_property
     def closure(self) -> Array:
@@ -306,17 +307,17 @@ class Configuration:
 
     @property
     def loop_jacobian(self) -> Array:
-        """Twists of the freedoms about the middles of the loops, with their signs in the rows of every loop, ``(6 loops, F, T)``."""
+        """Twists of the freedoms about the middles of the loops, with their signs in the rows of every loop, ``(loop rows, F, T)``."""
         s, e = self.system, self.system.entries
         twists, origins = self._twists
         parts, arms = twists.take(e.column, axis=2), origins.take(e.column, axis=1)
         parts *= e.signs
         arms -= self.middles[:, e.loops]
         parts[1] += cross(arms, parts[0])
-        rows = parts.reshape(6, *parts.shape[2:])
+        rows = parts.reshape(6, *parts.shape[2:])[s.graph.span]
         if s.entry_places is None:
             return rows
-        n = 6 * s.graph.n_loops
+        n = s.graph.loop_rows
         out = np.zeros((n * s.n_freedoms, self.T), dtype=rows.dtype)
         out[s.entry_places] = rows
         return out.reshape(n, s.n_freedoms, self.T)
@@ -383,14 +384,15 @@ class Configuration:
         return carriers
 
     def loop_sums(self, per_pair: Array) -> Array:
-        """Signed sum of pair terms along every loop, about its middle, stacked ``(6 loops, T)``."""
+        """Signed sum of pair terms along every loop, about its middle, stacked ``(loop rows, T)``."""
         return self._about_middles(_summed(self.system.graph.sparse_loop_matrix, per_pair))
 
     def pair_wrenches(self, x: Array) -> Array:
         """Pair wrenches ``(6, P, k, T)`` of the loop rows of ``x (n_rows, k, T)``: ``w = C^T x``, taken about the internal origin."""
         s = self.system
-        n = s.graph.n_loops
-        loops = x[: 6 * n].reshape(n, 6, *x.shape[1:]).copy()
+        n, span = s.graph.n_loops, s.graph.span
+        loops = np.zeros((n, 6, *x.shape[1:]), dtype=x.dtype)
+        loops[:, span] = x[: s.graph.loop_rows].reshape(n, s.graph.width, *x.shape[1:])
         parts = loops.swapaxes(0, 1)
         parts[:3] += cross(self.middles[:, :, None], parts[3:])
         flat = np.asarray(s.graph.sparse_loop_matrix.T @ loops.reshape(n, 6 * math.prod(x.shape[1:])))
@@ -631,7 +633,7 @@ class ClosureRows:
     @property
     def count(self) -> int:
         """Number of rows."""
-        return 6 * self.graph.n_loops + self.further
+        return self.graph.loop_rows + self.further
 
 
 class ReducedRows:
@@ -663,6 +665,11 @@ class ReducedRows:
         return len(self.entries.first) - 1
 
     @property
+    def width(self) -> int:
+        """Number of rows of a loop."""
+        return self.rows.graph.width
+
+    @property
     def height(self) -> int:
         """Number of kept rows and further rows."""
         return int(self.kept.sum()) + self.rows.further
@@ -684,14 +691,14 @@ class ReducedRows:
         return np.concatenate([mine, self.loops + np.arange(self.rows.further)]).astype(np.intp)
 
     def _blocks(self, S: Array, middles: Array) -> Array:
-        """Entries ``(..., 6, entries)`` about the ``middles (..., 3, loops)``, over the lengths of the loops; zero in the fixed columns."""
+        """Entries ``(..., width, entries)`` about the ``middles (..., 3, loops)``, over the lengths of the loops; zero in fixed columns."""
         e = self.entries
         out = S[..., e.column]
         turns, slides = out[..., :3, :], out[..., 3:, :]
         slides += np.moveaxis(cross(np.moveaxis(turns, -2, 0), np.moveaxis(middles[..., e.loop], -2, 0)), 0, -2)
         slides /= self.length[e.loop]
         out *= e.sign * self._free[e.column]
-        return out
+        return out[..., self.rows.graph.span, :]
 
     @cached_property
     def _by_width(self) -> list[tuple[Index, Index]]:
@@ -705,11 +712,11 @@ class ReducedRows:
 
     def _reduce(self, blocks: Array) -> None:
         """Turn the rows of every loop so that the dependent ones come last, all loops of one width at once."""
-        n = self.loops
-        self._turn, self.kept, self.dropped = np.empty((n, 6, 6)), np.zeros(n, dtype=np.intp), 0.0
+        n, w = self.loops, self.width
+        self._turn, self.kept, self.dropped = np.empty((n, w, w)), np.zeros(n, dtype=np.intp), 0.0
         for loops, at in self._by_width:
             block = np.moveaxis(blocks[:, at], 0, 1)
-            U, s, _ = np.linalg.svd(block, full_matrices=block.shape[2] < 6)
+            U, s, _ = np.linalg.svd(block, full_matrices=block.shape[2] < w)
             self._turn[loops] = np.swapaxes(U, 1, 2)
             s = s / np.maximum(s.max(axis=1, initial=0.0), 1.0)[:, None]
             self.kept[loops] = (s > RANKS.loop).sum(axis=1)
@@ -717,12 +724,12 @@ class ReducedRows:
 
     @cached_property
     def _live(self) -> Mask:
-        """Which of the turned entries ``(6, entries)`` stand in the system: kept rows, free columns."""
+        """Which of the turned entries ``(width, entries)`` stand in the system: kept rows, free columns."""
         e = self.entries
-        return (np.arange(6)[:, None] < self.kept[e.loop][None]) & self._free[e.column][None]
+        return (np.arange(self.width)[:, None] < self.kept[e.loop][None]) & self._free[e.column][None]
 
     def _turned_blocks(self, rows: ClosureRows) -> Array:
-        """Entries ``(..., 6, entries)`` of rows at any positions in the turned rows of their loops and columns of unit size."""
+        """Entries ``(..., width, entries)`` of rows at any positions in the turned rows of their loops and columns of unit size."""
         blocks = self._first if rows is self.rows else self._unit_blocks(rows)
         turned = np.empty_like(blocks)
         for loops, at in self._by_width:
@@ -730,7 +737,7 @@ class ReducedRows:
         return turned
 
     def _unit_blocks(self, rows: ClosureRows) -> Array:
-        """Entries ``(..., 6, entries)`` of rows at any positions in columns of unit size."""
+        """Entries ``(..., width, entries)`` of rows at any positions in columns of unit size."""
         out = self._blocks(rows.S, rows.middles)
         out *= self._scale[self.entries.column]
         return out
@@ -741,8 +748,8 @@ class ReducedRows:
         e = self.entries
         starts = np.concatenate([[0], np.cumsum(self.kept)])
         place = np.cumsum(self._free) - 1
-        rows = (starts[e.loop][None] + np.arange(6)[:, None])[self._live]
-        cols = np.broadcast_to(place[e.column], (6, len(e.loop)))[self._live]
+        rows = (starts[e.loop][None] + np.arange(self.width)[:, None])[self._live]
+        cols = np.broadcast_to(place[e.column], (self.width, len(e.loop)))[self._live]
         shape = (int(starts[-1]), int(self._free.sum()))
         K = scipy.sparse.csr_array((self._turned_blocks(self.rows)[self._live], (rows, cols)), shape=shape)
         if self.rows.more is None:
@@ -753,25 +760,26 @@ class ReducedRows:
     @cached_property
     def dense_matrix(self) -> Array:
         """The same as a full matrix."""
-        e, m = self.entries, int(self.kept.sum())
-        whole = np.zeros((6 * self.loops, len(self._free)))
-        whole[6 * e.loop + np.arange(6)[:, None], e.column] = self._turned_blocks(self.rows)
+        e, m, w = self.entries, int(self.kept.sum()), self.width
+        whole = np.zeros((w * self.loops, len(self._free)))
+        whole[w * e.loop + np.arange(w)[:, None], e.column] = self._turned_blocks(self.rows)
         K = np.zeros((self.height, int(self._free.sum())))
-        K[:m] = whole[(np.arange(6) < self.kept[:, None]).ravel()][:, self._free]
+        K[:m] = whole[(np.arange(w) < self.kept[:, None]).ravel()][:, self._free]
         if self.rows.more is not None:
             K[m:] = (self.rows.more.toarray() * self._scale)[:, self._free]
         return K
 
     def _turned(self, b: Array) -> Array:
-        """Right sides ``(6 loops, k)`` as turned rows ``(loops, 6, k)``."""
-        local = b.reshape(self.loops, 6, b.shape[1]).copy()
-        local[:, 3:] /= self.length[:, None, None]
+        """Right sides ``(loop rows, k)`` as turned rows ``(loops, width, k)``."""
+        local = b.reshape(self.loops, self.width, b.shape[1]).copy()
+        local[:, self.rows.graph.turns :] /= self.length[:, None, None]
         return np.asarray(self._turn @ local)
 
     def open_part(self, residual: Array) -> float:
         """Largest component of a residual ``(rows,)`` in all rows, those of a loop in its own measure."""
-        loops = np.abs(self._turned(residual[: 6 * self.loops, None])).max(initial=0.0)
-        return float(max(loops, np.abs(residual[6 * self.loops :]).max(initial=0.0)))
+        n = self.rows.graph.loop_rows
+        loops = np.abs(self._turned(residual[:n, None])).max(initial=0.0)
+        return float(max(loops, np.abs(residual[n:]).max(initial=0.0)))
 
     @property
     def rounding(self) -> float:
@@ -780,8 +788,9 @@ class ReducedRows:
 
     def kept_part(self, b: Array) -> Array:
         """Right sides ``(rows, k)`` in the kept and the further rows, ``(height, k)``."""
-        turned = self._turned(b[: 6 * self.loops])[np.arange(6) < self.kept[:, None]]
-        return np.concatenate([turned, b[6 * self.loops :]])
+        n = self.rows.graph.loop_rows
+        turned = self._turned(b[:n])[np.arange(self.width) < self.kept[:, None]]
+        return np.concatenate([turned, b[n:]])
 
     @cached_property
     def least_norm(self) -> LeastNorm:
@@ -796,29 +805,30 @@ class ReducedRows:
         return out
 
     def _wrenches(self, kept: Array, dropped: Array) -> Array:
-        full = np.empty((self.loops, 6, kept.shape[1]))
-        mask = np.arange(6) < self.kept[:, None]
+        full = np.empty((self.loops, self.width, kept.shape[1]))
+        mask = np.arange(self.width) < self.kept[:, None]
         full[mask], full[~mask] = kept, dropped
         return self._unscaled(np.moveaxis(np.swapaxes(self._turn, 1, 2) @ full, 1, 0))
 
     def _unscaled(self, y: Array) -> Array:
-        """Loop wrenches ``(6, loops, k)`` about the middles from multipliers of rows over the lengths."""
-        return np.concatenate([y[:3], y[3:] / self.length[:, None]])
+        """Loop wrenches ``(width, loops, k)`` about the middles from multipliers of rows over the lengths."""
+        t = self.rows.graph.turns
+        return np.concatenate([y[:t], y[t:] / self.length[:, None]])
 
     def multipliers(self, kept: Array, dropped: Array | None = None) -> Array:
         """Loop wrenches and multipliers of further rows ``(rows, k)`` from those of kept (and of dropped) rows."""
-        m = int(self.kept.sum())
-        nothing = np.zeros((6 * self.loops - m, kept.shape[1]))
+        m, n = int(self.kept.sum()), self.rows.graph.loop_rows
+        nothing = np.zeros((n - m, kept.shape[1]))
         wrenches = self._wrenches(kept[:m], nothing if dropped is None else dropped)
-        return np.concatenate([np.moveaxis(wrenches, 0, 1).reshape(6 * self.loops, kept.shape[1]), kept[m:]])
+        return np.concatenate([np.moveaxis(wrenches, 0, 1).reshape(n, kept.shape[1]), kept[m:]])
 
     def unit_wrenches(self) -> Array:
-        """Loop wrenches ``(6, 6, loops)`` of unit multipliers of the turned rows, one column a row."""
+        """Loop wrenches ``(width, width, loops)`` of unit multipliers of the turned rows, one column a row."""
         return self._unscaled(self._turn.transpose(2, 0, 1)).transpose(0, 2, 1)
 
     def local_stress(self) -> tuple[Index, Array]:
-        """Loops with self-stresses of their own, and these as loop wrenches ``(6, 6, n)``, those of rows that were kept left out."""
-        some = np.flatnonzero(self.kept < 6)
+        """Loops with self-stresses of their own, and these as loop wrenches ``(width, width, n)``, kept rows left out."""
+        some = np.flatnonzero(self.kept < self.width)
         unit = self.unit_wrenches()[:, :, some]
-        order = (np.arange(6)[:, None] + self.kept[some]) % 6
+        order = (np.arange(self.width)[:, None] + self.kept[some]) % self.width
         return some, np.take_along_axis(unit, order[None], axis=1)

@@ -1,6 +1,6 @@
 """A mechanism made ready for evaluation: layout, numbers, states, rows of the closure equations.
 
-The rows of the closure equations: every constraint contributes its own, a loop six, a coupling of freedoms one.
+The rows of the closure equations: every constraint contributes its own, a loop six (in the plane three), a coupling of freedoms one.
 
 Rows of all contributors stand one below the other, in the order of ``System.rows``: the loops first. A new kind of constraint
 implements the protocol ``Rows``; nothing else in the package knows how many rows there are or where they come from.
@@ -52,17 +52,17 @@ class Evaluated(Protocol):
 
     @property
     def loop_errors(self) -> Array:
-        """Closure errors of the loops about their middles, stacked ``(6 loops, T)``."""
+        """Closure errors of the loops about their middles, stacked ``(loop rows, T)``."""
 
     @property
     def loop_jacobian(self) -> Array:
-        """Twists of the freedoms in the rows of every loop, about its middle, ``(6 loops, F, T)``."""
+        """Twists of the freedoms in the rows of every loop, about its middle, ``(loop rows, F, T)``."""
 
     def pair_sums(self, terms: Array) -> Array:
         """``(6, F, T)`` -> ``(6, P, T)``."""
 
     def loop_sums(self, per_pair: Array) -> Array:
-        """``(6, P, T)`` -> ``(6 loops, T)``."""
+        """``(6, P, T)`` -> ``(loop rows, T)``."""
 
 
 class PositionRows(Protocol):
@@ -104,13 +104,13 @@ class LoopRows:
     ``J`` and ``bias`` are the derivatives where the loops are closed and rates meet the rows, as the middle moves otherwise.
     """
 
-    def __init__(self, n_loops: int) -> None:
-        self.n_loops = n_loops
+    def __init__(self, graph: LinkGraph) -> None:
+        self.n_loops, self.count = graph.n_loops, graph.loop_rows
 
     @property
     def scale(self) -> Array:
         """Ones."""
-        return np.ones((6 * self.n_loops, 1))
+        return np.ones((self.count, 1))
 
     def residual(self, here: Evaluated) -> Array:
         """Closure errors of the loops."""
@@ -308,7 +308,7 @@ class System(States):
     @cached_property
     def rows(self) -> list[Rows]:
         """The contributors of closure rows: the loops, then the couplings."""
-        loops: list[Rows] = [LoopRows(self.graph.n_loops)]
+        loops: list[Rows] = [LoopRows(self.graph)]
         return loops + ([self._coupling_rows()] if self.m.couplings else [])
 
     @property

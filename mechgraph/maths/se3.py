@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
+IN_SPACE, IN_PLANE = slice(0, 6), slice(2, 5)
+"""Components of twists (wrenches): all six, and Rz, Tx, Ty (Mz, Fx, Fy) of the x-y plane."""
 
 
 def multiplied(A: Array, B: Array, out: Array | None = None) -> Array:

@@ -23,6 +23,7 @@ from mechgraph.errors import DeclarationError
 from mechgraph.fields import (
     BY_FREEDOM,
     FACTS,
+    FLAG,
     NUMBER,
     TABLE,
     TABLES,
@@ -32,13 +33,14 @@ from mechgraph.fields import (
     tolerance_fault,
 )
 from mechgraph.maths.inertia import physical
-from mechgraph.maths.se3 import Array
+from mechgraph.maths.se3 import IN_PLANE, IN_SPACE, Array
 from mechgraph.maths.tolerances import SHAPES
 from mechgraph.memo import Once, of_graph
 from mechgraph.model.couplings import BaseCoupling, rim_faults
 from mechgraph.model.loads import LOADS, Load
 from mechgraph.model.motion import Drive
 from mechgraph.model.pair import NO_POINTS, Link, Marker, Pair, largest_cosine
+from mechgraph.model.plane import plane_faults
 from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.pairs.contact_types import travels
 from mechgraph.pairs.pair_type import PairType
@@ -70,6 +72,9 @@ class Parts(Formatted, Once):
             default="exact",
         ),
     ]
+    planar: Annotated[
+        bool, FLAG("whether it moves in the x-y plane alone, and everything is counted there", default="false")
+    ]
     links: Annotated[
         tuple[Link, ...], TABLES("links; left out, they follow from the pairs, massless", key="link", table="link")
     ]
@@ -94,6 +99,11 @@ class Parts(Formatted, Once):
         TABLE("what `respond` takes where it is given nothing else", table="response", default="none"),
     ]
     expected: Annotated[Mapping[str, Any], FACTS("facts that a test checks; any names", default="empty")]
+
+    @property
+    def span(self) -> slice:
+        """The components of twists and wrenches in which it moves and is in balance: all six, or Rz Tx Ty (Mz Fx Fy)."""
+        return IN_PLANE if self.planar else IN_SPACE
 
     def link_names(self) -> tuple[str, ...]:
         """Names of the links, in order."""
@@ -294,6 +304,10 @@ def declaration_faults(m: Parts) -> list[str]:
         return faults
     if not _links_are_sound(m.links):
         faults += [fault for link in m.links for fault in link.faults()]
+    if m.planar is not True and m.planar is not False:
+        faults.append(wrong(m.planar, "planar", "true or false"))
+    if m.planar:
+        faults += plane_faults(m.links, m.pairs, m.loads)
     names, pair_names = _texts(m.link_names()), _texts([pair.name for pair in m.pairs])
     faults += _repeated(names, "link") + _repeated(pair_names, "pair")
     tol = sound_tol(m.tol)
@@ -430,7 +444,7 @@ def _markers_are_sound(markers: Sequence[Any], most: Array) -> bool:
 
 def item_faults(m: Parts) -> list[str]:
     """Faults of drives and loads alone, for links, pairs and couplings that were checked before."""
-    return _kind_faults(m) or _reference_faults(m)
+    return _kind_faults(m) or (plane_faults((), (), m.loads) if m.planar else []) + _reference_faults(m)
 
 
 @of_graph

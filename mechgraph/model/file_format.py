@@ -223,10 +223,14 @@ def _series_of(name: str, words: str, one: dict[str, Any]) -> dict[str, Any]:
 
 
 SHARED = {
-    "vector": _array(3),
+    "vector": {"description": "Three numbers; in a planar file two will do.", **_array(3), "minItems": 2},
     "six": _array(6),
     **_series_of("series", "A number, or an array of numbers, one a position.", {"type": "number"}),
-    **_series_of("vector_series", "Three numbers, or an array of such, one a position.", _array(3)),
+    **_series_of(
+        "vector_series",
+        "Three numbers, in a planar file two (a moment: one); or an array of such, one a position.",
+        {"$ref": "#/$defs/vector"},
+    ),
 }
 """Values that many fields share."""
 MARK = re.compile(r"(<!-- fields: ([\w, ]+) -->\n)(?:\|[^\n]*\n)*")

@@ -685,7 +685,7 @@ class Wrench(Load):
     subject: ClassVar[str] = "wrench on {link}"
     link: Annotated[str, LINK_NAME("the link it acts on")]
     force: Annotated[Value, VECTOR_SERIES("at least one of the two", FORCE, default="none")] = None
-    moment: Annotated[Value, VECTOR_SERIES("at least one of the two", MOMENT, default="none")] = None
+    moment: Annotated[Value, VECTOR_SERIES("at least one of the two", MOMENT, default="none", normal=True)] = None
     point: Annotated[
         Any,
         NAMED_POINT(

@@ -31,6 +31,7 @@ from mechgraph.model.declaration import Parts, declaration_faults, flat_start, i
 from mechgraph.model.loads import Gravity, Load
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Pair
+from mechgraph.model.plane import in_space, pair_in_plane, pair_in_space
 from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.pairs.contact_types import row_of, travels
 from mechgraph.pairs.pair_type import TABLE, PairType
@@ -198,6 +199,9 @@ class Mechanism(Parts, Shown):
         Accuracy of directions [rad] and distances (relative to L), see ``snapped``. Default: exact.
     response : ResponseSetup, optional
         Default arguments of ``respond``.
+    planar : bool
+        It moves in the x-y plane alone: points, centers and forces may have two numbers, inertias and moments one (about z), R needs no
+        axis, P one in the plane. What leaves the plane is zero by the model; 3 closure equations a loop, 3 equilibrium equations a link.
     source : str
         Where the mechanism comes from.
     description : str
@@ -240,6 +244,7 @@ class Mechanism(Parts, Shown):
         units: Mapping[str, str] | None = None,
         tol: float | None = None,
         response: ResponseSetup | None = None,
+        planar: bool = False,
         source: str = "",
         description: str = "",
         expected: Mapping[str, Any] | None = None,
@@ -259,13 +264,16 @@ class Mechanism(Parts, Shown):
             units=MappingProxyType(dict(units) if isinstance(units, Mapping) else {}),
             tol=plain(tol),
             response=response,
+            planar=planar,
             source=source,
             description=description,
             expected=MappingProxyType(dict(expected) if isinstance(expected, Mapping) else {}),
         )
         if not faults:
+            self._take_plane()
             faults = declaration_faults(self)
             if faults and self._take_quantities():
+                self._take_plane()
                 self._set(_kept={}, _kept_of_graph={})  # what was found of pairs with quantities
                 faults = declaration_faults(self)
         self._finish(start, faults + mapping_faults(units=units, start=start, expected=expected))
@@ -301,6 +309,20 @@ class Mechanism(Parts, Shown):
         }
         self._set(**{key: tuple(items) for key, items in new.items() if len(items) == len(getattr(self, key))})
         return True
+
+    def _take_plane(self) -> None:
+        """Of a planar mechanism what is declared with two numbers in three, pairs as rows of the plane; of others rows of space."""
+        if self.planar is not True:
+            if any(
+                isinstance(p, Pair) and isinstance(p.type, PairType) and p.type.normal is not None for p in self.pairs
+            ):
+                self._set(pairs=tuple(map(pair_in_space, self.pairs)))
+            return
+        self._set(
+            links=tuple(in_space(link) if isinstance(link, Link) else link for link in self.links),
+            pairs=tuple(map(pair_in_plane, self.pairs)),
+            loads=tuple(in_space(load) if isinstance(load, Load) else load for load in self.loads),
+        )
 
     def _finish(self, start: Any, faults: list[str]) -> None:
         """Raise all faults at once, those of ``start`` too; keep start values by full freedom names."""
@@ -394,8 +416,10 @@ class Mechanism(Parts, Shown):
             (k, v) for k, v in vars(self).items() if isinstance(getattr(Mechanism, k, None), cached_property)
         )
         start = changes.get("start", self.start)
+        out._take_plane()
         faults = item_faults(out)
         if faults and out._take_quantities():
+            out._take_plane()
             faults = item_faults(out)
         out._finish(start, wrong_kinds + faults + mapping_faults(start=start))
         if "loads" in changes:
@@ -449,6 +473,7 @@ class Mechanism(Parts, Shown):
         """Whether links and pairs have the names, ends and types of those of another mechanism, in the same order."""
         return (
             self.frame == other.frame
+            and self.planar == other.planar
             and [link.name for link in self.links] == [link.name for link in other.links]
             and len(self.pairs) == len(other.pairs)
             and all(

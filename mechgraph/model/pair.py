@@ -469,7 +469,7 @@ class Pair(Described):
 
     def in_units(self, base: tuple[float, float, float], turns: bool = False) -> Pair:
         """The same pair with its numbers, and the lengths in a type of its own, in other units (see ``Described``)."""
-        return super().in_units(base, turns).replace(type=self.type.scaled(1 / base[0]))
+        return super().in_units(base, turns).replace(type=(self.type.spatial or self.type).scaled(1 / base[0]))
 
     def faults(self, tol: float = 0.0) -> list[str]:
         """What is wrong with this pair alone, one line each, in a mechanism whose directions are meant to ``tol``."""

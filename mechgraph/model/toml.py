@@ -429,7 +429,8 @@ def _as_sweep(out: dict[str, Any], motion: Motion) -> dict[str, Any]:
 def to_data(m: Mechanism, path: str = "") -> dict[str, Any]:
     """The content of the TOML file of a mechanism."""
     data: dict[str, Any] = {"schema": SCHEMA}
-    own = {p.type.symbol: p.type for p in m.pairs if not travels(p.type) and PAIR_TABLE.get(p.type.symbol) != p.type}
+    rows = [p.type.spatial or p.type for p in m.pairs]
+    own = {row.symbol: row for row in rows if not travels(row) and PAIR_TABLE.get(row.symbol) != row}
     if own:
         data["pair_type"] = [_type_data(row, path) for row in own.values()]
     for key, attribute in TABLES_OF_FILE["file"].attributes.items():

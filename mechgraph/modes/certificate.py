@@ -122,7 +122,7 @@ def rod_row(here: Configuration, rod: int) -> tuple[Ball, Ball]:
 
 
 def loop_rows(here: Configuration, loop: int) -> tuple[Ball, Ball]:
-    """Of a loop at one position ``f (6,)`` by which it is open, about its middle, and its derivatives by the freedoms along it ``(6, n)``.
+    """Of a loop at one position ``f (width,)`` by which it is open, about its middle, and its derivatives by its freedoms ``(width, n)``.
 
     ``f = (vee (R - R^T) / 2, p)`` and ``f' = (w + vee part of w x (R - 1), v + w x p)`` for a twist ``(w, v)``.
 
@@ -134,7 +134,8 @@ def loop_rows(here: Configuration, loop: int) -> tuple[Ball, Ball]:
     walk = _Walk(here, here.middles[:, loop, 0])
     for pair, sign in here.system.graph.loops[loop]:
         walk.along(pair, sign)
-    return walk.rows()
+    f, A = walk.rows()
+    return f[here.system.graph.span], A[here.system.graph.span]
 
 
 class _Walk:
@@ -352,10 +353,10 @@ def rows(here: Configuration) -> tuple[Ball, Ball]:
     largest = s.n_freedoms * (1.0 + size.sum(axis=1) * np.abs(here.x).max(initial=1.0))
     f, A = Ball(here.residual[:, 0].copy(), STORED * largest), Ball(J.copy(), STORED * size)
     for loop, (columns, _) in enumerate(s.loop_columns):
-        _put(f, A, slice(6 * loop, 6 * loop + 6), columns, loop_rows(here, loop))
+        _put(f, A, slice(s.graph.width * loop, s.graph.width * (loop + 1)), columns, loop_rows(here, loop))
     if isinstance(s, RodSystem):
         for rod, columns in enumerate(_columns_of_rods(s)):
-            row = 6 * s.graph.n_loops + rod
+            row = s.graph.loop_rows + rod
             _put(f, A, slice(row, row + 1), columns, rod_row(here, rod))
     return f, A
 

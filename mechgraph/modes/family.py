@@ -272,7 +272,7 @@ class Family:
         """Rates ``(rows, T)`` at which markers that move with twists ``V (6, 2 P, T)``, and drivers, open the rows."""
         s, P = self.system, len(self.system.m.pairs)
         out = (here.J[:, self.columns] * change[: len(self.columns)]).sum(axis=1)
-        out[: 6 * s.graph.n_loops] += here.loop_sums(V[:, :P] - V[:, P:])
+        out[: s.graph.loop_rows] += here.loop_sums(V[:, :P] - V[:, P:])
         return np.asarray(out)
 
     def random_closed(self, rng: np.random.Generator) -> tuple[Member, Array] | None:

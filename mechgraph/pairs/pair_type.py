@@ -160,29 +160,31 @@ def reactions_of(row: PairType, pitch: Array, frames: Sequence[Array], x: Array 
         if not row.computed_reactions:
             return W
         return without_work(W, efforts_of(row, pitch, frames, x), twists_of(row, pitch, frames, x))
-    return reciprocal(twists_of(row, pitch, frames, x), frames[-1])
+    return reciprocal(twists_of(row, pitch, frames, x), frames[-1], row.normal)
 
 
-def reciprocal(S: Array, B: Array) -> Array:
+def reciprocal(S: Array, B: Array, normal: int | None = None) -> Array:
     """Wrenches ``(6, 6 - f, n, T)`` that do no work on the twists ``S (6, f, n, T)``: the null space of ``S^T``.
 
-    It is taken about the origin of marker B, in its directions.
+    It is taken about the origin of marker B, in its directions; in a plane on which the axis ``normal`` of B stands among the three of it.
     """
     f = S.shape[1]
-    if not f:
+    if not f and normal is None:
         return np.broadcast_to(np.eye(6)[:, :, None, None], (6, 6, *B.shape[2:])).copy()
+    rows = slice(None) if normal is None else [normal, *(3 + i for i in range(3) if i != normal)]
     turned = np.einsum("jint,jfnt->ifnt", B[:, :3], S[:3])
     moved = S[3:] + cross(S[:3], np.broadcast_to(B[:, None, 3], S[:3].shape))
     local = np.concatenate([turned, np.einsum("jint,jfnt->ifnt", B[:, :3], moved)])
-    null = _null_of_transpose(np.moveaxis(local, (0, 1), (-2, -1)))
-    null = np.moveaxis(null, (-2, -1), (0, 1))
+    found = np.moveaxis(_null_of_transpose(np.moveaxis(local[rows], (0, 1), (-2, -1))), (-2, -1), (0, 1))
+    null = np.zeros((6, *found.shape[1:]), dtype=found.dtype)
+    null[rows] = found
     force = np.einsum("ijnt,jcnt->icnt", B[:, :3], null[3:])
     moment = np.einsum("ijnt,jcnt->icnt", B[:, :3], null[:3])
     return np.concatenate([moment + cross(np.broadcast_to(B[:, None, 3], force.shape), force), force])
 
 
 def _null_of_transpose(S: Array) -> Array:
-    """Bases ``(..., 6, 6 - f)`` of the null spaces of ``S^T`` for ``S (..., 6, f)``.
+    """Bases ``(..., n, n - f)`` of the null spaces of ``S^T`` for ``S (..., n, f)``.
 
     Orthonormal for real ``S``. For complex ones that of the real part, corrected by its range ``U`` so that ``S^T N = 0``
     without a conjugate: ``N - U (S^T U)^-1 S^T N``.
@@ -337,6 +339,8 @@ class PairType:
     touching: Touching | None = field(init=False, default=None)
     computed_reactions: bool = field(init=False, default=False)
     pushed: tuple[int, ...] = field(init=False, default=())
+    normal: int | None = field(init=False, default=None)
+    spatial: PairType | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         tried = self.efforts is None
@@ -409,10 +413,20 @@ class PairType:
         return len(self.freedoms)
 
     @property
+    def width(self) -> int:
+        """Number of freedoms and components together: 6, in the plane 3."""
+        return 6 if self.normal is None else 3
+
+    @property
+    def held(self) -> int:
+        """Number of reaction components."""
+        return self.width - self.f
+
+    @property
     def component_names(self) -> tuple[str, ...]:
         """Names of the reaction components, in order."""
         if self.reactions is None:
-            return tuple(f"n{i + 1}" for i in range(6 - self.f))
+            return tuple(f"n{i + 1}" for i in range(self.held))
         return tuple(c.name for c in self.reactions)
 
     @cached_property
@@ -444,8 +458,8 @@ class PairType:
 
     @property
     def unknowns_and_equations(self) -> tuple[int, int]:
-        """Lee's ledger entry of the row; ``(6 - f, 0)`` without a bookkeeping."""
-        return (self.bookkeeping.unknowns, self.bookkeeping.equations) if self.bookkeeping else (6 - self.f, 0)
+        """Lee's ledger entry of the row; its components and no equation without a bookkeeping."""
+        return (self.bookkeeping.unknowns, self.bookkeeping.equations) if self.bookkeeping else (self.held, 0)
 
     def __repr__(self) -> str:
         return f"PairType({self.symbol!r}, {self.name!r}, f={self.f})"

@@ -620,7 +620,7 @@ class _SummaryText(PositionLabels):
         """Names of the components and efforts of a pair that are not unique somewhere."""
         pair = self.values.whole.pairs[k]
         driven = np.flatnonzero([name in self.values.actuated for name in pair.freedom_names])
-        loose = [*self.reactions.touched[: 6 - pair.type.f, k], *self._loose_efforts(k)[driven]]
+        loose = [*self.reactions.touched[: pair.type.held, k], *self._loose_efforts(k)[driven]]
         return [name for (_, name), open_ in zip(labels_of(pair, driven), loose, strict=True) if open_]
 
     def _loose_efforts(self, k: int) -> Mask:

@@ -570,7 +570,7 @@ class Trajectory:
         return {name: self._out(part) for name, part in zip(row.component_names, masked, strict=True)}
 
     def directions(self, pair: int) -> Array:
-        """Forces of the unit reaction components of a pair, global directions, ``(..., 3, 6 - f)``."""
+        """Forces of the unit reaction components of a pair, global directions, ``(..., 3, components)``."""
         number, i = self._system.place_of(pair)
         return self._out(self._evaluated(lambda block: block.here.W[number][3:, :, i]))
 
@@ -624,21 +624,21 @@ class Trajectory:
         return out
 
     def _components(self, pair: int) -> tuple[PairType, Array, Array]:
-        """The type of a pair, its components ``(6 - f, T)`` in the user's units and what self-stresses have in them ``(6 - f, s, T)``."""
+        """The type of a pair, its components ``(c, T)`` in the user's units and what self-stresses have in them ``(c, s, T)``."""
         self._force("reactions")
         states = np.concatenate([self._of("reactions")[:, pair][:, None], self._of("stress")[:, pair]], axis=1)
         row, unit, found = self._components_of(pair, states)
         return row, unit * found[:, 0], found[:, 1:]
 
     def _components_of(self, pair: int, states: Array) -> tuple[PairType, Array, Array]:
-        """The type of a pair, factors ``(6 - f, 1)`` to the user's units, components ``(6 - f, n, T)`` of its wrenches ``(6, n, T)``."""
+        """The type of a pair, factors ``(c, 1)`` to the user's units, components ``(c, n, T)`` of its wrenches ``(6, n, T)``."""
         number, i = self._system.place_of(pair)
         row = self._system.groups[number].row
 
         def components(block: BlockMotion) -> Array:
             return PairFrames(block.here).components_of(number, i, states[..., block.places])
 
-        couples = [c.is_couple for c in row.reactions or ()] or [False] * (6 - row.f)
+        couples = [c.is_couple for c in row.reactions or ()] or [False] * row.held
         return row, np.where(couples, self._L**2, self._L)[:, None], self._evaluated(components)
 
     def efforts(self, pair: int) -> tuple[Array, Array]:
@@ -708,7 +708,7 @@ class Trajectory:
         return np.array(found).reshape(len(found), self._count), loose
 
     def _multiplier(self, coupling: int) -> Array:
-        row, blocks = 6 * self._system.graph.n_loops + coupling, in_blocks(np.arange(self._count))
+        row, blocks = self._system.graph.loop_rows + coupling, in_blocks(np.arange(self._count))
         scales = [np.broadcast_to(self._system_at(block).row_scale[row], len(block)) for block in blocks]
         return np.asarray(self._L**2 * np.concatenate(scales) * self._force("multipliers")[coupling])
 

@@ -1,0 +1,276 @@
+"""A planar mechanism: what is declared with two numbers in three, pairs as rows of the x-y plane, and what leaves it.
+
+``in_space`` and ``pair_in_plane`` give the declared things as everything else reads them: points, forces and centers with a third number
+0, moments and inertias about z as vectors and tensors. What leaves the plane is kept, and is a fault (``plane_faults``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from copy import copy
+from types import MappingProxyType
+from typing import Any, TypeVar
+
+import numpy as np
+
+from mechgraph.errors import DeclarationError
+from mechgraph.fields import (
+    DIRECTION,
+    NAMED_POINT,
+    POINT,
+    POINT_LIST,
+    POINTS,
+    TENSOR,
+    VECTOR,
+    VECTOR_SERIES,
+    Described,
+    FieldFormat,
+    axes_of,
+    filled_second,
+    plain,
+)
+from mechgraph.maths.se3 import Array
+from mechgraph.model.pair import Marker, Pair
+from mechgraph.pairs.pair_type import PairType
+from mechgraph.pairs.plane import MARKERS, in_plane, instead_of, reach_of
+from mechgraph.quantities import is_numeric, real_array, shown
+
+ROUNDING = 1e-12
+"""Part of the largest number of a vector up to which a third one is rounding."""
+NORMAL = (0.0, 0.0, 1.0)
+INSIDE = (POINT, NAMED_POINT, POINT_LIST, VECTOR, VECTOR_SERIES)
+"""Kinds of vectors that lie in the plane."""
+Item = TypeVar("Item", bound=Described)
+
+
+def in_space(item: Item) -> Item:
+    """A declared thing with vectors of three numbers; what is no number, or has three that leave the plane, stays as it is."""
+    changes: dict[str, Any] = {}
+    for name, about in item.formats.items():
+        value = getattr(item, name)
+        made: Any = in_space(value) if isinstance(value, Described) else _in_space(value, about)
+        if made is not value:
+            changes[name] = made
+    return item.replace(**changes) if changes else item
+
+
+def _in_space(value: Any, about: FieldFormat) -> Any:
+    if value is None or isinstance(value, str) or callable(value):
+        return value
+    if about.kind is POINTS and isinstance(value, Mapping):
+        made = {name: _padded(point, about) for name, point in value.items()}
+        return MappingProxyType(made) if any(made[name] is not point for name, point in value.items()) else value
+    if about.kind is TENSOR and is_numeric(value, ()):
+        third = float(value)  # of a lamina, which has the least moments about axes in its plane that a body can have
+        return ((third / 2, 0.0, 0.0), (0.0, third / 2, 0.0), (0.0, 0.0, third))
+    return _padded(value, about) if about.kind in (*INSIDE, DIRECTION) else value
+
+
+def _padded(value: Any, about: FieldFormat) -> Any:
+    """A vector with a third number 0, a moment as one along z; a third number that is rounding is made 0."""
+    array = real_array(value)
+    if array is None:
+        return value
+    if about.normal:
+        if array.ndim == 0 or array.shape[-1:] == (1,):
+            one = array.reshape(*array.shape[:-1], 1)
+            return plain(np.concatenate([np.zeros((*one.shape[:-1], 2)), one], axis=-1))
+        return value
+    if array.ndim and array.shape[-1] == 2:
+        return plain(np.concatenate([array, np.zeros((*array.shape[:-1], 1))], axis=-1))
+    if array.ndim and array.shape[-1] == 3 and array[..., 2].any() and about.kind is not DIRECTION:
+        size = np.abs(array).max(axis=-1, initial=0.0)
+        if (np.abs(array[..., 2]) <= ROUNDING * size).all():
+            array[..., 2] = 0.0
+            return plain(array)
+    return value
+
+
+def pair_in_plane(pair: Any) -> Any:
+    """A pair with its row in the plane, and the normal of the plane where its marker says none; itself where it has none there."""
+    if not isinstance(pair, Pair):
+        return pair
+    pair = in_space(pair)
+    spatial = spatial_row(pair.type)
+    row = in_plane(spatial) if isinstance(spatial, PairType) else None
+    if row is None:
+        return pair
+    if pair.contact is None and row.normal is not None:
+        changes: dict[str, Any] = {}
+        if pair.on_a is not None or pair.on_b is not None:
+            for side in ("on_a", "on_b"):
+                if isinstance(marker := getattr(pair, side), Marker):
+                    changes[side] = marker.replace(**_normal_said(marker, row.normal))
+        elif pair.point is not None or pair.axis is not None:
+            changes = _normal_said(pair, row.normal)
+        if any(getattr(pair, name) != value for name, value in changes.items()):
+            pair = pair.replace(**changes)
+    if pair.type is row:
+        return pair
+    out = copy(pair)
+    object.__setattr__(out, "type", row)
+    return out
+
+
+def _normal_said(marker: Any, normal: int) -> dict[str, Any]:
+    """The axis and second direction of a marker with the normal of the plane where that is left out."""
+    axis, second = marker.axis, marker.second
+    if normal == 2:
+        if axis is None:
+            return {"axis": NORMAL, "second": filled_second(NORMAL) if second is None else second}
+        if is_numeric(axis, (3,)) and _along_normal(axis):
+            exact = (0.0, 0.0, float(axis[2]))
+            return {"axis": exact, "second": filled_second(exact) if second == filled_second(axis) else second}
+        return {}
+    if not is_numeric(axis, (3,)):
+        return {}
+    if second is None or second == filled_second(axis):
+        second = NORMAL
+    elif is_numeric(second, (3,)) and _along_normal(second):
+        second = (0.0, 0.0, float(second[2]))
+    flat = abs(axis[2]) <= ROUNDING * max(map(abs, axis))
+    return {"axis": (float(axis[0]), float(axis[1]), 0.0) if flat else axis, "second": second}
+
+
+def _along_normal(direction: Any) -> bool:
+    return bool(max(abs(direction[0]), abs(direction[1])) <= ROUNDING * abs(direction[2]))
+
+
+def spatial_row(row: Any) -> Any:
+    """The row of a pair type in space; what is no row of the plane stays."""
+    return row.spatial if isinstance(row, PairType) and row.spatial is not None else row
+
+
+def pair_in_space(pair: Any) -> Any:
+    """A pair of a planar mechanism as one of a spatial one."""
+    if not isinstance(pair, Pair) or not isinstance(pair.type, PairType) or pair.type.normal is None:
+        return pair
+    out = copy(pair)
+    object.__setattr__(out, "type", pair.type.spatial)
+    return out
+
+
+# --- faults ----------------------------------------------------------------------------------------------------------------
+
+DROPPED = "m.to_planar() of the spatial mechanism drops it"
+
+
+def plane_faults(links: Iterable[Any], pairs: Iterable[Any], loads: Iterable[Any]) -> list[str]:
+    """What leaves the plane, one line each."""
+    found: list[str] = []
+    for link in links:
+        if isinstance(link, Described):
+            found += _leaving(link, f"link {shown(getattr(link, 'name', ''))}: ")
+    for pair in pairs:
+        if isinstance(pair, Pair) and isinstance(pair.type, PairType):
+            found += _pair_faults(pair)
+    for load in loads:
+        if isinstance(load, Described):
+            found += _leaving(load, getattr(load, "where", ""))
+    return found
+
+
+def _leaving(item: Described, where: str) -> Iterator[str]:
+    """Vectors, moments and tensors of a thing that leave the plane."""
+    for name, about in item.formats.items():
+        value = getattr(item, name)
+        if isinstance(value, Described):
+            yield from _leaving(value, f"{where}{name}.")
+        elif about.kind is POINTS and isinstance(value, Mapping):
+            for key, point in value.items():
+                if _leaves(point, about):
+                    yield f"{where}{name}: {key} = {shown(point)}: {_third(about)}"
+        elif _leaves(value, about):
+            yield f"{where}{name} = {shown(value)}: {_third(about)}"
+
+
+def _leaves(value: Any, about: FieldFormat) -> bool:
+    if value is None or isinstance(value, str) or callable(value):
+        return False
+    array = real_array(value)
+    if array is None:
+        return False
+    if about.kind is TENSOR:
+        return array.shape == (3, 3) and bool(np.abs(array[:2, 2]).max() > ROUNDING * np.abs(array).max())
+    if about.kind not in (*INSIDE, POINTS) or array.ndim == 0 or array.shape[-1] != 3:
+        return False
+    return bool(array[..., :2].any() if about.normal else array[..., 2].any())
+
+
+def _third(about: FieldFormat) -> str:
+    if about.kind is TENSOR:
+        return f"products of inertia with z leave the plane; expected 0, or a number, the moment of inertia about z ({DROPPED})"
+    if about.normal:
+        return f"turns out of the plane; expected a number, the moment about z ({DROPPED})"
+    return f"leaves the plane; expected z = 0, or two numbers ({DROPPED})"
+
+
+def _pair_faults(pair: Pair) -> Iterator[str]:
+    """What of a pair leaves the plane: its type, its marker, its curves."""
+    where, row = f"pair {shown(pair.name)}: ", pair.type
+    yield from _leaving(pair, where)
+    for name, curve in (("curve", pair.curve), ("curve_b", pair.curve_b)):
+        if curve is not None and pair.contact is not None and (off := _off_plane(pair, curve)):
+            yield f"{where}{name}: leaves the x-y plane, by {off:.3g}; give a curve in it"
+    sides = [pair] if pair.on_a is None else [pair.on_a, pair.on_b]
+    markers = [side for side in sides if side is not None and _placed(side)]
+    axes = axes_of(markers[0].axis, markers[0].second) if markers else np.eye(3)
+    if row.normal is None:
+        yield where + _not_planar(row, axes)
+        return
+    for side in markers:
+        frame = axes_of(side.axis, side.second)
+        if abs(abs(frame[2, row.normal]) - 1.0) > ROUNDING:
+            name = MARKERS[row.normal]
+            asked = (
+                f"axis = {shown(side.axis)}"
+                if row.normal != 0
+                else f"axis = {shown(side.axis)}, second = {shown(side.second)}"
+            )
+            hint = f"leave {'it' if row.normal == 2 else 'second'} out"
+            if row.normal == 0 and abs(frame[2, 2]) > ROUNDING:
+                hint = "give an axis in the plane"
+            elif row.normal == 2 and abs(frame[2, 2]) <= ROUNDING:
+                hint += f", or take {instead_of(row.spatial or row, frame)}, which holds the same in the plane"
+            yield f"{where}{asked}: of {row.symbol} in a planar mechanism the {name} stands on the x-y plane; {hint}"
+            return
+
+
+def _placed(side: Any) -> bool:
+    return is_numeric(side.axis, (3,)) and is_numeric(side.second, (3,)) and not _parallel(side)
+
+
+def _parallel(side: Any) -> bool:
+    return bool(np.linalg.norm(np.cross(side.axis, side.second)) <= ROUNDING)
+
+
+def _not_planar(row: PairType, axes: Array) -> str:
+    """Why a type has no row in the plane, and the one to take."""
+    leaving = reach_of(row.freedoms, axes)
+    why = f"can leave the plane ({', '.join(leaving)})" if leaving else "holds nothing in the plane"
+    return f"{row.symbol} {why}; in a planar mechanism take {instead_of(row, axes)}, which holds the same in the plane"
+
+
+def _off_plane(pair: Pair, curve: Any) -> float:
+    """How far a curve leaves the plane, or the direction of one that stands in it; 0 for rounding."""
+    from mechgraph.pairs.curves import Travel
+
+    travel: Travel = curve.once(Travel)
+    points = travel.at(travel.s).x
+    size = max(1e-300, float(np.abs(points).max()), float(np.ptp(points)))
+    off = float(np.abs(points[2]).max())
+    return off if off > 1e-9 * size else 0.0
+
+
+def refuse(m: Any, what: str) -> None:
+    """Refuse what a planar mechanism has not.
+
+    Raises
+    ------
+    DeclarationError
+        for a planar one.
+    """
+    if m.planar:
+        raise DeclarationError(
+            f"mechanism {m.name!r}", [f"{what} is not known for planar mechanisms; ask m.to_spatial()"]
+        )
