@@ -9,6 +9,7 @@ from mechgraph import methods
 from mechgraph.determinacy.decomposition import Decomposition, Group
 from mechgraph.determinacy.equivalent import equivalent, multiple_joints, split_joint
 from mechgraph.determinacy.families import Families
+from mechgraph.determinacy.flat import to_planar, to_spatial
 from mechgraph.determinacy.report import DeterminacyReport, Structure, check, groups, structure
 from mechgraph.determinacy.snapping import snapped
 from mechgraph.equations.build import formulate
@@ -109,6 +110,8 @@ def _draw_branches(found: Branches, output: str | None, **asked: Any) -> Any:
 methods.TABLE |= {
     "snapped": snapped,
     "equivalent": equivalent,
+    "to_planar": to_planar,
+    "to_spatial": to_spatial,
     "view": _view,
     "draw_assemblies": _draw_assemblies,
     "draw_branches": _draw_branches,

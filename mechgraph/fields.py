@@ -99,7 +99,8 @@ def axes_of(axis: Any, second: Any) -> Array:
 def vector_fault(value: Any, what: str, *, direction: bool = False) -> str | None:
     """The fault of a vector of three numbers, or None; a direction must not be zero."""
     if not is_numeric(value, (3,)):
-        return wrong(value, what, "three finite numbers")
+        two = " (two where planar=True)" if is_numeric(value, (2,)) else ""
+        return wrong(value, what, f"three finite numbers{two}")
     if direction and not math.hypot(*value) > 1e-12:
         return f"{what} = {value!r}: has length 0; give a direction, e.g. (0, 0, 1)"
     return None

@@ -125,6 +125,8 @@ def kind_of(twists: Array) -> MotionKind:
 def kind_of_mechanism(freedoms: Freedoms, motion: FiniteMotion | None) -> MotionKind:
     """The kind of all pairs, else of the motions beside the passive ones at a position nearby."""
     rows = freedoms.position.rows
+    if freedoms.position.m.planar:
+        return planar(np.eye(6)[:, 2:3])
     kind = kind_of(rows.S)
     # mobility up to which the motions of pairs of other kinds are looked at
     look = motion and not kind.name and freedoms.mobility <= 200

@@ -603,8 +603,12 @@ def random_twists(m: Mechanism, rng: np.random.Generator) -> tuple[Array, Array]
     for row, pairs in by_type.items():
         n = len(pairs)
         base = np.empty((3, 4, n, 1))
-        base[:, :3, :, 0] = rotation_exp(rng.uniform(-2, 2, (3, n)))
-        base[:, 3, :, 0] = points[:, pairs] = rng.normal(size=(3, n))
+        turn, place = rng.uniform(-2, 2, (3, n)), rng.normal(size=(3, n))
+        base[:, :3, :, 0] = rotation_exp(turn)
+        if row.normal is not None:  # about the normal of the plane, which that axis of the marker is
+            turn[:2], place[2] = 0.0, 0.0
+            base[:, :3, :, 0] = np.roll(rotation_exp(turn), row.normal - 2, axis=1)
+        base[:, 3, :, 0] = points[:, pairs] = place
         x = evaluation.random_coordinates(row, rng, n, 1)
         pitch = rng.uniform(0.3, 0.9, (n, 1))
         twists = evaluation.twists_of(row, pitch, evaluation.frames_of(row, pitch, x, base))[..., 0]

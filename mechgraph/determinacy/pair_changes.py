@@ -37,6 +37,7 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.pairs import pair_type as evaluation
 from mechgraph.pairs.pair_type import TABLE, PairType
+from mechgraph.pairs.plane import in_plane
 
 CHANGES_SHOWN, FREEING = 6, 3
 """Largest number of single changes, and of sets of changes, reported; and of changes that let a structure move."""
@@ -116,7 +117,9 @@ def wider_types(row: PairType) -> Iterator[PairType]:
         return evaluation.twists_of(t, one, evaluation.frames_of(t, one, x))[:, :, 0, 0]
 
     mine = span(row)
-    for other in sorted(TABLE.values(), key=lambda t: t.f):
+    of_plane = (in_plane(t) for t in TABLE.values())
+    table = TABLE.values() if row.normal is None else [t for t in of_plane if t and t.normal == row.normal]
+    for other in sorted(table, key=lambda t: t.f):
         if row.f < other.f and other.bears and not other.takes_pitch:
             both = np.concatenate([span(other), mine], axis=1)
             if np.linalg.matrix_rank(both, tol=1e-9) == other.f:

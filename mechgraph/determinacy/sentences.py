@@ -88,7 +88,7 @@ def _of_position(r: Facts) -> str:
     if r.reactions is None or r.reactions.all_unique:
         idle = f": {len(r.passive)} of them {spins(r)}" if r.passive else ""
         state = "Determinate" if r.mobility else "Determinate structure"
-        return f"{_bearing(r)}{state}: {_counts(r)}{idle}; every reaction is unique."
+        return f"{_bearing(r)}{state}{' (planar)' * r.mechanism.planar}: {_counts(r)}{idle}; every reaction is unique."
     return f"{_bearing(r)}{_state(r)}{_not_unique(r, r.reactions)}."
 
 
@@ -239,7 +239,8 @@ def _of_topology(r: Facts) -> str:
             f"{count}: mobility {generic.mobility} for general geometry, "
             f"{plural(drivers - generic.mobility, 'driver')} too many."
         )
-    return f"{count}: determinate for general geometry (mobility {generic.mobility})."
+    plane = "in the plane " * r.mechanism.planar
+    return f"{count}: determinate {plane}for general geometry (mobility {generic.mobility})."
 
 
 def loop_names(r: Facts, loops: tuple[int, ...]) -> str:
@@ -340,6 +341,8 @@ def mobility_line(r: Facts) -> str:
 def kind_line(r: Facts) -> str:
     """What kind of mechanism it is, or of what kinds its loops are."""
     how = "" if r.kind.by_pairs else " in its motion, not in all of its pairs"
+    if r.mechanism.planar:
+        return "Planar: motion and equilibrium in the x-y plane alone, 3 equations a link."
     if r.kind.name:
         return f"{r.kind.name.capitalize()}{how}: {place(r.kind)}."
     names = [kind.name for kind in r.loop_kinds]

@@ -645,6 +645,66 @@ class Mechanism(Parts, Shown):
         made: Mechanism = methods.call("equivalent", self, at, rollers=rollers)
         return made
 
+    @door
+    def to_planar(self, normal: ArrayLike | None = None) -> Mechanism:
+        """Return the planar mechanism of a spatial one that moves in a plane; ``description`` tells what is left out.
+
+        Points are moved into the plane along its normal, and the plane becomes x-y. Forces along the normal, moments across it and
+        products of inertia with it are dropped. A pair that can leave the plane gives way to the one that holds the same in it (S to R).
+        Coordinates of pairs keep their values.
+
+        Parameters
+        ----------
+        normal : (3,) array_like, optional
+            Normal of the plane. Default: found from the motion.
+
+        Returns
+        -------
+        Mechanism
+
+        Raises
+        ------
+        DeclarationError
+            It does not move in that plane, or a drive leaves it.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> m = mg.load("four-bar")
+        >>> mg.check(m).redundancy, mg.check(m.to_planar()).redundancy
+        (3, 0)
+        """
+        made: Mechanism = methods.call("to_planar", self, normal)
+        return made
+
+    @door
+    def to_spatial(self, z: Mapping[str, float] | None = None) -> Mechanism:
+        """Return the spatial mechanism of a planar one, its links in layers where asked.
+
+        Parameters
+        ----------
+        z : mapping of str to float, optional
+            Height of a link over the plane [length]; its pairs stand in the middle between its links. Default: all 0.
+
+        Returns
+        -------
+        Mechanism
+
+        Raises
+        ------
+        DeclarationError
+            Unknown link; layers of pairs that are given by markers or curves.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> m = mg.load("four-bar").to_planar()
+        >>> m.to_spatial(z={"coupler": 0.02}).pair("B").point[2]
+        0.01
+        """
+        made: Mechanism = methods.call("to_spatial", self, z)
+        return made
+
     def view(self) -> Any:
         """Show the mechanism in a notebook, in space, with every freedom, self-stress and recommendation (``notebook`` extra).
 

@@ -122,7 +122,7 @@ def _normal_said(marker: Any, normal: int) -> dict[str, Any]:
             exact = (0.0, 0.0, float(axis[2]))
             return {"axis": exact, "second": filled_second(exact) if second == filled_second(axis) else second}
         return {}
-    if not is_numeric(axis, (3,)):
+    if not is_numeric(axis, (3,)) or _along_normal(axis):
         return {}
     if second is None or second == filled_second(axis):
         second = NORMAL
@@ -148,6 +148,50 @@ def pair_in_space(pair: Any) -> Any:
     out = copy(pair)
     object.__setattr__(out, "type", pair.type.spatial)
     return out
+
+
+def dropped(item: Item) -> tuple[Item, list[str]]:
+    """A declared thing without what leaves the plane, and what that was."""
+    changes: dict[str, Any] = {}
+    lost: list[str] = []
+    label = str(getattr(item, "name", "") or getattr(item, "kind", ""))
+    for name, about in item.formats.items():
+        value = getattr(item, name)
+        if isinstance(value, Described):
+            changes[name], more = dropped(value)
+            lost += [f"{label} {what}" for what in more]
+        elif about.kind is POINTS and isinstance(value, Mapping):
+            out = {key: point for key, point in value.items() if _leaves(point, about)}
+            lost += [f"{label} {name} {key}: z = {point[2]:.4g}" for key, point in out.items()]
+            changes[name] = {**value, **{key: (point[0], point[1], 0.0) for key, point in out.items()}}
+        elif _leaves(value, about):
+            flat = np.array(value, dtype=float)
+            if about.kind is TENSOR:
+                flat[:2, 2] = flat[2, :2] = 0.0
+                what = "products of inertia with z"
+            elif about.normal:
+                flat[..., :2], what = 0.0, "about x and y"
+            else:
+                flat[..., 2], what = 0.0, "along z"
+            if about.kind is POINT or about.kind is NAMED_POINT:
+                what = f"z = {value[2]:.4g}"
+            lost.append(f"{label} {name} {what}")
+            changes[name] = plain(flat)
+    return item.replace(**changes) if changes else item, lost
+
+
+def lifted(item: Item, height: float, only: str = "") -> Item:
+    """A declared thing with its points (or one of them) moved along z."""
+    changes: dict[str, Any] = {}
+    for name, about in item.formats.items():
+        value = getattr(item, name)
+        if not height or value is None or isinstance(value, str) or (only and name != only):
+            continue
+        if about.kind is POINTS:
+            changes[name] = {key: (x, y, z + height) for key, (x, y, z) in value.items()}
+        elif about.kind is POINT or about.kind is NAMED_POINT:
+            changes[name] = (value[0], value[1], value[2] + height)
+    return item.replace(**changes) if changes else item
 
 
 # --- faults ----------------------------------------------------------------------------------------------------------------
@@ -221,18 +265,14 @@ def _pair_faults(pair: Pair) -> Iterator[str]:
     for side in markers:
         frame = axes_of(side.axis, side.second)
         if abs(abs(frame[2, row.normal]) - 1.0) > ROUNDING:
-            name = MARKERS[row.normal]
-            asked = (
-                f"axis = {shown(side.axis)}"
-                if row.normal != 0
-                else f"axis = {shown(side.axis)}, second = {shown(side.second)}"
-            )
-            hint = f"leave {'it' if row.normal == 2 else 'second'} out"
+            name, stands, hint = MARKERS[row.normal], "stands on the x-y plane", "leave it out"
             if row.normal == 0 and abs(frame[2, 2]) > ROUNDING:
-                hint = "give an axis in the plane"
+                name, stands, hint = "axis", "lies in the x-y plane", "give two numbers, axis=(x, y)"
             elif row.normal == 2 and abs(frame[2, 2]) <= ROUNDING:
-                hint += f", or take {instead_of(row.spatial or row, frame)}, which holds the same in the plane"
-            yield f"{where}{asked}: of {row.symbol} in a planar mechanism the {name} stands on the x-y plane; {hint}"
+                other = instead_of(row.spatial or row, frame)
+                hint += f", or take {other}, which holds the same in the plane" if other != row.symbol else ""
+            given = getattr(side, name, side.axis)
+            yield f"{where}{name} = {shown(given)}: in a planar mechanism the {name} of {row.symbol} {stands}; {hint}"
             return
 
 

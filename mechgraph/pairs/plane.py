@@ -154,18 +154,23 @@ def _by_held() -> dict[Held, str]:
 
 def instead_of(row: PairType, axes: Array) -> str:
     """The symbol of the pair that holds in the plane what a row holds at coordinates zero; ``axes (3, 3)`` of its marker, as columns."""
-    x = evaluation.coordinates_to_state(row, np.zeros((row.f, 1, 1)))
-    pitch = np.full((1, 1), 0.3 * row.takes_pitch)
     if travels(row):
         return "Ps"
+    inside = held_in_plane(row, axes)
+    forces = int(np.linalg.matrix_rank(inside[1:], tol=CLEAR)) if inside.size else 0
+    return _by_held()[inside.shape[1], forces]
+
+
+def held_in_plane(row: PairType, axes: Array) -> Array:
+    """A basis ``(3, k)`` of the wrenches Mz, Fx, Fy of the plane that a row holds at coordinates zero, about its own point."""
+    x = evaluation.coordinates_to_state(row, np.zeros((row.f, 1, 1)))
+    pitch = np.full((1, 1), 0.3 * row.takes_pitch)
     frames = evaluation.frames_of(row, pitch, x)
     W = evaluation.reactions_of(row, pitch, frames, x)[..., 0, 0]
     W = np.concatenate([axes @ W[:3], axes @ W[3:]])
     _, s, Vt = np.linalg.svd(np.delete(W, IN_PLANE, axis=0)) if W.size else (None, np.zeros(0), np.zeros((0, 0)))
-    inside = W[IN_PLANE] @ Vt[int((s > CLEAR).sum()) :].T
-    forces = int(np.linalg.matrix_rank(inside[1:], tol=CLEAR)) if inside.size else 0
-    held = int(np.linalg.matrix_rank(inside, tol=CLEAR)) if inside.size else 0
-    return _by_held()[held, forces]
+    U, s, _ = np.linalg.svd(W[IN_PLANE] @ Vt[int((s > CLEAR).sum()) :].T)
+    return np.asarray(U[:, : int((s > CLEAR).sum())])
 
 
 def reach_of(freedoms: Sequence[Freedom], axes: Array) -> list[str]:

@@ -1,0 +1,222 @@
+"""From a spatial mechanism that moves in a plane to the planar one, and back into space.
+
+Every link keeps its frame but for a turn that puts its z on the normal of the plane, so that coordinates of pairs, and with them motions of
+drives and starts, keep their values. A pair of another type takes over what the old one holds in the plane.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from mechgraph.determinacy.families import kind_of_mechanism
+from mechgraph.determinacy.finite_motion import finite_motion
+from mechgraph.determinacy.mobility import free_motion
+from mechgraph.errors import DeclarationError, listed
+from mechgraph.fields import Described, axes_of
+from mechgraph.force.loads import user_poses
+from mechgraph.kinematics.assembly import assembled
+from mechgraph.kinematics.state import Configuration
+from mechgraph.maths.se3 import Array
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.pair import Marker, Pair
+from mechgraph.model.plane import dropped, lifted
+from mechgraph.pairs.contact_types import row_of
+from mechgraph.pairs.pair_type import PairType
+from mechgraph.pairs.plane import held_in_plane, in_plane, instead_of
+from mechgraph.quantities import is_numeric, unknown, wrong
+
+LEVEL = 1e-9
+"""Sine of an angle, or length over that of a vector, up to which it is rounding."""
+Z = np.array([0.0, 0.0, 1.0])
+
+
+def to_planar(m: Mechanism, normal: Any = None) -> Mechanism:
+    """See ``Mechanism.to_planar``."""
+    if m.planar:
+        return m
+    flat = _Flat(m, _normal_of(m, normal))
+    return flat.made()
+
+
+def _normal_of(m: Mechanism, normal: Any) -> Array:
+    """The normal of the plane in which a mechanism moves, pointing to the side of z; as given, where that is one."""
+    where = f"to_planar of {m.name!r}"
+    if normal is not None and not (is_numeric(normal, (3,)) and np.linalg.norm(normal) > 0):
+        raise DeclarationError(where, [wrong(normal, "normal", "a direction of three numbers")])
+    given = None if normal is None else np.asarray(normal, dtype=float) / np.linalg.norm(normal)
+    if not m.has_geometry:
+        return Z if given is None else given
+    system, x = assembled(m)
+    freedoms = free_motion(system, x, np.zeros(0, dtype=np.intp))
+    kind = kind_of_mechanism(freedoms, finite_motion(system, x, freedoms.closure, "auto"))
+    found = np.array(kind.place) if kind.name == "planar" else None
+    if found is None and given is not None and freedoms.mobility == 0:
+        found = given
+    if found is None or (given is not None and np.linalg.norm(np.cross(found, given)) > LEVEL):
+        what = "does not move in a plane" if found is None else f"moves in the plane with the normal {_shown(found)}"
+        raise DeclarationError(
+            where, [f"{what}; expected a mechanism that moves in {'one' if given is None else 'that one'}"]
+        )
+    found = found if found @ Z >= -LEVEL else -found
+    return Z if np.linalg.norm(np.cross(found, Z)) <= LEVEL else found
+
+
+def _shown(vector: Array) -> str:
+    return f"({', '.join(f'{v + 0.0:.6g}' for v in vector)})"
+
+
+def _turn_to(n: Array) -> Array:
+    """The least rotation that takes a unit vector to z; none where it stands on the plane, on either side."""
+    if np.linalg.norm(np.cross(n, Z)) <= LEVEL:
+        return np.eye(3)
+    axis, c = np.cross(n, Z), float(n @ Z)
+    K = np.cross(np.eye(3), axis)  # minus the matrix of the product with the axis
+    return np.asarray(np.eye(3) - K + K @ K / (1.0 + c))
+
+
+class _End:
+    """A link: the ``turn`` of its frame that puts z on the normal, on which ``side`` that is, the global x axis seen from it then."""
+
+    def __init__(self, turn: Array, R: Array) -> None:
+        self.turn = turn
+        self.side = float(np.sign((turn @ R[2])[2]))
+        x = turn @ R[0]
+        self.first = np.array([x[0], x[1], 0.0])
+
+
+@dataclass
+class _Flat:
+    """A mechanism on its way into the plane with that ``normal``; what is ``lost`` on it."""
+
+    m: Mechanism
+    normal: Array
+    lost: list[str] = field(default_factory=list)
+
+    @property
+    def where(self) -> str:
+        """For messages."""
+        return f"to_planar of {self.m.name!r}"
+
+    def made(self) -> Mechanism:
+        """The planar mechanism."""
+        G = np.column_stack([_turn_to(self.normal), np.zeros(3)])
+        turned = self.m if np.array_equal(G[:, :3], np.eye(3)) else self.m.moved(G)
+        ends = [_End(_turn_to(R[2]), R) for R in self._poses(turned)]
+        place = turned.link_index
+        links = [
+            self._dropped(link.moved(np.column_stack([ends[i].turn, np.zeros(3)])))
+            for i, link in enumerate(turned.links)
+        ]
+        pairs = [self._pair(pair, (ends[place[pair.a]], ends[place[pair.b]])) for pair in turned.pairs]
+        loads = [self._dropped(load) for load in turned.loads]
+        names = {name for pair in pairs for name in pair.freedom_names}
+        old = {name for name in turned.freedom_names() if name not in names}
+        drives = [d for d in turned.drives if turned.full_name(d.freedom) not in old]
+        if len(drives) < len(turned.drives):
+            gone = [d.freedom for d in turned.drives if d not in drives]
+            raise DeclarationError(self.where, [f"drive {name!r}: leaves the plane" for name in gone])
+        start = {name: value for name, value in turned.start.items() if name not in old}
+        told = f"Planar; left out: {listed(self.lost, 12)}." if self.lost else ""
+        description = " ".join(filter(None, (turned.description, told)))
+        return turned.replace(
+            planar=True, links=links, pairs=pairs, loads=loads, drives=drives, start=start, description=description
+        )
+
+    def _poses(self, m: Mechanism) -> Array:
+        """Rotations ``(N, 3, 3)`` of the links where they stand."""
+        if not m.has_geometry or all(pair.on_a is None for pair in m.pairs):
+            return np.tile(np.eye(3), (len(m.links), 1, 1))
+        system, x = assembled(m)
+        return np.asarray(user_poses(Configuration(system, x[:, None]))[:, 0, :3, :3])
+
+    def _dropped(self, item: Any) -> Any:
+        made, lost = dropped(item)
+        self.lost += lost
+        return made
+
+    def _pair(self, pair: Pair, ends: tuple[_End, _End]) -> Pair:
+        """A pair in the plane, of its own type or of the one that holds the same there."""
+        row: PairType = pair.type
+        if pair.contact is not None:
+            return self._dropped(pair)
+        sides = [side for side in ((pair,) if pair.on_a is None else (pair.on_a, pair.on_b)) if side is not None]
+        axes = ends[0].turn @ axes_of(sides[0].axis, sides[0].second) if pair.has_geometry else np.eye(3)
+        flat = in_plane(row)
+        held = held_in_plane(row, axes)
+        if flat is not None and flat.held == held.shape[1]:
+            new, symbol = flat, row
+        else:
+            symbol = row_of(instead_of(row, axes), None)
+            found = in_plane(symbol)
+            assert found is not None
+            new = found
+            self.lost.append(f"{pair.name} {row.symbol} -> {symbol.symbol}")
+        changes: dict[str, Any] = {"type": symbol, "pitch": None, "lead": None}
+        if pair.has_geometry:
+            single = {f.name for f, alone in zip(row.freedoms, row.drivable, strict=True) if alone}
+            same = new.normal == 0 or (abs(abs(axes[2, 2]) - 1.0) <= LEVEL and {f.name for f in new.freedoms} <= single)
+            made = [
+                self._marker(pair, side, end, new.normal == 0, same) for side, end in zip(sides, ends, strict=False)
+            ]
+            there = axes_of(made[0]["axis"], made[0]["second"])
+            both = np.concatenate([held, held_in_plane(symbol, there)], axis=1)
+            if symbol.symbol == "Ps" or int(np.linalg.matrix_rank(both, tol=LEVEL)) != held.shape[1]:
+                what = f"pair {pair.name!r}: {row.symbol} has no counterpart in the plane where it stands; replace it yourself, a ball in a"
+                raise DeclarationError(self.where, [f"{what} groove by Ps with curve=mg.Curve.line(...)"])
+            changes |= made[0] if pair.on_a is None else {"on_a": Marker(**made[0]), "on_b": Marker(**made[1])}
+        return pair.replace(**changes)
+
+    def _marker(self, pair: Pair, side: Any, end: _End, slides: bool, same: bool) -> dict[str, Any]:
+        """Point, axis and second direction in the plane; not the ``same`` as before, they coincide on both links where these stand."""
+        point, axis, second = (end.turn @ np.asarray(v) for v in (side.point, side.axis, side.second))
+        if abs(point[2]) > LEVEL * np.abs(point).max():
+            self.lost.append(f"{pair.name} z = {point[2]:.4g}")
+        if slides:
+            axis, second = np.array([axis[0], axis[1], 0.0]), np.array([0.0, 0.0, end.side])
+        elif same:
+            axis, second = np.array([0.0, 0.0, axis[2]]), np.array([second[0], second[1], 0.0])
+        else:
+            axis, second = np.array([0.0, 0.0, end.side]), end.first
+        return {"point": (*point[:2].tolist(), 0.0), "axis": tuple(axis.tolist()), "second": tuple(second.tolist())}
+
+
+def to_spatial(m: Mechanism, z: Mapping[str, float] | None = None) -> Mechanism:
+    """See ``Mechanism.to_spatial``."""
+    heights = {} if z is None else z
+    faults = [unknown("link", name, m.link_index) for name in heights if name not in m.link_index]
+    faults += [wrong(h, f"z of {name!r}", "a finite number") for name, h in heights.items() if not is_numeric(h, ())]
+    if faults:
+        raise DeclarationError(f"to_spatial of {m.name!r}", faults)
+    out = m.replace(planar=False) if m.planar else m
+    if not any(heights.values()):
+        return out
+    if any(pair.on_a is not None or pair.contact is not None for pair in m.pairs):
+        raise DeclarationError(
+            f"to_spatial of {m.name!r}", ["z: layers need pairs by point and axis; move the markers yourself"]
+        )
+
+    def height(name: str) -> float:
+        return float(heights.get(name, 0.0))
+
+    def of_load(load: Described) -> Described:
+        ends = {
+            name: value
+            for name in load.formats
+            if isinstance(value := getattr(load, name), str) and value in m.link_index
+        }
+        first = next(iter(ends.values()), "")
+        points = {"p": ends.get("a", first), "q": ends.get("b", first), "point": first}
+        for name, link in points.items():
+            if name in load.formats:
+                load = lifted(load, height(link), only=name)
+        return load
+
+    return out.replace(
+        links=[lifted(link, height(link.name)) for link in out.links],
+        pairs=[lifted(pair, 0.5 * (height(pair.a) + height(pair.b)), only="point") for pair in out.pairs],
+        loads=[of_load(load) for load in out.loads],
+    )
