@@ -31,7 +31,7 @@ from mechgraph.quantities import is_numeric, unknown, wrong
 
 LEVEL = 1e-9
 """Sine of an angle, or length over that of a vector, up to which it is rounding."""
-Z = np.array([0.0, 0.0, 1.0])
+UPRIGHT = np.array([0.0, 0.0, 1.0])
 
 
 def to_planar(m: Mechanism, normal: Any = None) -> Mechanism:
@@ -49,7 +49,7 @@ def _normal_of(m: Mechanism, normal: Any) -> Array:
         raise DeclarationError(where, [wrong(normal, "normal", "a direction of three numbers")])
     given = None if normal is None else np.asarray(normal, dtype=float) / np.linalg.norm(normal)
     if not m.has_geometry:
-        return Z if given is None else given
+        return UPRIGHT if given is None else given
     system, x = assembled(m)
     freedoms = free_motion(system, x, np.zeros(0, dtype=np.intp))
     kind = kind_of_mechanism(freedoms, finite_motion(system, x, freedoms.closure, "auto"))
@@ -61,8 +61,8 @@ def _normal_of(m: Mechanism, normal: Any) -> Array:
         raise DeclarationError(
             where, [f"{what}; expected a mechanism that moves in {'one' if given is None else 'that one'}"]
         )
-    found = found if found @ Z >= -LEVEL else -found
-    return Z if np.linalg.norm(np.cross(found, Z)) <= LEVEL else found
+    found = found if found @ UPRIGHT >= -LEVEL else -found
+    return UPRIGHT if np.linalg.norm(np.cross(found, UPRIGHT)) <= LEVEL else found
 
 
 def _shown(vector: Array) -> str:
@@ -71,11 +71,11 @@ def _shown(vector: Array) -> str:
 
 def _turn_to(n: Array) -> Array:
     """The least rotation that takes a unit vector to z; none where it stands on the plane, on either side."""
-    if np.linalg.norm(np.cross(n, Z)) <= LEVEL:
+    if np.linalg.norm(np.cross(n, UPRIGHT)) <= LEVEL:
         return np.eye(3)
-    axis, c = np.cross(n, Z), float(n @ Z)
-    K = np.cross(np.eye(3), axis)  # minus the matrix of the product with the axis
-    return np.asarray(np.eye(3) - K + K @ K / (1.0 + c))
+    axis, c = np.cross(n, UPRIGHT), float(n @ UPRIGHT)
+    K = np.cross(np.eye(3), axis)  # the matrix of the product with the axis
+    return np.asarray(np.eye(3) + K + K @ K / (1.0 + c))
 
 
 class _End:

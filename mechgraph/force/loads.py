@@ -34,6 +34,7 @@ def inertia_wrenches(here: Configuration, rates: Rates) -> Array:
     return np.concatenate([cross(c, force) - rotate(R, turning), force])
 
 
+OUT_OF_PLANE = "leaves the x-y plane; expected a force (x, y) or (x, y, 0), and a moment about z"
 NOT_FINITE = "gives a value that is not finite at some position; check its callable, or a spring of length 0"
 
 
@@ -60,19 +61,26 @@ class Site:
         """Evaluate all loads."""
         for load in loads:
             load.act(self)
-        if not self._finite():
-            wrong = next((load for load in loads if not self._alone(load)), loads[-1])
-            raise DeclarationError(f"load {wrong.where.removesuffix(': ')}", [NOT_FINITE])
+        for sound, fault in ((Site._finite, NOT_FINITE), (Site._in_plane, OUT_OF_PLANE)):
+            if not sound(self):
+                wrong = next((load for load in loads if not sound(self._of(load))), loads[-1])
+                raise DeclarationError(f"load {wrong.where.removesuffix(': ')}", [fault])
 
     def _finite(self) -> bool:
         return all(np.isfinite(part).all() for part in (self.wrenches, self.efforts))
 
-    def _alone(self, load: Load) -> bool:
-        """Whether a load alone gives finite values."""
+    def _in_plane(self) -> bool:
+        """Whether nothing acts out of the plane of a planar mechanism, but for rounding."""
+        span = self.m.span
+        outside = [np.abs(self.wrenches[part]).max(initial=0.0) for part in (slice(span.start), slice(span.stop, None))]
+        return max(outside) <= 1e-9 * np.abs(self.wrenches).max(initial=0.0)
+
+    def _of(self, load: Load) -> Site:
+        """What a load does alone."""
         other = copy(self)
         other.wrenches, other.efforts = np.zeros_like(self.wrenches), np.zeros_like(self.efforts)
         load.act(other)
-        return other._finite()
+        return other
 
     # --- what loads ask ----------------------------------------------------------------------------------------------
 
@@ -124,6 +132,7 @@ class Site:
             value = real_array(given)
             if value is None:
                 raise DeclarationError(f"load on {link!r}", [wrong(given, "value of its callable", "numbers")])
+            value = self._in_space(value) if width == 3 and self.m.planar else value
         array = np.asarray(value, dtype=float)
         if width == 1 and (array.ndim == 0 or array.shape[-1:] != (1,) or len(array.shape) <= len(self.batch)):
             array = array[..., None]
@@ -140,6 +149,15 @@ class Site:
                 [f"value of shape {np.shape(value)} does not fit the positions {self.batch}; expected {wanted}"],
             ) from None
         return np.moveaxis(full.reshape(-1, width)[self.good], -1, 0)
+
+    def _in_space(self, value: Array) -> Array:
+        """Of a planar mechanism a force with three numbers, where a function gives two, and a moment where it gives one a position."""
+        if value.shape[-1:] == (2,):
+            return np.concatenate([value, np.zeros((*value.shape[:-1], 1))], axis=-1)
+        if value.shape[-1:] == (3,):
+            return value
+        one = value if value.shape[-1:] == (1,) and value.ndim > len(self.batch) else value[..., None]
+        return np.concatenate([np.zeros((*one.shape[:-1], 2)), one], axis=-1)
 
     def motion_of(self, link: str) -> tuple[Array, Array]:
         """Pose ``(..., 4, 4)`` and twist ``(..., 6)`` of a link in the user's batch."""

@@ -23,6 +23,7 @@ from mechgraph.maths.se3 import Array, homogeneous, rotation_log
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Marker, Pair
+from mechgraph.model.plane import pair_in_plane
 from mechgraph.pairs.factors import UNIT_TWISTS, Freedom
 from mechgraph.pairs.pair_type import TABLE, PairType
 from mechgraph.quantities import has_quantity, is_numeric, items_of
@@ -57,23 +58,28 @@ def target_of(m: Mechanism, name: str) -> Target | str:
         if link.name == m.frame:
             return f"{name!r} is on the frame, which does not move"
         rest = name.removeprefix(link.name).removeprefix(".")
-        found = PART.fullmatch(rest)
-        if rest in ("", *SLIDES, *TURNS):
+        found, (slides, turns) = PART.fullmatch(rest), parts_of(m)
+        if rest in ("", *slides, *turns):
             return Target(link.name, "", rest)
         if rest in link.points:
             return Target(link.name, rest, "")
         if found and found["point"] in link.points:
             target = Target(link.name, found["point"], found["part"])
-            return (
-                target if target.part in SLIDES or _direction(target.part) is not None else _NO_DIRECTION.format(name)
-            )
+            fits = target.part in slides or _direction(m, target.part) is not None
+            return target if fits else (_OUT_OF_PLANE if m.planar else _NO_DIRECTION).format(name)
         if m.freedom_fault(rest, single=False) is not None:
             point = found["point"] if found else rest
-            return f"{link.point_fault(point)}; of a link itself {', '.join((*SLIDES, *TURNS))} can be given"
+            return f"{link.point_fault(point)}; of a link itself {', '.join((*slides, *turns))} can be given"
     return str(m.freedom_fault(name, single=True))
 
 
 _NO_DIRECTION = "{!r}: expected a direction as in T(1,0,1)"
+_OUT_OF_PLANE = "{!r}: expected Tx, Ty or a direction in the plane as in T(1,1)"
+
+
+def parts_of(m: Mechanism) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of the slides and turns that a link has."""
+    return (SLIDES[:2], TURNS[2:]) if m.planar else (SLIDES, TURNS)
 
 
 def coordinate(m: Mechanism, name: str) -> bool | str:
@@ -86,16 +92,21 @@ def coordinate(m: Mechanism, name: str) -> bool | str:
         return target
     if target.part:
         return target.turns
-    parts = SLIDES if target.point else (*SLIDES, *TURNS)
+    slides, turns = parts_of(m)
+    parts = slides if target.point else (*slides, *turns)
     return f"{name!r} has several coordinates; give one or more of {', '.join(f'{name}.{part}' for part in parts)}"
 
 
-def _direction(part: str) -> Array | None:
-    """Unit vector of ``T(1,0,1)``."""
+def _direction(m: Mechanism, part: str) -> Array | None:
+    """Unit vector of ``T(1,0,1)``, in a plane also of ``T(1,1)``."""
     try:
         d = np.array([float(v) for v in part[2:-1].split(",")])
     except ValueError:
         return None
+    if m.planar:
+        d = np.append(d, 0.0) if d.shape == (2,) else d
+        if d[2:].any():
+            return None
     return d / np.linalg.norm(d) if is_numeric(d, (3,)) and d.any() else None
 
 
@@ -108,10 +119,13 @@ def _of_points() -> PairType:
 
 
 def coordinates(pair: Pair, poses: Array) -> Array:
-    """Coordinates ``(6, ...)`` of a free pair for poses ``(..., 4, 4)`` of its link; angles continued along the last axis."""
+    """Coordinates ``(6, ...)`` (in a plane 3) of a free pair for poses ``(..., 4, 4)`` of its link; angles continued along the last."""
     A, B = (homogeneous(marker.pose()[..., None])[..., 0] for marker in pair.markers)
     D = np.linalg.inv(A) @ poses @ B
     R = D[..., :3, :3]
+    if pair.type.normal is not None:
+        angle = np.arctan2(R[..., 1, 0], R[..., 0, 0])
+        return np.stack([D[..., 0, 3], D[..., 1, 3], np.unwrap(angle, axis=-1) if angle.ndim else angle])
     if not pair.type.drivable[-1]:
         turned = rotation_log(np.moveaxis(R, (-2, -1), (0, 1)).reshape(3, 3, -1)).reshape(3, *R.shape[:-2])
     else:
@@ -183,15 +197,60 @@ class Prescription:
             self._put(name, self._pair_of(target), target.part, motion)
             return
         shape, what = ((3,), "points (..., 3)") if target.point else ((4, 4), "poses (..., 4, 4)")
-        P, *rest = motion.given
+        P, *rest = given = self._in_space(motion.given) if target.point else motion.given
         if any(map(has_quantity, motion.given)) or np.shape(P)[-len(shape) :] != shape:
             self.faults.append(
                 f"motion of {name!r}: expected {what}, plain numbers, got an array of shape {np.shape(P)}"
             )
+        elif self.m.planar:
+            self._in_plane(name, target, given)
         elif target.point:
-            self._components(name, self._pair_of(target), SLIDES, motion.given)
+            self._components(name, self._pair_of(target), SLIDES, given)
         else:
             self._pose(name, target, np.asarray(P), *rest)
+
+    def _in_space(self, given: Sequence[Any]) -> Sequence[Any]:
+        """Position, velocity and acceleration of a point, given in the plane with two numbers, with three."""
+        *vectors, t = given
+        if not self.m.planar or np.shape(vectors[0])[-1:] != (2,):
+            return given
+        return (
+            *(v if v is None else np.concatenate([v, np.zeros((*np.shape(v)[:-1], 1))], axis=-1) for v in vectors),
+            t,
+        )
+
+    def _in_plane(self, name: str, target: Target, given: Sequence[Any]) -> None:
+        """Motions of a point or a link of a planar mechanism: of x and y, and of the angle."""
+        *vectors, t = given
+        P = np.asarray(vectors[0])
+        leaves = (
+            np.abs(P[..., 2]).max(initial=0.0) if target.point else np.abs(P[..., 2, :] - (0, 0, 1, 0)).max(initial=0.0)
+        )
+        if leaves > 1e-9 * max(1.0, float(np.abs(P).max(initial=0.0))):
+            self.faults.append(f"motion of {name!r}: leaves the x-y plane, by {leaves:.3g}")
+            return
+        pair = self._pair_of(target)
+        if target.point:
+            self._components(
+                name, pair, SLIDES[:2], (*(v if v is None else np.asarray(v)[..., :2] for v in vectors), t)
+            )
+            return
+        q, (twist, change) = np.moveaxis(coordinates(pair, P), 0, -1), vectors[1:]
+        if change is not None and twist is None:
+            self.faults.append(f"motion of {name!r}: has an acceleration and no velocity; give both")
+            return
+        rates: list[Any] = [None, None]
+        if twist is not None:
+            V = np.broadcast_to(twist, (*q.shape[:-1], 6))
+            A = np.broadcast_to(0.0 if change is None else change, V.shape)
+            w, along = V[..., 2:3], q[..., :2]
+            across = np.stack([-q[..., 1], q[..., 0]], axis=-1)
+            rates[0] = np.concatenate([V[..., 3:5] + w * across, w], axis=-1)
+            if change is not None or t is None:
+                turned = np.stack([-rates[0][..., 1], rates[0][..., 0]], axis=-1)
+                bend = A[..., 3:5] + A[..., 2:3] * across + w * turned if change is not None else np.zeros(along.shape)
+                rates[1] = np.concatenate([bend, A[..., 2:3]], axis=-1)
+        self._components(name, pair, (*SLIDES[:2], TURNS[2]), (q, *rates, t))
 
     def _put(self, name: str, pair: Pair, part: str, motion: Motion) -> None:
         full = f"{pair.name}.{part}"
@@ -203,9 +262,9 @@ class Prescription:
         """The free pair that has a coordinate; every line has one of its own."""
         if not target.part.startswith("T("):
             return self._made(target.owner, target, _of_points if target.point else lambda: TABLE["Fr"])
-        d = _direction(target.part)
+        d = _direction(self.m, target.part)
         assert d is not None
-        across = np.linalg.svd(d[None])[2][1]
+        across = np.array([-d[1], d[0], 0.0]) if self.m.planar else np.linalg.svd(d[None])[2][1]
 
         def row() -> PairType:
             units = zip((target.part, "across", "beside"), SLIDES, strict=True)
@@ -232,7 +291,8 @@ class Prescription:
                 name += "'"
             point = self.m.link(target.link).points[target.point] if target.point else (0.0, 0.0, 0.0)
             markers = Marker((0.0, 0.0, 0.0), A[:, 2], A[:, 0]), Marker(point, B[:, 2], B[:, 0])
-            self.free[key] = Pair(name, row(), self.m.frame, target.link, on_a=markers[0], on_b=markers[1])
+            pair = Pair(name, row(), self.m.frame, target.link, on_a=markers[0], on_b=markers[1])
+            self.free[key] = pair_in_plane(pair) if self.m.planar else pair
         return self.free[key]
 
     def _components(self, name: str, pair: Pair, parts: Sequence[str], given: Sequence[Any]) -> None:

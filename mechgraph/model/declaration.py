@@ -105,6 +105,11 @@ class Parts(Formatted, Once):
         """The components of twists and wrenches in which it moves and is in balance: all six, or Rz Tx Ty (Mz Fx Fy)."""
         return IN_PLANE if self.planar else IN_SPACE
 
+    @property
+    def axes(self) -> str:
+        """Letters of the global directions in which it moves, ``"xyz"`` or ``"xy"``."""
+        return "xy" if self.planar else "xyz"
+
     def link_names(self) -> tuple[str, ...]:
         """Names of the links, in order."""
         return tuple([link.name for link in self.links])

@@ -33,6 +33,8 @@ UNIT_WRENCHES: dict[str, Six] = {
     name: tuple(float(i == j) for j in range(6))  # type: ignore[misc]
     for i, name in enumerate(("Mx", "My", "Mz", "Fx", "Fy", "Fz"))
 }
+WRENCHES = tuple(UNIT_WRENCHES)
+"""Names of the components of a wrench, in order."""
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import textwrap
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
@@ -16,7 +16,7 @@ from mechgraph.document import Bullets, Document, Heading, Paragraph, Shown, Tab
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import NAMED_POINT
 from mechgraph.files import Format, cell, csv_of, format_of, write_whole
-from mechgraph.maths.se3 import Array
+from mechgraph.maths.se3 import IN_PLANE, IN_SPACE, Array
 from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.loads import Gravity, Load
 from mechgraph.model.mechanism import Mechanism
@@ -52,6 +52,7 @@ class PointLoad(Shown):
     about: str
     distributed: bool = False
     known_sizes: Array | None = None
+    planar: bool = False
 
     @property
     def sizes(self) -> Array:
@@ -72,12 +73,13 @@ class PointLoad(Shown):
     def document(self) -> Document:
         """Least and greatest of its components; what is not unique has none."""
         rows = []
-        for name, values in zip(COMPONENTS, self.wrench.reshape(-1, 6).T, strict=True):
+        span = IN_PLANE if self.planar else IN_SPACE
+        for name, values in zip(COMPONENTS[span], self.wrench.reshape(-1, 6).T[span], strict=True):
             known = values[np.isfinite(values)]
             rows.append(
                 (name, *(number(float(v)) for v in (known.min(), known.max()))) if known.size else (name, "", "")
             )
-        at = ", ".join(f"{x + 0.0:.6g}" for x in self.point)
+        at = ", ".join(f"{x + 0.0:.6g}" for x in self.point[: 2 if self.planar else 3])
         about = Paragraph(f"{self.kind} at ({at}) in the frame of the link: {self.about}.")
         return Document(self.name, (about, Table(("component", "least", "greatest"), rows, "lrr")))
 
@@ -230,7 +232,8 @@ class BalancedLoads:
         out = []
         units = {letter: unit_of(self.mechanism.units, (2 if letter == "M" else 1, 1, -2)) for letter in "MF"}
         for one in self.acting:
-            values = dict(zip(COMPONENTS, np.moveaxis(one.wrench, -1, 0), strict=True))
+            span = self.mechanism.span
+            values = dict(zip(COMPONENTS[span], np.moveaxis(one.wrench, -1, 0)[span], strict=True))
             values |= {"|F|": one.sizes[..., 1], "|M|": one.sizes[..., 0]}
             for component, value in values.items():
                 flat = np.ravel(value)
@@ -283,24 +286,27 @@ def write_table(body: BalancedLoads, path: Path, at: Any = "worst", **options: A
     if options:
         raise DeclarationError(f"loads on {body.link.name!r}", [f"{', '.join(options)}: for a load deck (.inp) alone"])
     length, force, moment = (bracket(unit_of(body.mechanism.units, powers)) for powers in (LENGTH, FORCE, MOMENT))
-    columns = [*(f"{x}{length}" for x in "xyz"), *(f"F{x}{force}" for x in "xyz"), *(f"M{x}{moment}" for x in "xyz")]
+    axes, about = body.mechanism.axes, "z" if body.mechanism.planar else "xyz"
+    columns = [*(f"{x}{length}" for x in axes), *(f"F{x}{force}" for x in axes), *(f"M{x}{moment}" for x in about)]
     heads = ("position", "at", "name", "kind", *columns, "not unique", "about")
     write_whole(path, [csv_of(heads, _rows(body, body.cases(at)))])
 
 
 def _rows(body: BalancedLoads, cases: Sequence[Case]) -> Iterator[list[Any]]:
+    planar = body.mechanism.planar
+    forces, moments = (slice(3, 5), slice(2, 3)) if planar else (slice(3, 6), slice(3))
     for case in cases:
         unknown = body.not_unique(case.position)
         for one in body.acting:
             wrench = _at(one, case)
-            numbers = ["" if np.isnan(v) else float(v) for v in (*wrench[3:], *wrench[:3])]
+            numbers = ["" if np.isnan(v) else float(v) for v in (*wrench[forces], *wrench[moments])]
             texts = (" ".join(unknown.get(one.name, ())), cell(plain(one.about)))
             yield [
                 case.position,
                 cell(plain(case.place)),
                 cell(plain(one.name)),
                 one.kind,
-                *one.point,
+                *one.point[: 2 if planar else 3],
                 *numbers,
                 *texts,
             ]
@@ -592,7 +598,7 @@ class FreeBody(BalancedLoads, Shown):
         most = dict(zip(("|F|", "|M|"), reversed(self.scales), strict=True))
         rows = []
         for one in self.acting:
-            row = [one.name, one.kind, ", ".join(f"{x + 0.0:.6g}" for x in one.point)]
+            row = [one.name, one.kind, ", ".join(f"{x + 0.0:.6g}" for x in one.point[: len(self.mechanism.axes)])]
             for size, largest in most.items():
                 r = ranges[one.name, size]
                 row += (
@@ -706,7 +712,7 @@ def free_body(s: Solution, link: str) -> FreeBody:
         acting.append(PointLoad("inertia", "inertia", _point(one.center), wrench, _every(wrench), about, True))
     if link == m.frame:
         add("support", "support", None, -s.shaking, "what holds the frame, at the origin of its frame")
-    return FreeBody(s, one, tuple(acting), acceleration)
+    return FreeBody(s, one, tuple(replace(load, planar=m.planar) for load in acting), acceleration)
 
 
 def _gears(m: Mechanism, c: BaseCoupling) -> Iterator[tuple[str, Marker, float]]:

@@ -22,6 +22,7 @@ from mechgraph.errors import DeclarationError, MechgraphWarning
 from mechgraph.fields import vector_fault
 from mechgraph.files import read_off
 from mechgraph.maths.se3 import Array
+from mechgraph.pairs.factors import WRENCHES
 from mechgraph.pairs.journal import ACROSS, TURN, Journal, film_faults
 from mechgraph.quantities import ENERGY, FORCE, MOMENT, POWER, TIME, door, unit_of, wrong
 from mechgraph.result.film import FilmResult, Loaded
@@ -423,7 +424,7 @@ def over_time(s: Solution, about: ArrayLike = (0.0, 0.0, 0.0)) -> OverTime:
         spent = spent + row.integral(np.abs(power))
     p, shaking = np.asarray(about, dtype=float), s.shaking
     wrench = np.concatenate([shaking[..., :3] - np.cross(p, shaking[..., 3:]), shaking[..., 3:]], axis=-1)
-    parts = {name: wrench[..., i] for i, name in enumerate(("Mx", "My", "Mz", "Fx", "Fy", "Fz"))}
+    parts = {WRENCHES[i]: wrench[..., i] for i in range(6)[s.mechanism.span]}
     parts |= {
         f"|{letter}|": np.linalg.norm(wrench[..., part], axis=-1)
         for letter, part in (("M", slice(0, 3)), ("F", slice(3, 6)))

@@ -21,6 +21,7 @@ from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import CHECKS, PATH
 from mechgraph.model.loads import Law
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.pairs.factors import WRENCHES
 from mechgraph.pairs.journal import Journal
 from mechgraph.quantities import BASE_UNITS, items_of, place_among, unit_of, wrong
 from mechgraph.result.contacts import (
@@ -115,43 +116,43 @@ def table_of(s: Trajectory, include: Sequence[Include] = ()) -> list[Column]:
 
 Extra = tuple[str, Array, tuple[int, ...]]
 """Name, values and dimension of a column; no exponents for a number without a unit."""
-XYZ = "xyz"
 
 
-def _vector(name: str, values: Array, dimension: tuple[int, ...], letters: Sequence[str] = XYZ) -> Iterator[Extra]:
+def _vector(name: str, values: Array, dimension: tuple[int, ...], letters: Sequence[str]) -> Iterator[Extra]:
     for i, letter in enumerate(letters):
         yield f"{name}:{letter}", values[..., i], dimension
 
 
-def _point(name: str, p: MaterialPoint) -> Iterator[Extra]:
+def _point(name: str, p: MaterialPoint, letters: str) -> Iterator[Extra]:
     for order, (label, values) in enumerate(zip(("", " velocity", " acceleration"), p, strict=True)):
-        yield from _vector(name + label, values, (1, 0, -order))
+        yield from _vector(name + label, values, (1, 0, -order), letters)
 
 
 def _points(s: Trajectory) -> Iterator[Extra]:
     """Motion of the named points of links: ``bucket.tip:x``, ``bucket.tip velocity:x``, ..."""
     for i, link in enumerate(s.mechanism.links):
         for name, p in link.points.items():
-            yield from _point(f"{link.name}.{name}", s.link_point(i, p))
+            yield from _point(f"{link.name}.{name}", s.link_point(i, p), s.mechanism.axes)
 
 
 def _links(s: Trajectory) -> Iterator[Extra]:
     """Poses of the links: origin of the frame ``crank:x``, rotation matrix ``crank:Rxx``, and angular rates."""
+    axes, turns = s.mechanism.axes, slice(2, 3) if s.mechanism.planar else slice(3)
     for i, link in enumerate(s.mechanism.links):
         pose, twist, acceleration = s.link(i)
-        yield from _vector(link.name, pose[..., :3, 3], (1, 0, 0))
-        for j, row in enumerate(XYZ):
-            for k, column in enumerate(XYZ):
+        yield from _vector(link.name, pose[..., :3, 3], (1, 0, 0), axes)
+        for j, row in enumerate(axes):
+            for k, column in enumerate(axes):
                 yield f"{link.name}:R{row}{column}", pose[..., j, k], ()
-        yield from _vector(f"{link.name} angular velocity", twist[..., :3], (0, 0, -1))
-        yield from _vector(f"{link.name} angular acceleration", acceleration[..., :3], (0, 0, -2))
+        yield from _vector(f"{link.name} angular velocity", twist[..., turns], (0, 0, -1), "xyz"[turns])
+        yield from _vector(f"{link.name} angular acceleration", acceleration[..., turns], (0, 0, -2), "xyz"[turns])
 
 
 def _centers(s: Trajectory) -> Iterator[Extra]:
     """Motion of the mass centers: ``crank center:x``, ``crank center velocity:x``, ..."""
     for i, link in enumerate(s.mechanism.links):
         if link.center is not None:
-            yield from _point(f"{link.name} center", s.link_point(i, None))
+            yield from _point(f"{link.name} center", s.link_point(i, None), s.mechanism.axes)
 
 
 def _loads(s: Trajectory) -> Iterator[Extra]:
@@ -167,8 +168,8 @@ def _loads(s: Trajectory) -> Iterator[Extra]:
             yield f"{name} force", found.force, (2 if turns else 1, 1, -2)
         else:
             for link, wrench in found.wrenches.items():
-                yield from _vector(f"{name} on {link}", wrench[..., :3], (2, 1, -2), ("Mx", "My", "Mz"))
-                yield from _vector(f"{name} on {link}", wrench[..., 3:], (1, 1, -2), ("Fx", "Fy", "Fz"))
+                for i in range(6)[m.span]:
+                    yield f"{name} on {link}:{WRENCHES[i]}", wrench[..., i], (2 if i < 3 else 1, 1, -2)
         yield f"{name} power", found.power, (2, 1, -3)
 
 
@@ -296,6 +297,11 @@ class Solution(Shown):
     def mechanism(self) -> Mechanism:
         """The mechanism that was solved; its drives are the freedoms that take unknown efforts."""
         return self._values.mechanism
+
+    @property
+    def planar(self) -> bool:
+        """Whether the mechanism is planar: what leaves the x-y plane is zero by the model."""
+        return self.mechanism.planar
 
     @property
     def prescribed(self) -> tuple[str, ...]:

@@ -155,7 +155,7 @@ def _link_rows(values: Trajectory, k: int) -> Iterator[Row]:
     named = {"mass center": None} if link.center is not None else {}
     for name, at in {**named, **link.points}.items() or {"origin of the frame": (0.0, 0.0, 0.0)}.items():
         point = values.link_point(k, at)
-        yield from ((f"{name} {axis}{length}", point.position[..., i]) for i, axis in enumerate("xyz"))
+        yield from ((f"{name} {axis}{length}", point.position[..., i]) for i, axis in enumerate(m.axes))
         yield f"{name} speed{speed}", np.linalg.norm(point.velocity, axis=-1)
         yield f"{name} acceleration{rate}", np.linalg.norm(point.acceleration, axis=-1)
     _, twist, change = values.link(k)

@@ -234,6 +234,8 @@ class DrawnPose:
 
     def _plane(self) -> Array | None:
         """The normal of the plane of the mechanism: all points lie in it, and what can only turn does so about the normal."""
+        if self.m.planar:
+            return np.array([0.0, 0.0, 1.0])
         normal = plane_normal(self.everything)
         for pair in self.m.pairs:
             if (
