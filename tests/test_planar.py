@@ -442,3 +442,17 @@ def test_tables_show_the_plane_alone(tmp_path: pathlib.Path) -> None:
     assert "coupler.tip:z" not in head
     assert "crank:Rzz" not in head
     assert np.isfinite(np.linalg.norm(s["B"].force, axis=-1)).all()
+
+
+def test_the_command_line_takes_the_plane() -> None:
+    def run(*words: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, "-m", "mechgraph", *words], capture_output=True, text=True, check=False, timeout=60
+        )
+
+    found = run("check", "four-bar", "--planar")
+    assert found.returncode == 0
+    assert "Determinate (planar): 1 driver, 9 unknowns, 9 equations" in " ".join(found.stdout.split())
+    spatial = run("check", "rcsr", "--planar")
+    assert spatial.returncode == 2
+    assert "does not move in a plane" in spatial.stderr

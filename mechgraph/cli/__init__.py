@@ -24,7 +24,7 @@ from mechgraph.cli.commands import (
     solve,
     structure,
 )
-from mechgraph.cli.options import DONE, EXIT_STATUS, outcome, warned, write
+from mechgraph.cli.options import DONE, EXIT_STATUS, in_plane, outcome, warned, write
 
 
 class Program(TyperGroup):
@@ -73,5 +73,5 @@ def _main(
 
 app.command("list")(list_library)
 for command in (check, structure, equations, solve, respond, save, plot, loads, report, assemblies, branches):
-    app.command(command.__name__)(command)
-app.command("compile")(compile_)
+    app.command(command.__name__)(in_plane(command))
+app.command("compile")(in_plane(compile_))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import inspect
 import io
 import os
 import re
@@ -16,8 +17,10 @@ import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any, Literal, NoReturn
+from typing import Annotated, Any, Literal, NoReturn, get_type_hints
 
 import numpy as np
 import typer
@@ -444,7 +447,40 @@ OVER_TIME = "Also peak, mean, RMS and work of drivers, and shaking, over time or
 OverTime = Annotated[bool, typer.Option("--over-time", help=OVER_TIME)]
 
 
+PLANAR = "Take the mechanism in the plane in which it moves, as m.to_planar() does."
+
+
+FLATTENED: ContextVar[bool] = ContextVar("planar", default=False)
+"""Whether the running command is asked for in the plane."""
+
+
+def in_plane(command: Callable[..., None]) -> Callable[..., None]:
+    """A command with the option ``--planar``, which ``loaded`` goes by."""
+
+    @wraps(command)
+    def run(planar: bool = False, **named: Any) -> None:
+        token = FLATTENED.set(planar)
+        try:
+            command(**named)
+        finally:
+            FLATTENED.reset(token)
+
+    hints = get_type_hints(command, include_extras=True)
+    hints["planar"] = Annotated[bool, typer.Option("--planar", help=PLANAR)]
+    own = [one.replace(annotation=hints[name]) for name, one in inspect.signature(command).parameters.items()]
+    asked = inspect.Parameter("planar", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=hints["planar"])
+    vars(run)["__signature__"] = inspect.Signature([*own, asked])
+    run.__annotations__ = hints
+    return run
+
+
 def loaded(name: str) -> mg.Mechanism:
+    """A mechanism by its name on the command line, in its plane where that is asked for."""
+    m = _found(name)
+    return m.to_planar() if FLATTENED.get() else m
+
+
+def _found(name: str) -> mg.Mechanism:
     """A mechanism of the library, else of a file, else a loop by its letters; an unknown name is answered with its near matches."""
     known = mg.library()
     if name in known:
