@@ -108,6 +108,8 @@ def _direction(row: PairType, c: Component | None) -> str:
     """The direction of a force or moment against z of its frame; nothing for a pair without an axis."""
     if c is None or not row.directed:
         return ""
+    if row.normal is not None and c.is_couple:
+        return "moment M in the plane"
     turning, slot = divmod(int(np.flatnonzero(c.wrench)[0]), 3)
     how = {(0, True): "moment about", (0, False): "moment across", (1, True): "along", (1, False): "across"}
     return f"{how[turning, slot == 2]} the {LINES.get(row.symbol, 'axis')}"

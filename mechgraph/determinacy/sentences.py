@@ -342,9 +342,10 @@ def kind_line(r: Facts) -> str:
     """What kind of mechanism it is, or of what kinds its loops are."""
     how = "" if r.kind.by_pairs else " in its motion, not in all of its pairs"
     if r.mechanism.planar:
-        return "Planar: motion and equilibrium in the x-y plane alone, 3 equations a link."
+        return "Planar: 3 equations a link, in the x-y plane alone; moments of parts in layers: ask m.to_spatial()."
     if r.kind.name:
-        return f"{r.kind.name.capitalize()}{how}: {place(r.kind)}."
+        offer = " Counted in its plane alone: m.to_planar()." * (r.kind.name == "planar" and bool(r.redundancy))
+        return f"{r.kind.name.capitalize()}{how}: {place(r.kind)}.{offer}"
     names = [kind.name for kind in r.loop_kinds]
     if not any(names):
         return ""

@@ -730,7 +730,10 @@ def formulation_document(f: Formulation, components: bool) -> Document:
     numbers = names_of(m).link_number
     count = f"{len(f.unknowns)} unknowns, {len(f.equations)} equations"
     blocks: list[Piece] = [
-        Paragraph(f"Bookkeeping {f.bookkeeping}, {f.sought}: {count}. Numbers in brackets are those of Lee (1977)."),
+        Paragraph(
+            f"Bookkeeping {f.bookkeeping}, {f.sought}: {count}. Numbers in brackets are those of Lee (1977)."
+            + " Planar: vectors have the components x and y, turns and moments z." * f.mechanism.planar
+        ),
         f.ledger().table("llll"),
         Heading("Symbols", 2),
         Bullets(

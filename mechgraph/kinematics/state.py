@@ -522,6 +522,8 @@ class ContactLines:
         axes = Axes(here.pair_points[:, first], S[0][:3], here.pair_points[:, last], along, here.system.par.L)
         P, n = self._lines(g, axes)
         line = np.concatenate([cross(P, n), n])
+        if here.system.m.planar:  # of gears with a helix the axial force leaves the plane
+            line[np.delete(np.arange(6), here.system.graph.span)] = 0.0
         power = contact.steps[0].sense * (line * S[0][:, None]).sum(axis=0)
         size = here.system.coupling_matrix[g, columns[0]] / power
         # the first line serves the multipliers that make its force push, the second the others

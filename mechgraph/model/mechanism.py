@@ -31,10 +31,11 @@ from mechgraph.model.declaration import Parts, declaration_faults, flat_start, i
 from mechgraph.model.loads import Gravity, Load
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Pair
-from mechgraph.model.plane import in_space, pair_in_plane, pair_in_space
+from mechgraph.model.plane import in_space, pair_in_plane, pair_in_space, spatial_row
 from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.pairs.contact_types import row_of, travels
 from mechgraph.pairs.pair_type import TABLE, PairType
+from mechgraph.pairs.plane import in_plane
 from mechgraph.quantities import (
     LENGTH,
     MASS,
@@ -69,7 +70,10 @@ def mechanism_document(m: Parts) -> Document:
 def _counts(m: Parts) -> str:
     units = ", ".join(f"{base} in {unit}" for base, unit in m.units.items())
     counts = ((m.links, "link"), (m.pairs, "pair"), (m.couplings, "coupling"), (m.drives, "driver"), (m.loads, "load"))
-    return ", ".join(counted(len(of), what) for of, what in counts if of) + (f"; {units}" if units else "") + "."
+    plane = "; planar, in x and y" * m.planar
+    return (
+        ", ".join(counted(len(of), what) for of, what in counts if of) + plane + (f"; {units}" if units else "") + "."
+    )
 
 
 def _rows(head: Sequence[str], rows: Iterator[tuple[str, ...]], count: int, align: str) -> Iterator[Block]:
@@ -91,7 +95,7 @@ def _links(m: Parts) -> Iterator[Block]:
             link.name,
             "frame" if link.name == m.frame else "",
             _number(link.mass) if link.mass else "",
-            _vector(link.center),
+            _vector(link.center, m.axes),
             "yes" if link.inertia is not None else "",
             ", ".join(link.points),
         )
@@ -109,8 +113,8 @@ def _pairs(m: Parts) -> Iterator[Block]:
             p.type.symbol,
             p.a,
             p.b,
-            _vector(p.point) if p.on_a is None else "by markers",
-            _vector(p.axis),
+            _vector(p.point, m.axes) if p.on_a is None else "by markers",
+            "" if m.planar and p.type.normal == 2 else _vector(p.axis, m.axes),
             _pitch(p),
         )
         for p in m.pairs
@@ -167,8 +171,8 @@ def _number(value: float) -> str:
     return f"{value:.4g}"
 
 
-def _vector(value: Any) -> str:
-    return "" if value is None else f"({', '.join(f'{x + 0.0:.4g}' for x in value)})"
+def _vector(value: Any, axes: str) -> str:
+    return "" if value is None else f"({', '.join(f'{x + 0.0:.4g}' for x in value[: len(axes)])})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -511,6 +515,14 @@ class Mechanism(Parts, Shown):
         1
         """
         old = self.pair(pair)
+        row = row_of(type, old.curve, old.surface)
+        if (
+            self.planar
+            and isinstance(row, PairType)
+            and (flat := in_plane(spatial_row(row)))
+            and flat.normal != old.type.normal
+        ):
+            old = old.replace(axis=None, second=None)  # those of the plane
         new = Pair(
             old.name,
             type,

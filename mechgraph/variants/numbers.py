@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from mechgraph.determinacy.snapping import SnappedMechanism
 from mechgraph.errors import DeclarationError, did_you_mean, near_names
-from mechgraph.fields import POINT, Described, FieldFormat, PerCase
+from mechgraph.fields import POINT, XYZ, Described, FieldFormat, PerCase
 from mechgraph.maths.inertia import physical
 from mechgraph.maths.se3 import Array
 from mechgraph.model.couplings import BaseCoupling
@@ -31,6 +31,7 @@ from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import NUMBERS_OF_CHAIN, Mechanism, chain_numbers, markers_of_chain
 from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.model.parameters import Declared, coupling_places, declared
+from mechgraph.model.plane import plane_faults
 from mechgraph.quantities import is_numeric
 
 PLACED = (*Marker.formats, "pitch")
@@ -135,7 +136,8 @@ def find_field(m: Mechanism, name: str) -> AnyField | str:
         count = len(getattr(m, indexed["what"]))
         if int(indexed["index"]) >= count:
             return f"{name!r}: there are {count} {indexed['what']}, counted from 0"
-        return INDEXED[indexed["what"]](m, int(indexed["index"]), indexed["rest"] or "")
+        i, rest = int(indexed["index"]), indexed["rest"] or ""
+        return _leaving(m, name, getattr(m, indexed["what"])[i], rest) or INDEXED[indexed["what"]](m, i, rest)
     named: Sequence[tuple[Sequence[Link | Pair | BaseCoupling], Finder]] = (
         (m.links, _link_field),
         (m.pairs, _pair_field),
@@ -143,14 +145,31 @@ def find_field(m: Mechanism, name: str) -> AnyField | str:
     )
     for items, find in named:
         for i, item in enumerate(items):
-            if name.startswith(item.name + ".") and (found := find(m, i, name.removeprefix(item.name + "."))):
-                return found
+            rest = name.removeprefix(item.name + ".")
+            if rest != name and (found := find(m, i, rest)):
+                return _leaving(m, name, item, rest) or found
     example = (
         f"expected e.g. {m.links[-1].name}.mass, {m.links[-1].name}.center.x, "
         f"{m.links[-1].name}.inertia.xx, {m.pairs[0].name}.{'point' if m.pairs[0].point is not None else 'on_a.point'}.x, "
         "loads[0].stiffness, or length[2] of a chain"
     )
     return f"{name!r}: no declared number of that name; {did_you_mean(_near(m, name)) or example}"
+
+
+def _leaving(m: Mechanism, name: str, item: Described, rest: str) -> str | None:
+    """Why a number of a planar mechanism does not vary: what it belongs to would leave the plane; None where it would not."""
+    if not m.planar:
+        return None
+    found, (point, _, at) = _component(item, rest), rest.rpartition(".")
+    if found is None and not (isinstance(item, Link) and point in item.points and at in XYZ):
+        return None
+    path, _, (place, *_) = (("points", point), POINT, ((XYZ.index(at),),)) if found is None else found
+    value: Any = item
+    for part in path:
+        value = _part(value, part)
+    moved = _changed(item, path, place, float(np.asarray(value, dtype=float)[place]) + 1.0)
+    of = ([moved] if isinstance(moved, kind) else [] for kind in (Link, Pair, Load))
+    return f"{name!r}: leaves the x-y plane of a planar mechanism; m.to_spatial() has it" if plane_faults(*of) else None
 
 
 def _near(m: Mechanism, name: str) -> list[str]:
@@ -196,6 +215,8 @@ def _link_field(m: Mechanism, i: int, rest: str) -> Field | ItemField | str | No
     (what,), _, places = found
     if what == "mass" and link.center is None:
         return f"'{link.name}.mass': link {link.name!r} has no mass center; declare center=(x, y, z)"
+    if m.planar and rest == "inertia.zz":  # the others, which do nothing in the plane, go with it: a body that can be
+        places = tuple((j, j) for j in range(3))
     return Field(what, tuple((*place, i) for place in places))
 
 
@@ -221,6 +242,8 @@ def _chain_field(m: Mechanism, name: str, what: str, index: int) -> ChainField |
         return f"{name!r}: mechanism {m.name!r} is no chain with twist, length and offset of every link"
     if index >= numbers.shape[1]:
         return f"{name!r}: the chain has {numbers.shape[1]} links, counted from 0"
+    if m.planar and what != "length":
+        return f"{name!r}: leaves the x-y plane of a planar mechanism; m.to_spatial() has it"
     return ChainField(NUMBERS_OF_CHAIN.index(what), index)
 
 
