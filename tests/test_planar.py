@@ -1,9 +1,11 @@
 """Planar mechanisms: three equations a link and three rows a loop; the same numbers as their spatial twins have in the plane."""
 
+import json
 import pathlib
 import pickle
 import subprocess
 import sys
+import tomllib
 
 import numpy as np
 import pytest
@@ -338,6 +340,38 @@ def test_there_and_back_is_equal(m: mg.Mechanism, tmp_path: pathlib.Path) -> Non
     assert "pair_type" not in (tmp_path / "m.toml").read_text(encoding="utf-8")
     assert not m.to_spatial().planar
     assert m.to_spatial().pairs[0].type is mg.pair_types()["R"]
+
+
+PLANAR_FILE = """
+schema = 1
+name = "bars"
+planar = true
+link = [
+  {name = "frame"}, {name = "crank", mass = 1.0, center = [0.05, 0.0], inertia = 0.001},
+  {name = "coupler", mass = 2.0, center = [0.3, 0.2], inertia = 0.01, points = {tip = [0.3, 0.35]}},
+  {name = "rocker", mass = 2.0, center = [0.5, 0.2], inertia = 0.01},
+]
+pair = [
+  {name = "A", type = "R", a = "frame", b = "crank", point = [0, 0]},
+  {name = "B", type = "R", a = "crank", b = "coupler", point = [0.1, 0]},
+  {name = "C", type = "R", a = "coupler", b = "rocker", point = [0.5, 0.4]},
+  {name = "D", type = "R", a = "frame", b = "rocker", point = [0.5, 0]},
+]
+drive = [{freedom = "A"}]
+load = [
+  {kind = "gravity", acceleration = [0, -9.81]}, {kind = "wrench", link = "rocker", force = [3, 4], moment = 2.0, point = [0.5, 0.3]}
+]
+"""
+
+
+def test_a_file_has_two_numbers_a_point(tmp_path: pathlib.Path) -> None:
+    (tmp_path / "bars.toml").write_text(PLANAR_FILE, encoding="utf-8")
+    assert mg.load(tmp_path / "bars.toml") == four_bar()
+    jsonschema = pytest.importorskip("jsonschema")
+    rules = json.loads(
+        (pathlib.Path(__file__).parents[1] / "library" / "mechanism.schema.json").read_text(encoding="utf-8")
+    )
+    jsonschema.validate(tomllib.loads(PLANAR_FILE), rules)
 
 
 def test_layers_are_heights_of_links() -> None:

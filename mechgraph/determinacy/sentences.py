@@ -344,8 +344,8 @@ def kind_line(r: Facts) -> str:
     if r.mechanism.planar:
         return "Planar: 3 equations a link, in the x-y plane alone; moments of parts in layers: ask m.to_spatial()."
     if r.kind.name:
-        offer = " Counted in its plane alone: m.to_planar()." * (r.kind.name == "planar" and bool(r.redundancy))
-        return f"{r.kind.name.capitalize()}{how}: {place(r.kind)}.{offer}"
+        offer = "; in that plane alone: m.to_planar()" * (r.kind.name == "planar" and bool(r.redundancy))
+        return f"{r.kind.name.capitalize()}{how}: {place(r.kind)}{offer}."
     names = [kind.name for kind in r.loop_kinds]
     if not any(names):
         return ""

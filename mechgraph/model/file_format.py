@@ -228,7 +228,7 @@ SHARED = {
     **_series_of("series", "A number, or an array of numbers, one a position.", {"type": "number"}),
     **_series_of(
         "vector_series",
-        "Three numbers, in a planar file two (a moment: one); or an array of such, one a position.",
+        "Three numbers, in a planar file two; or an array of such, one a position.",
         {"$ref": "#/$defs/vector"},
     ),
 }
@@ -287,6 +287,8 @@ def _table_schema(name: str, table: FileTable) -> dict[str, Any]:
 
 def _field_schema(about: FieldFormat, default: Any) -> dict[str, Any]:
     out: dict[str, Any] = {"description": about.meaning, **about.kind.schema, **about.rules}
+    if about.normal:  # of a planar file one number
+        out = {"description": about.meaning, "anyOf": [about.kind.schema, {"$ref": "#/$defs/series"}]}
     if about.choices:
         out = {"description": about.meaning, "enum": list(about.choices)}
     elif out.get("type") == "string" and default != "" and "pattern" not in out:
