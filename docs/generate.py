@@ -16,6 +16,11 @@ from mechgraph import show
 from mechgraph.cli import app
 
 ROOT = Path(__file__).resolve().parents[1]
+PARTS = (
+    *("Parts", "bearings", "cardan_shaft", "cylinder", "four_bar", "gear_stage", "rack_and_pinion", "rod"),
+    *("screw_drive", "slider_crank", "spring_strut"),
+)
+"""Public names of the catalogue of parts."""
 GROUPS: Mapping[str, tuple[str, str, tuple[str, ...]]] = {
     "declare": (
         "Declare a mechanism",
@@ -47,6 +52,7 @@ GROUPS: Mapping[str, tuple[str, str, tuple[str, ...]]] = {
             ),
             *("Belt", "Curve", "Surface", "Hertz", "Journal", "Stiffness", "Misfit"),
             *(f"inertia.{name}" for name in ("rod", "box", "cylinder", "sphere", "from_components")),
+            *(f"parts.{name}" for name in PARTS),
         ),
     ),
     "loads": (

@@ -45,6 +45,7 @@ from mechgraph.graph.chains import Chain
 from mechgraph.kinetostatics import Transmission, assemble, kinematics, solve, transmission
 from mechgraph.maths import inertia
 from mechgraph.maths.tolerances import Tolerances
+from mechgraph.model import parts
 from mechgraph.model.couplings import Belt, BevelGears, Coupling, Rack, SpurGears, WormGear
 from mechgraph.model.loads import Damper, Effort, ForceLaw, ForceTable, Gravity, Spring, TorsionSpring, Wrench
 from mechgraph.model.mechanism import Mechanism, chain
@@ -84,7 +85,7 @@ __all__ = [
     "Surface", "SystemGroup", "Tolerances", "TorsionSpring", "Transmission", "WormGear", "Wrench", "assemble",
     "assemblies", "atlas", "branches", "chain", "check", "compile", "equilibrium", "formulate", "free_body", "groups",
     "identify", "inertia", "kinematics", "library", "linearize", "load", "load_chains", "multiple_joints",
-    "over_time", "pair_types", "respond", "save", "save_chains", "solve", "split_joint", "structure", "study",
+    "over_time", "pair_types", "parts", "respond", "save", "save_chains", "solve", "split_joint", "structure", "study",
     "system_groups", "transmission", "write_report",
 ]  # fmt: skip
 

@@ -31,9 +31,10 @@ def functions() -> dict[str, Callable]:
     """Public functions and constructors, by name."""
     found = {name: getattr(mg, name) for name in mg.__all__}
     found |= {
-        f"inertia.{k}": v
-        for k, v in vars(mg.inertia).items()
-        if getattr(v, "__module__", "") == mg.inertia.__name__ and callable(v) and k[0] != "_"
+        f"{room}.{k}": v
+        for room, module in (("inertia", mg.inertia), ("parts", mg.parts))
+        for k, v in vars(module).items()
+        if getattr(v, "__module__", "") == module.__name__ and callable(v) and k[0] != "_"
     }
     found |= {f"show.{name}": getattr(show, name) for name in show.__all__}
     for name in ("Curve", "Surface", "Motion"):
@@ -344,6 +345,43 @@ def declared_doors() -> list[tuple[str, Callable, tuple, dict]]:
         ("inertia.sphere", mg.inertia.sphere, (1.0, 1.0), {}),
         ("inertia.from_components", mg.inertia.from_components, (1.0, 1.0, 1.0, 0.0, 0.0, 0.0), {}),
         ("inertia.shifted", mg.inertia.shifted, (np.eye(3), 1.0, (0, 0, 1)), {}),
+        (
+            "parts.cylinder",
+            mg.parts.cylinder,
+            ("j", "a", (0, 0), "b", (1, 0)),
+            {"mass": 2.0, "bore": 0.1, "pressure": 3.0},
+        ),
+        ("parts.cylinder about", mg.parts.cylinder, ("j", "a", (0, 0, 0), "b", (1, 0, 0)), {"axis": Z}),
+        ("parts.rod", mg.parts.rod, ("j", "a", (0, 0, 0), "b", (1, 0, 0)), {"axis": Z, "mass": 2.0}),
+        (
+            "parts.spring_strut",
+            mg.parts.spring_strut,
+            ("j", "a", (0, 0, 0), "b", (1, 0, 0)),
+            {"stiffness": 1.0, "free_length": 1.0, "damping": 1.0, "axis": Z, "mass": 1.0},
+        ),
+        ("parts.bearings", mg.parts.bearings, ("j", "a", "b", [(0, 0, 0), (0, 0, 1)], Z), {"fixed": 1}),
+        ("parts.screw_drive", mg.parts.screw_drive, ("j", "a", (0, 0, 0), "b", (1, 0, 0)), {"lead": 0.1, "mass": 1.0}),
+        (
+            "parts.cardan_shaft",
+            mg.parts.cardan_shaft,
+            ("j", "a", (0, 0, 0), "b", (1, 0, 0)),
+            {"axis_a": (1, 1, 0), "axis_b": (1, 0, 0), "phase": 0.0, "mass": 1.0},
+        ),
+        (
+            "parts.rack_and_pinion",
+            mg.parts.rack_and_pinion,
+            ("j", "a", (0, 0, 0), Z, (1, 0, 0)),
+            {"radius": 0.1, "pressure_angle": 0.3},
+        ),
+        (
+            "parts.gear_stage",
+            mg.parts.gear_stage,
+            ("j", "a", (0, 0, 0), (1, 0, 0), Z),
+            {"teeth": (20, 40), "module": 0.03, "helix_angle": 0.0, "internal": False},
+        ),
+        ("parts.four_bar", mg.parts.four_bar, ("j", "a", [(0, 0), (0, 1), (2, 1), (2, 0)], Z), {"mass": 1.0}),
+        ("parts.slider_crank", mg.parts.slider_crank, ("j", "a", [(0, 0), (1, 0), (3, 0)], (1, 0), Z), {"mass": 1.0}),
+        ("parts.Parts", mg.parts.Parts, ((), (), (), ()), {}),
         ("inertia.physical_faults", mg.inertia.physical_faults, (np.eye(3),), {"tol": 1e-9}),
     ]
 

@@ -12,7 +12,22 @@ import pytest
 import mechgraph as mg
 from mechgraph import show
 
-MODULES = {"inertia": ("rod", "box", "cylinder", "sphere", "from_components")}
+MODULES = {
+    "inertia": ("rod", "box", "cylinder", "sphere", "from_components"),
+    "parts": (
+        "Parts",
+        "bearings",
+        "cardan_shaft",
+        "cylinder",
+        "four_bar",
+        "gear_stage",
+        "rack_and_pinion",
+        "rod",
+        "screw_drive",
+        "slider_crank",
+        "spring_strut",
+    ),
+}
 """Public modules, with their public functions."""
 RETURNED = re.compile(r"(Returned|Yielded) by ``|Part of ``|Attribute ``")
 """What the docstring of a class says that users get and do not make."""

@@ -31,6 +31,7 @@ from mechgraph.model.declaration import Parts, declaration_faults, flat_start, i
 from mechgraph.model.loads import Gravity, Load
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Pair
+from mechgraph.model.parts import Parts as Catalogued
 from mechgraph.model.plane import in_space, pair_in_plane, pair_in_space, spatial_row
 from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.pairs.contact_types import row_of, travels
@@ -193,6 +194,8 @@ class Mechanism(Parts, Shown):
         ``Gravity``, ``Wrench``, ``Effort``, ``Spring``, ``TorsionSpring``, ``Damper``, ``ForceLaw``.
     couplings : iterable of Coupling
         Linear relations between freedoms, gears and belts among them; kept with full freedom names, ``"A.Rz"``.
+    parts : iterable of parts.Parts
+        Catalogue parts, ``mg.parts.cylinder(...)``: their links, pairs, couplings and loads are written out behind the others.
     frame : str, optional
         Name of the fixed link. Default: the first link.
     start : mapping of str to float, optional
@@ -243,6 +246,7 @@ class Mechanism(Parts, Shown):
         loads: Iterable[Load] = (),
         *,
         couplings: Iterable[BaseCoupling] = (),
+        parts: Iterable[Catalogued] = (),
         frame: str | None = None,
         start: Mapping[str, Any] | None = None,
         units: Mapping[str, str] | None = None,
@@ -254,16 +258,17 @@ class Mechanism(Parts, Shown):
         expected: Mapping[str, Any] | None = None,
     ) -> None:
         faults: list[str] = []
-        pair_tuple = items_of(pairs, "pairs", faults)
-        link_tuple = tuple(map(Link, _ends(pair_tuple))) if links is None else items_of(links, "links", faults)
+        more = Catalogued.joined(parts, faults)
+        pair_tuple = (*items_of(pairs, "pairs", faults), *more.pairs)
+        link_tuple = more.links_with(pair_tuple) if links is None else (*items_of(links, "links", faults), *more.links)
         first = next((link.name for link in link_tuple if isinstance(link, Link)), "")
         self._set(
             name=name,
             links=link_tuple,
             pairs=pair_tuple,
-            couplings=_named(items_of(couplings, "couplings", faults), pair_tuple),
+            couplings=_named((*items_of(couplings, "couplings", faults), *more.couplings), pair_tuple),
             drives=_as_drives(items_of(drives, "drives", faults)),
-            loads=items_of(loads, "loads", faults),
+            loads=(*items_of(loads, "loads", faults), *more.loads),
             frame=first if frame is None else frame,
             units=MappingProxyType(dict(units) if isinstance(units, Mapping) else {}),
             tol=plain(tol),
@@ -766,12 +771,6 @@ class Mechanism(Parts, Shown):
             pairs=[pair.moved(G) for pair in self.pairs],
             loads=[load.moved(G) for load in self.loads],
         )
-
-
-def _ends(pairs: Iterable[Any]) -> list[str]:
-    """Names of the links of pairs, each once, in order."""
-    ends = (end for p in pairs if isinstance(p, Pair) for end in (p.a, p.b))
-    return list(dict.fromkeys(end for end in ends if isinstance(end, str)))
 
 
 def _are_pairs(items: Iterable[Any]) -> bool:
