@@ -254,6 +254,28 @@ def test_a_part_is_plain_data(part, tmp_path: Path):
     assert (mine.mobility, mine.redundancy) == (theirs.mobility, theirs.redundancy)
 
 
+def test_quantities_of_pint_are_numbers_in_the_units_of_the_mechanism():
+    u = pytest.importorskip("pint").UnitRegistry()
+    part = mg.parts.cylinder(
+        "jack", "frame", (100, -100, 0) * u.cm, "boom", [1 * u.m, 0 * u.m, 0 * u.m],
+        axis=Z, mass=4000 * u.g, bore=8 * u.cm, pressure=2 * u.bar,
+    )  # fmt: skip
+    units = {"length": "mm", "mass": "t", "time": "s"}
+    m = mg.Mechanism("crane", pairs=[PIN], parts=[part], units=units)
+    plain = jack(axis=Z, mass=4.0, bore=0.08, pressure=2e5)
+    wanted = mg.Mechanism("crane", pairs=[PIN], parts=[plain], units={"length": "m", "mass": "kg", "time": "s"})
+    wanted = wanted.to_units(length="mm", mass="t")
+    for one, two in zip(m.links[2:], wanted.links[2:], strict=True):
+        np.testing.assert_allclose([one.mass, *one.center], [two.mass, *two.center], rtol=1e-12)
+        np.testing.assert_allclose(one.inertia, two.inertia, rtol=1e-12)
+    np.testing.assert_allclose([p.point for p in m.pairs], [p.point for p in wanted.pairs], rtol=1e-12)
+    assert m.loads[0].value == pytest.approx(wanted.loads[0].value)
+    with pytest.raises(mg.DeclarationError) as error:
+        mg.parts.cylinder("jack", "frame", (100, -100, 0) * u.cm, "boom", (1, 0, 0), mass=4.0)
+    assert "q = (1, 0, 0): expected a quantity with its unit" in str(error.value)
+    assert "mass = 4.0" in str(error.value)
+
+
 def test_parts_add_up():
     both = PARTS["cylinder"] + PARTS["rod"]
     assert mg.Mechanism("m", pairs=[PIN], parts=[both]) == mg.Mechanism(

@@ -6,9 +6,11 @@ of the part, ``boom.tube``, ``boom.lift.Tz``. Points are global, in the configur
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import functools
+import inspect
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, ParamSpec
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,7 +23,20 @@ from mechgraph.maths.tolerances import SHAPES
 from mechgraph.model.couplings import BaseCoupling, Rack, SpurGears
 from mechgraph.model.loads import Effort, Load, Spring
 from mechgraph.model.pair import Link, Pair
-from mechgraph.quantities import Count, Index, door, is_numeric, items_of, shown, wrong
+from mechgraph.quantities import (
+    Count,
+    Index,
+    door,
+    has_quantity,
+    is_numeric,
+    is_quantity,
+    items_of,
+    real_array,
+    shown,
+    wrong,
+)
+
+P = ParamSpec("P")
 
 PLANE_NORMAL = (0.0, 0.0, 1.0)
 """Axis of all pairs of planar parts."""
@@ -145,6 +160,73 @@ class _Given:
             raise DeclarationError(self.where, self.faults)
 
 
+PURE = ("axis", "axis_a", "axis_b", "direction", "phase", "pressure_angle", "helix_angle", "teeth", "fixed")
+"""Arguments of parts that are no lengths, masses or forces."""
+
+
+def _part(make: Callable[P, Parts]) -> Callable[P, Parts]:
+    """A door that makes a part; of quantities of pint it is made in SI units, and its numbers are quantities then."""
+
+    @door
+    @functools.wraps(make)
+    def made(*args: P.args, **named: P.kwargs) -> Parts:
+        bound = inspect.signature(make).bind(*args, **named)
+        given = bound.arguments
+        known = {what: value for what, value in given.items() if has_quantity(value)}
+        if not known:
+            return make(*args, **named)
+        numbers = {what: _in_si(value) for what, value in known.items()}
+        faults = [
+            wrong(given[what], what, "a quantity with its unit, as others of the part are")
+            for what, value in given.items()
+            if what not in (*PURE, *known)
+            and real_array(value) is not None
+            and np.any(value)
+            and not isinstance(value, bool)
+        ]
+        faults += [
+            wrong(given[what], what, "quantities with their units")
+            for what, value in numbers.items()
+            if has_quantity(value)
+        ]
+        if faults:
+            raise DeclarationError(f"parts.{make.__name__} {shown(given['name'])}", faults)
+        given.update(numbers)
+        one = _a_quantity(next(iter(known.values())))
+        return _with_units(make(*bound.args, **bound.kwargs), one._REGISTRY)
+
+    return made
+
+
+def _in_si(value: Any) -> Any:
+    """Quantities as numbers in SI units, in sequences too."""
+    if is_quantity(value):
+        return value.to_base_units().magnitude
+    return tuple(map(_in_si, value)) if isinstance(value, list | tuple) else value
+
+
+def _a_quantity(value: Any) -> Any:
+    """A value, or the first quantity in it."""
+    return value if is_quantity(value) else next(_a_quantity(one) for one in value if has_quantity(one))
+
+
+def _with_units(parts: Parts, registry: Any) -> Parts:
+    """The same with quantities in SI units in place of numbers that have a unit."""
+
+    def changed(record: Any) -> Any:
+        held = {}
+        for name, about in record.formats.items():
+            value = getattr(record, name)
+            if about.kind.numeric and about.slide != (0, 0, 0) and np.size(value) and real_array(value) is not None:
+                unit = registry.Quantity(
+                    1.0, " * ".join(f"{u} ** {p}" for u, p in zip(("m", "kg", "s"), about.slide, strict=True))
+                )
+                held[name] = np.asarray(value) * unit
+        return record.replace(**held)
+
+    return Parts(*(tuple(map(changed, getattr(parts, f.name))) for f in fields(Parts)))
+
+
 def _bar(name: str, mass: float, p: Array, q: Array, radius: float | None = None) -> Link:
     """A uniform bar between two points: slender, or a solid cylinder of a radius."""
     if not mass > 0:
@@ -159,7 +241,7 @@ def _eye(name: str, a: str, b: str, point: Array, axis: Array | None) -> Pair:
     return Pair(name, "S", a, b, point=point) if axis is None else Pair(name, "R", a, b, point=point, axis=axis)
 
 
-@door
+@_part
 def cylinder(
     name: str,
     a: str,
@@ -244,7 +326,7 @@ def cylinder(
     )
 
 
-@door
+@_part
 def rod(
     name: str,
     a: str,
@@ -300,7 +382,7 @@ def rod(
     return Parts((_bar(link, weight, start, end),), pairs)
 
 
-@door
+@_part
 def spring_strut(
     name: str,
     a: str,
@@ -355,7 +437,7 @@ def spring_strut(
     return cylinder(name, a, p, b, q, axis=axis, mass=mass) + Parts(loads=(spring,))
 
 
-@door
+@_part
 def bearings(
     name: str,
     housing: str,
@@ -423,7 +505,7 @@ def bearings(
     return Parts((), (*held, turn))
 
 
-@door
+@_part
 def screw_drive(
     name: str,
     a: str,
@@ -493,7 +575,7 @@ def screw_drive(
     )
 
 
-@door
+@_part
 def cardan_shaft(
     name: str,
     a: str,
@@ -568,7 +650,7 @@ def cardan_shaft(
     )
 
 
-@door
+@_part
 def rack_and_pinion(
     name: str,
     base: str,
@@ -631,7 +713,7 @@ def rack_and_pinion(
     return Parts((), pairs, (mesh,))
 
 
-@door
+@_part
 def gear_stage(
     name: str,
     base: str,
@@ -693,7 +775,7 @@ def gear_stage(
     return Parts((), pairs, (mesh,))
 
 
-@door
+@_part
 def four_bar(
     name: str,
     base: str,
@@ -750,7 +832,7 @@ def four_bar(
     return Parts(bars, pairs)
 
 
-@door
+@_part
 def slider_crank(
     name: str,
     base: str,
