@@ -11,7 +11,7 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import MISSING, Field, dataclass, field, fields
 from functools import lru_cache, partial
 from types import MappingProxyType
 from typing import Any, ClassVar, Self, get_type_hints
@@ -278,7 +278,10 @@ class Formatted:
         found = {name: getattr(hint, "__metadata__", (None,))[0] for name, hint in hints.items()}
         cls.formats = {name: about for name, about in found.items() if isinstance(about, FieldFormat)}
         cls._numeric = tuple(name for name, about in cls.formats.items() if about.kind.numeric)
-        cls._defaults = tuple(getattr(cls, name, NEEDED) for name in cls.formats)
+        given = (getattr(cls, name, NEEDED) for name in cls.formats)
+        cls._defaults = tuple(
+            (NEEDED if one.default is MISSING else one.default) if isinstance(one, Field) else one for one in given
+        )
         if cls.__doc__ and cls.formats and "Parameters\n" not in cls.__doc__:
             told = [
                 line

@@ -120,7 +120,7 @@ class Pipeline:
     @cached_property
     def freedoms(self) -> Freedoms:
         """What can move at the start, what the drivers leave free, passive freedoms."""
-        key = "free", self.engine, self.columns.tobytes(), tuple(load.in_freedom for load in self.m.loads)
+        key = "free", self.engine, self.columns.tobytes(), tuple(load.freedoms for load in self.m.loads)
         return self._with_start(key, lambda: free_motion(self.system, self.x, self.columns, self.engine))
 
     # --- drivers ---------------------------------------------------------------------------------------------------------

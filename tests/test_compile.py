@@ -272,7 +272,7 @@ def test_what_is_copied_or_sent_has_a_state_of_its_own(other):
 def test_what_is_not_carried_is_named():
     with pytest.raises(mg.DeclarationError, match=r"pair 'C' .* travels along a curve"):
         mg.compile(mg.load("geneva"))
-    with pytest.raises(mg.DeclarationError, match="a load is a function"):
+    with pytest.raises(mg.DeclarationError, match="load force law in 'B' is a function"):
         mg.compile(mg.load("four-bar").replace(loads=[mg.ForceLaw("B", law=lambda x, v, t: -x)]))
     with pytest.raises(mg.DeclarationError, match="no drives"):
         mg.compile(mg.load("four-bar").replace(drives=[]))

@@ -327,3 +327,181 @@ def test_a_spring_at_no_place_is_named(spring, words):
         return
     with pytest.raises(mg.DeclarationError, match=words):
         mg.Mechanism("bar", pairs=pairs, loads=[spring])
+
+
+# --- a force in one freedom from another's coordinate -------------------------------------------------------------------------
+
+
+def wheel_and_block(*loads: object, drives: tuple[str, ...] = (), **more: object) -> mg.Mechanism:
+    """The wheel and the block, side by side on the frame: nothing but a law joins them."""
+    pairs, links = (*wheel().pairs, *block().pairs), (*wheel().links, block().link("block"))
+    return mg.Mechanism("both", links, pairs, drives, loads, **more)  # type: ignore[arg-type]
+
+
+GAS = mg.ForceTable(x=[0.0, 1.0, 2.0, 4.0], force=[900.0, 400.0, 150.0, 100.0])
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse", "auto"])
+def test_gas_force_over_the_angle_of_the_crank(engine: str) -> None:
+    """Slider-crank: the crank gives what the gas takes, ``M = -F dx/dA`` with x = r cos A + sqrt(l^2 - r^2 sin^2 A)."""
+    r, length = 0.05, 0.15
+    ends = {"A": ("frame", "crank", 0.0), "B": ("crank", "rod", r), "C": ("rod", "piston", r + length)}
+    pairs = [mg.Pair(k, "R", a, b, point=(x, 0, 0), axis=(0, 0, 1)) for k, (a, b, x) in ends.items()]
+    pairs.append(mg.Pair("P", "P", "frame", "piston", point=(r + length, 0, 0), axis=X))
+    m = mg.Mechanism("engine", pairs=pairs, drives=["A"], loads=[mg.ForceLaw("P", reads="A", law=GAS, scale=-1.0)])
+    A, w = np.linspace(0.1, 3.9, 7), 200.0
+    s = mg.solve(m, {"A": mg.Motion(A, w)}, engine=engine)  # type: ignore[arg-type]
+    slope = -r * np.sin(A) - r**2 * np.sin(A) * np.cos(A) / np.sqrt(length**2 - r**2 * np.sin(A) ** 2)
+    gas = -scipy.interpolate.PchipInterpolator(GAS.x, GAS.force)(A)
+    np.testing.assert_allclose(s["P"].applied_effort[:, 0], gas, rtol=1e-12)
+    np.testing.assert_allclose(s["A"].effort[:, 0], -gas * slope, rtol=1e-9)
+    load = s.load(0)
+    np.testing.assert_allclose(load.coordinate, A)
+    np.testing.assert_allclose(load.rate, w)
+    np.testing.assert_allclose(load.power, gas * slope * w, rtol=1e-9)
+    assert np.abs(s.checks.power).max() < 1e-10
+
+
+def test_a_law_between_points_may_read_a_freedom_too() -> None:
+    law = mg.ForceLaw(("frame", "block", (-1, 0, 0), (0, 0, 0)), reads="A", law=lambda x, v, t: 5.0 * x + v)
+    s = mg.solve(wheel_and_block(law, drives=("A", "P")), {"A": mg.Motion([0.2, 0.4], 3.0), "P": 0.1})
+    np.testing.assert_allclose(s["P"].effort[:, 0], [-4.0, -5.0])
+    np.testing.assert_allclose(s["A"].effort[:, 0], 0.0, atol=1e-14)
+    with pytest.raises(mg.DeclarationError, match=r"acts between points and reads the freedom 'A'"):
+        mg.compile(wheel_and_block(law.replace(law=GAS), drives=("A", "P")))
+
+
+def test_reading_is_a_term_off_the_diagonal_of_the_stiffness() -> None:
+    """Force -8 A - 2 A' on the block: rows of K and C of the block have entries in the column of the wheel, not the other way round."""
+    loads = (
+        mg.ForceLaw("P", reads="A", law=lambda x, v, t: -8.0 * x - 2.0 * v),
+        mg.Spring("A", stiffness=5.0),
+        mg.Spring("P", stiffness=7.0),
+    )
+    small = mg.linearize(wheel_and_block(*loads))
+    order = [small.freedoms.index(name) for name in ("A.Rz", "P.Tz")]
+    np.testing.assert_allclose(small.K[np.ix_(order, order)], [[5, 0], [8, 7]], atol=1e-6)
+    np.testing.assert_allclose(small.C[np.ix_(order, order)], [[0, 0], [2, 0]], atol=1e-6)
+    found = mg.equilibrium(wheel_and_block(*loads, mg.Effort("A", 1.0)), kind="nearest")
+    assert found.start["P.Tz"] == pytest.approx(-8.0 * 0.2 / 7.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("law", [mg.ForceTable(x=[-1, 9], force=[-6, 54]), lambda x, v, t: 6.0 * x], ids=["table", "f"])
+def test_motion_under_a_force_that_reads(law: object) -> None:
+    """The wheel turns at 3 rad/s, the force is 6 A: x = 6 w t^3 / (6 m); its work becomes kinetic energy."""
+    t = np.linspace(0.0, 1.5, 7)
+    m = wheel_and_block(mg.ForceLaw("P", reads="A", law=law))
+    r = mg.respond(m, t, rates={"A": 3.0})
+    np.testing.assert_allclose(r["P"].position[:, 0], 6.0 * 3.0 * t**3 / 12.0, atol=1e-8)
+    np.testing.assert_allclose(r.energy.work, r.energy.kinetic - r.energy.kinetic[0], atol=1e-6)
+    assert np.abs(r.energy.potential).max() == 0.0
+    one = m.replace(drives=["A"])
+    driven = mg.respond(one, t, motions={"A": lambda t: (3.0 * t, 3.0, 0.0)})
+    np.testing.assert_allclose(driven["P"].position[:, 0], r["P"].position[:, 0], atol=1e-7)
+
+
+def test_a_read_table_in_the_kernel() -> None:
+    pytest.importorskip("mechgraph.kernel.build").built()
+    m = mg.load("four-bar").replace(loads=[mg.ForceLaw("D", reads="A", law=GAS, free=-0.2)])
+    motion = {"A": mg.Motion(np.linspace(0.0, 3.0, 5), 4.0)}
+    s, k = mg.solve(m, motion, engine="dense"), mg.solve(m, motion, engine="compiled")
+    np.testing.assert_allclose(k["A"].effort, s["A"].effort, rtol=1e-11)
+    c = mg.compile(m)
+    c.start()
+    np.testing.assert_allclose(
+        [c(q, velocity=4.0)[0] for q in np.linspace(0.0, 3.0, 5)], s["A"].effort[:, 0], rtol=1e-9
+    )
+
+
+def test_units_files_and_names_of_what_is_read(tmp_path) -> None:
+    law = mg.ForceLaw("P", reads="A", law=mg.ForceTable(x=[-1, 1], v=[-5, 5], force=[[3, 2], [1, 4]]), free=0.1)
+    m = wheel_and_block(law, drives=("A", "P"), units=SI)
+    assert m.loads[0].reads == "A"
+    mm = m.to_units(length="mm", time="ms").loads[0]
+    assert mm.law.x == (-1.0, 1.0)  # type: ignore[union-attr]
+    np.testing.assert_allclose(mm.law.v, [-0.005, 0.005])  # type: ignore[union-attr]
+    np.testing.assert_allclose(mm.law.force, np.array(law.law.force) * 1e-3)  # type: ignore[union-attr]
+    assert mm.free == 0.1  # type: ignore[union-attr]
+    mg.save(m, tmp_path / "m.toml")
+    assert mg.load(tmp_path / "m.toml") == m
+    slides = wheel_and_block(
+        mg.ForceLaw("A", reads="P", law=mg.ForceTable(x=[-1, 1], force=[3, 2]), free=0.1), units=SI
+    )
+    own = slides.to_units(length="mm").loads[0]
+    assert (own.law.x, own.law.force, own.free) == ((-1000.0, 1000.0), (3e6, 2e6), 100.0)  # type: ignore[union-attr]
+    s = mg.solve(m, {"A": mg.Motion(0.3, 1.0), "P": 0.0})
+    frame = s.to_pandas(include=["loads"])
+    assert "loads[0] force_law x" in str(list(frame.columns))
+    for wrong in ("Q", "S.Rx"):
+        with pytest.raises(mg.DeclarationError, match=f"unknown freedom '{wrong}'"):
+            block(mg.ForceLaw("P", reads=wrong, law=len))
+
+
+def test_quantities_of_what_is_read() -> None:
+    U = pytest.importorskip("pint").UnitRegistry()
+    table = mg.ForceTable(x=[0, 180] * U.degree, force=[0, 2] * U.kN)
+    m = wheel_and_block(mg.ForceLaw("P", reads="A", law=table, free=90 * U.degree), units=SI)
+    (law,) = m.loads
+    np.testing.assert_allclose((*law.law.x, *law.law.force, law.free), (0, np.pi, 0, 2000, np.pi / 2))  # type: ignore[union-attr]
+
+
+# --- springs along a fixed direction ------------------------------------------------------------------------------------------
+
+
+def test_a_spring_along_a_direction_of_the_frame() -> None:
+    """A block on a slide at 45 degrees; the spring knows its way to the right alone, l = x / sqrt 2, negative too."""
+    slide = mg.Pair("P", "P", "frame", "block", point=(0, 0, 0), axis=(1, 1, 0))
+    spring = mg.Spring(
+        "frame", "block", (0, 5, 0), (0, 0, 0), stiffness=100.0, free_length=-0.1, damping=3.0, along=(2, 0, 0)
+    )
+    m = mg.Mechanism("block", [mg.Link("frame"), mg.Link("block", 2.0, (0, 0, 0))], [slide], ["P"], [spring])
+    x, v = np.array([-0.4, 0.0, 0.3]), 2.0
+    s = mg.solve(m, {"P": mg.Motion(x, v)})
+    tension = 100.0 * (x / np.sqrt(2) + 0.1) + 3.0 * v / np.sqrt(2)
+    np.testing.assert_allclose(s["P"].effort[:, 0], tension / np.sqrt(2))
+    np.testing.assert_allclose(s.load(0).coordinate, x / np.sqrt(2), atol=1e-15)
+    np.testing.assert_allclose(s.load(0).power, -tension * v / np.sqrt(2))
+    free = m.replace(drives=[], loads=[spring.replace(damping=0.0)])
+    t = np.linspace(0.0, 1.0, 9)
+    r = mg.respond(free, t, start={"P": 0.5})
+    rest, w = -0.1 * np.sqrt(2), np.sqrt(100.0 / 2 / 2)
+    np.testing.assert_allclose(r["P"].position[:, 0], rest + (0.5 - rest) * np.cos(w * t), atol=1e-7)
+    assert np.abs(r.energy.balance).max() < 1e-6
+
+
+def test_a_spring_in_a_guide_on_a_moving_link() -> None:
+    """Its direction turns with link a: both forces on one line, power and energy agree, for any motion of both links."""
+    spring = mg.Spring("coupler", "rocker", (0.1, 0.05, 0.0), (0.4, 0.1, 0.0), 50.0, 0.1, along=(1.0, 2.0, 0.0))
+    m = mg.load("four-bar").replace(loads=[spring])
+    step = 1e-5
+    A = np.array([0.4, 0.4 + step, 0.4 - step])
+    s = mg.solve(m, {"A": mg.Motion(A, 1.0)})
+    load = s.load(0)
+    np.testing.assert_allclose(load.wrenches["coupler"] + load.wrenches["rocker"], 0.0, atol=1e-12)
+    energy = 25.0 * (load.coordinate - 0.1) ** 2
+    assert load.power[0] == pytest.approx(-(energy[1] - energy[2]) / (2 * step), rel=1e-7)
+    assert load.rate[0] == pytest.approx((load.coordinate[1] - load.coordinate[2]) / (2 * step), rel=1e-7)
+    assert np.abs(s.checks.power).max() < 1e-12
+    turned = np.array([[0.0, -1.0, 0.0, 3.0], [1.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+    np.testing.assert_allclose(
+        mg.solve(m.moved(turned), {"A": mg.Motion(A, 1.0)})["A"].effort, s["A"].effort, rtol=1e-9
+    )
+    law = mg.ForceLaw(
+        ("coupler", "rocker", spring.p, spring.q), law=lambda x, v, t: -50.0 * (x - 0.1), along=spring.along
+    )
+    np.testing.assert_allclose(mg.solve(m.replace(loads=[law]), {"A": mg.Motion(A, 1.0)})["A"].effort, s["A"].effort)
+
+
+def test_directions_in_files_studies_and_errors(tmp_path) -> None:
+    spring = mg.Spring("frame", "block", (0, 0, 0), (0, 0, 0), stiffness=100.0, along=X)
+    m = block(spring, units=SI)
+    mg.save(m, tmp_path / "m.toml")
+    assert mg.load(tmp_path / "m.toml") == m
+    found = mg.study(m, {"loads[0].along.y": [0.0, 1.0]}, "P.effort", sampling="grid", motions={"P": 0.2})
+    np.testing.assert_allclose(found.outputs["P.effort"].ravel(), [20.0, 10.0])
+    with pytest.raises(mg.DeclarationError, match="acts along a fixed direction"):
+        mg.compile(m)
+    with pytest.raises(mg.DeclarationError, match=r"along = .*: beside the freedom 'P'"):
+        block(mg.Spring("P", stiffness=1.0, along=X))
+    with pytest.raises(mg.DeclarationError, match=r"along = .*length 0"):
+        block(spring.replace(along=(0, 0, 0)))

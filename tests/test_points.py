@@ -126,6 +126,11 @@ def test_coordinates_of_named_points_are_parameters_and_motions_outputs() -> Non
     np.testing.assert_allclose(study.outputs["A.effort"].ravel(), [14.0, 21.0, 35.0])
     np.testing.assert_allclose(study.outputs["arm.hook"][:, 0], [(2, 4, 0), (3, 4, 0), (5, 4, 0)])
     np.testing.assert_allclose(study.outputs["arm.hook.velocity"][:, 0], [(-8, 4, 0), (-8, 6, 0), (-8, 10, 0)])
+    parts = mg.study(
+        m, {"arm.mass": [1.0]}, ["arm.hook.y", "arm.hook.velocity.x"], n=1, motions=motions, sampling="grid"
+    )
+    np.testing.assert_allclose(parts.outputs["arm.hook.y"], [[4.0]])
+    np.testing.assert_allclose(parts.outputs["arm.hook.velocity.x"], study.outputs["arm.hook.velocity"][1:2, :, 0])
     with pytest.raises(mg.DeclarationError, match=r"'arm\.hok\.x'.*did you mean arm\.hook\.x"):
         mg.study(m, {"arm.hok.x": [2.0]}, outputs, n=1, motions=motions)
 

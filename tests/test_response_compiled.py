@@ -106,7 +106,7 @@ def test_it_is_the_motion_of_the_dense_engine(name):
 def test_what_the_kernel_does_not_carry():
     m = five_bar().replace(loads=[mg.Effort("J0", lambda pose, twist, t: 1.0 + 0.0 * t)])
     with pytest.raises(
-        mg.DeclarationError, match=r"engine 'compiled' does not serve: load .*J0.* is a function, or a table over"
+        mg.DeclarationError, match=r"engine 'compiled' does not serve: load .*J0.* is a function, or varies over"
     ):
         mg.respond(m, (0.0, 0.01), engine="compiled")
     assert mg.respond(m, (0.0, 0.01)).engine == "dense"

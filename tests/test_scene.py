@@ -128,6 +128,16 @@ def test_springs_reach_from_end_to_end_and_forces_end_where_they_act() -> None:
         assert len(parts(found, "spring")) == 4
 
 
+def test_a_spring_along_a_direction_is_drawn_along_it() -> None:
+    """From the foot of its first point on the line through the second: two units to the right, whatever the height."""
+    slide = mg.Pair("P", "P", "frame", "block", point=(0, 0, 0), axis=(1, 1, 0))
+    spring = mg.Spring("frame", "block", (-2, 5, 0), (0, 0, 0), 9.0, along=(3, 0, 0))
+    m = mg.Mechanism("block", [mg.Link("frame"), mg.Link("block", 2.0, (0, 0, 0))], [slide], ["P"], [spring])
+    X = scene(mg.kinematics(m, {"P": [0.0, np.sqrt(2)]})).frames["load:0"]
+    np.testing.assert_allclose(X[:, :, 3], [[-2, 0, 0], [-2, 1, 0]], atol=1e-12)
+    np.testing.assert_allclose(X[:, :, 2], [[2, 0, 0], [3, 0, 0]], atol=1e-12)
+
+
 def test_reactions_of_a_plane_mechanism_are_drawn_in_its_plane_and_others_only_where_unique() -> None:
     """Along the axes of a four-bar nothing is unique, in its plane all is; a spherical one has no force that is known."""
     s = mg.solve(mg.load("four-bar"))

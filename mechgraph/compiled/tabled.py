@@ -17,7 +17,16 @@ from mechgraph.determinacy.snapping import meant
 from mechgraph.errors import DeclarationError, FileError, listed, visible
 from mechgraph.files import writable, write_whole
 from mechgraph.kernel.compiler import INCLUDED
-from mechgraph.kernel.tables import EFFORT, HEAD_LOAD_NUMBERS, HEAD_LOADS, Integers, Layout, layout, tables
+from mechgraph.kernel.tables import (
+    EFFORT,
+    HEAD_LOAD_NUMBERS,
+    HEAD_LOADS,
+    Integers,
+    Layout,
+    layout,
+    tables,
+    why_not_load,
+)
 from mechgraph.kinematics.assembly import closed_start
 from mechgraph.kinematics.prescribed import DriverMotion
 from mechgraph.kinematics.system import System
@@ -219,11 +228,7 @@ def tabled(m: Mechanism, asked: str = "compile") -> Tabled:
     places = layout(system, line.columns, line.passive)
     found = tables(places, system, x[:, None], own.loads)
     if found is None:
-        known = listed(sorted({load.kind for load in own.loads}))
-        fault = (
-            f"a load is a function, a table over coordinate and rate, or varies over positions (loads: {known}); "
-            "expected constant numbers"
-        )
+        fault = "; ".join(filter(None, map(why_not_load, own.loads)))
         raise DeclarationError(subject, [f"the compiled kernel does not carry it: {fault}"])
     I, P = found
     return Tabled(own, system, x, places, I, P[0], drives, home)

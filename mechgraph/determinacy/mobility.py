@@ -208,9 +208,9 @@ class _Search:
         return cut_off(graph.n_links, ends, graph.frame, ())
 
     def loaded(self) -> Index:
-        """The columns of the freedoms in which loads act."""
+        """The columns of the freedoms in which loads act, and that they read."""
         position, out = self.position, []
-        for k, j in (position.m.freedom(load.in_freedom) for load in position.m.loads if load.in_freedom is not None):
+        for k, j in (position.m.freedom(name) for load in position.m.loads for name in load.freedoms):
             name, names = position.m.pairs[k].type.freedoms[j].name, [f.name for f in position.type_of(k).freedoms]
             out += [position.columns(k)[names.index(name)]] if name in names else []
         return np.array(out, dtype=np.intp)

@@ -149,7 +149,7 @@ def changes_of(freedoms: Freedoms) -> list[Change]:
     states = stresses_of(freedoms)
     stress = np.moveaxis(pair_states(here, states)[..., 0], 1, 0)
     tied = [d.freedom for d in system.m.drives] + [name for c in system.m.couplings for name, _ in c.terms]
-    tied += [load.in_freedom for load in system.m.loads if load.in_freedom is not None and load.takes_coordinate]
+    tied += [name for load in system.m.loads if load.takes_coordinate for name in load.freedoms]
     geared = {step.pair for c in system.m.couplings for step in c.steps}
     needed: dict[int, set[str]] = {}
     for k, j in map(system.m.freedom, tied):

@@ -926,7 +926,7 @@ static void loads(const Model *m, Work *w, const double *x) {
     } else if (load[0] == MGK_LAW) {
       w->given[i] += -number[0] * (x[m->column_state[i]] - number[1]) - number[2] * w->dq[i];
     } else if (load[0] == MGK_TABLE) {
-      w->given[i] += tabulated(number, x[m->column_state[i]], w->dq[i]);
+      w->given[i] += tabulated(number, x[m->column_state[j]], w->dq[j]);
     } else {
       between_points(w, i, j, number, load[0] == MGK_TABLE_BETWEEN);
     }

@@ -22,7 +22,18 @@ from mechgraph.kinematics.system import CouplingRows, System
 from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Array, Index, compose, identity, inverse, rotate
 from mechgraph.memo import carried
-from mechgraph.model.loads import Damper, Effort, ForceLaw, ForceTable, Gravity, Load, Spring, TorsionSpring, Wrench
+from mechgraph.model.loads import (
+    Damper,
+    Effort,
+    ForceLaw,
+    ForceTable,
+    Gravity,
+    Law,
+    Load,
+    Spring,
+    TorsionSpring,
+    Wrench,
+)
 from mechgraph.pairs.factors import ConstantScrew, Factor, Freedom, Rotation
 
 Integers = NDArray[np.int32]
@@ -453,11 +464,24 @@ def acting(system: System, own: Array, loads: Sequence[Load]) -> Acting | None:
 
 
 def in_tables(load: Load) -> bool:
-    """Whether a load is numbers of the tables: its fields are no functions, and no arrays over positions."""
+    """Whether a load is numbers of the tables."""
+    return why_not_load(load) is None
+
+
+def why_not_load(load: Load) -> str | None:
+    """What of a load the kernel cannot carry; None where it is numbers of the tables."""
     values = [getattr(load, name) for name in load.formats]
     given = [name for name in load.over_positions if not isinstance(getattr(load, name), PerCase)]
-    by_pieces = not isinstance(load, ForceLaw) or (isinstance(load.law, ForceTable) and load.law.pieces is not None)
-    return type(load) in KINDS and not given and by_pieces and not any(callable(value) for value in values)
+    where = f"load {load.where.removesuffix(': ')}"
+    if type(load) not in KINDS or given or any(callable(value) for value in values):
+        return f"{where} is a function, or varies over positions"
+    if isinstance(load, ForceLaw) and (not isinstance(load.law, ForceTable) or load.law.pieces is None):
+        return f"{where} is a function, or a table over coordinate and rate"
+    if isinstance(load, Law) and load.in_freedom is None and load.freedoms:
+        return f"{where} acts between points and reads the freedom {load.reads_freedom!r}"
+    if isinstance(load, Law) and load.in_freedom is None and load.along is not None:
+        return f"{where} acts along a fixed direction"
+    return None
 
 
 def rows(value: Any, width: int = 1) -> Array:
@@ -507,16 +531,17 @@ def _damper(places: _Places, load: Any, out: Acting) -> None:
 
 
 def _tabled(places: _Places, load: Any, out: Acting) -> None:
-    """The cubics of a table over the coordinate or the rate, in internal units."""
-    pieces, slides, column = load.law.pieces, True, -1
+    """The cubics of a table over the coordinate or the rate, of the freedom that it reads, in internal units."""
+    pieces, slides, reads_slide, column, read = load.law.pieces, True, True, -1, -1
     if load.in_freedom is not None:
         column, slides = places.column(load.in_freedom)
-    length, unit = (places.L, 1.0 / places.L) if slides else (1.0, places.L**-2)
+        read, reads_slide = places.column(load.reads_freedom)
+    length, unit = places.L if reads_slide else 1.0, 1.0 / places.L if slides else places.L**-2
     cubics = (unit * pieces.c * length ** np.arange(3.0, -1.0, -1.0)[:, None]).T.reshape(-1, 1)
     kind = load.law.x is None, load.law.outside == "hold", len(pieces.x) - 1
     numbers = rows(load.free) / length, *map(rows, kind), (pieces.x / length)[:, None], cubics * rows(load.scale)
     if load.in_freedom is not None:
-        out.add(TABLE, column, 0, *numbers)
+        out.add(TABLE, column, read, *numbers)
         return
     p, q = places.point(load.a, load.p), places.point(load.b, load.q)
     out.add(TABLE_BETWEEN, places.link(load.a), places.link(load.b), p, q, *numbers)

@@ -8,7 +8,7 @@ laws of force: the force acts along the coordinate ``x``, so that its power is `
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Protocol, Self
@@ -19,6 +19,7 @@ import scipy
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import (
     BREAKS,
+    DIRECTION,
     FREEDOM_NAME,
     LINK_NAME,
     NAMED_POINT,
@@ -190,8 +191,22 @@ class Load(Described, ABC):
     @property
     def in_freedom(self) -> str | None:
         """The freedom in which this load acts; None of a load on links."""
-        named = [getattr(self, name) for name, about in self.formats.items() if about.kind is FREEDOM_NAME]
-        return named[0] if named else None
+        acting: str | None = getattr(self, "freedom", None)
+        return acting
+
+    @property
+    def freedoms(self) -> tuple[str, ...]:
+        """The freedoms that it names: in which it acts, and whose coordinate and rate it reads."""
+        named = (getattr(self, name) for name, about in self.formats.items() if about.kind is FREEDOM_NAME)
+        return tuple(name for name in named if name is not None)
+
+    def in_own_units(self, units: Mapping[str, str], turns: Callable[[Any], bool]) -> Self:
+        """The same with quantities of pint as plain numbers in these units; ``turns`` says which freedoms are angles."""
+        return self.without_quantities(units, turns(self.in_freedom))
+
+    def converted(self, base: tuple[float, float, float], turns: Callable[[Any], bool]) -> Self:
+        """The same in other units: every number times a factor; ``turns`` says which freedoms are angles."""
+        return self.in_units(base, turns(self.in_freedom))
 
     @property
     def takes_coordinate(self) -> bool:
@@ -335,11 +350,17 @@ class Law(Load):
         b: Any
         p: Any
         q: Any
+        along: Any
 
     @property
     def between_links(self) -> bool:
         """Whether it is a force that two links exert on each other."""
         return self.in_freedom is None
+
+    @property
+    def reads_freedom(self) -> str | None:
+        """The freedom whose coordinate and rate it reads: its own, or another; None between points."""
+        return self.freedoms[-1] if self.freedoms else None
 
     @abstractmethod
     def force(self, site: LoadSite, x: Array, v: Array) -> Array:
@@ -348,25 +369,35 @@ class Law(Load):
     def act(self, site: LoadSite) -> None:
         """Add the effort, or the forces on both links."""
         if self.in_freedom is not None:
-            site.add_effort(self.in_freedom, self.force(site, *site.freedom(self.in_freedom)))
+            site.add_effort(self.in_freedom, self.force(site, *self.coordinate(site)))
             return
-        p, q, length, u, rate = self._line(site)
-        force = self.force(site, length, rate)
+        p, q, _, u, _ = self._line(site)
+        force = self.force(site, *self.coordinate(site))
         # between points that meet, a force has no direction
-        push = np.where((length > 0) | (force == 0), force * u, np.nan)
+        push = np.where(u.any(axis=0) | (force == 0), force * u, np.nan)
         site.add_force(self.a, -push, p)
         site.add_force(self.b, push, q)
 
     def _line(self, site: LoadSite) -> tuple[Array, ...]:
-        """Both points ``(3, T)``, their distance ``(T,)``, the direction from p to q, and the rate of the distance."""
+        """Where it acts on links a and b ``(3, T)``, the distance ``(T,)``, the direction of its growth, and its rate.
+
+        With a direction ``e`` fixed in link a, ``x = e . (q - p)`` grows with ``e . (q - p)' + (w_a x e) . (q - p)``, so that by power the
+        force on link a acts at q too.
+        """
         (p, vp), (q, vq) = site.point(self.a, site.number(self.p)), site.point(self.b, site.number(self.q))
         d = q - p
+        if self.along is not None:
+            along = np.asarray(site.number(self.along), dtype=float).reshape(3, -1)
+            along = along / np.sqrt((along * along).sum(axis=0))
+            u = rotate(site.rotation(self.a), along)
+            turning = site.point(self.a, along)[1] - site.point(self.a, np.zeros(3))[1]
+            return q, q, (u * d).sum(axis=0), u, (u * (vq - vp) + turning * d).sum(axis=0)
         length = np.sqrt((d * d).sum(axis=0))
         u = np.divide(d, length, out=np.zeros_like(d), where=length > 0)
         return p, q, length, u, (u * (vq - vp)).sum(axis=0)
 
     def coordinate(self, site: LoadSite) -> tuple[Array, Array]:
-        """The coordinate or distance ``(T,)`` and its rate."""
+        """The coordinate or distance ``(T,)`` that it reads, and its rate."""
         if self.in_freedom is not None:
             return site.freedom(self.in_freedom)
         _, _, length, _, rate = self._line(site)
@@ -413,7 +444,18 @@ class _ByPlace(Law):
             return [f"{self.where}{', '.join(name for name in 'abpq' if name not in given)} left out; {expected}"]
         if self.freedom is not None and given:
             return [f"{self.where}beside it {', '.join(f'{n} = {shown(getattr(self, n))}' for n in given)}; {expected}"]
-        return [self.where + expected] if isinstance(self.freedom, tuple | list) else super().faults(names)
+        if isinstance(self.freedom, tuple | list):
+            return [self.where + expected]
+        if self.freedom is not None and self.along is not None:
+            return [
+                f"{self.where}along = {shown(self.along)}: beside the freedom {shown(self.freedom)}, which has its own; leave it out"
+            ]
+        return super().faults(names)
+
+
+_Along = Annotated[
+    Any, DIRECTION("fixed direction in the frame of link a: `x` is the part of `q - p` along it", default="from p to q")
+]
 
 
 class Elastic(Law):
@@ -444,7 +486,8 @@ class Spring(_ByPlace, Elastic):
 
     The tension along the line from point ``p`` of link ``a`` to point ``q`` of link ``b`` is
     ``stiffness (l - free_length) + damping dl/dt``; in a freedom the effort is ``-stiffness (q - free_length) - damping dq/dt``.
-    Points as in ``Wrench``.
+    Points as in ``Wrench``. With ``along``, a direction e that is fixed in link a, l is ``e . (q - p)``, which may be negative, and both
+    forces act along e at the point q, as those of a spring in a guide on link a.
 
     Examples
     --------
@@ -471,6 +514,7 @@ class Spring(_ByPlace, Elastic):
     freedom: Annotated[
         str | None, FREEDOM_NAME("a single freedom: rotation or translation", default="between points")
     ] = None
+    along: _Along = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         if self.freedom is None:
@@ -482,7 +526,7 @@ class Spring(_ByPlace, Elastic):
         found = super().faults(names)
         if self.stiffness is None:
             found.append(self.where + wrong(None, "stiffness", "a finite number"))
-        if self.freedom is None and is_numeric(self.free_length, ()) and self.free_length < 0:
+        if self.freedom is None and self.along is None and is_numeric(self.free_length, ()) and self.free_length < 0:
             found.append(self.where + wrong(self.free_length, "free_length", "a number of 0 or more"))
         return found
 
@@ -523,6 +567,7 @@ class _Placed(_ByPlace):
     b: Annotated[str | None, LINK_NAME("second link", default="in a freedom")] = None
     p: Annotated[Any, NAMED_POINT("point of link a, or its name", LENGTH, of="a", default="in a freedom")] = None
     q: Annotated[Any, NAMED_POINT("point of link b, or its name", LENGTH, of="b", default="in a freedom")] = None
+    along: _Along = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         if self.freedom is not None and self.q is None:
@@ -558,7 +603,9 @@ class ForceLaw(_Placed):
     """Declare a force ``F = scale law(x - free, x', t)`` in a freedom or between points ``(link a, link b, p, q)``.
 
     ``law`` is a ``ForceTable`` or a function of arrays ``(T,)``: coordinate, rate and time (None if the motion has no times). ``F``
-    acts along the coordinate and its power is ``F x'``: + on link b and - on link a in a freedom; + pushes the points apart.
+    acts along the coordinate and its power is ``F x'``: + on link b and - on link a in a freedom; + pushes the points apart. With
+    ``reads`` the law reads ``x`` and ``x'`` of that freedom, but acts where it is declared, as gas forces that are known over the
+    angle of the crank do; it then has no potential energy, and its stiffness is not symmetric.
 
     Examples
     --------
@@ -566,6 +613,9 @@ class ForceLaw(_Placed):
     >>> stop = mg.ForceLaw("A", law=lambda x, v, t: -300.0 * x**3)
     >>> mg.solve(mg.load("four-bar"), {"A": 0.5}, loads=[stop])["A"].applied_effort
     array([-37.5])
+    >>> gas = mg.ForceLaw("D", reads="A", law=mg.ForceTable(x=[0, 1], force=[-3, -1]))
+    >>> mg.solve(mg.load("four-bar"), {"A": 0.5}, loads=[gas])["D"].applied_effort
+    array([-2.])
     """
 
     kind: ClassVar[str] = "force_law"
@@ -575,6 +625,9 @@ class ForceLaw(_Placed):
         default=0.0, kw_only=True
     )
     scale: Annotated[float, NUMBER("factor of the force")] = field(default=1.0, kw_only=True)
+    reads: Annotated[
+        str | None, FREEDOM_NAME("the freedom whose coordinate and rate the law reads", default="where it acts")
+    ] = field(default=None, kw_only=True)
     breaks: Breaks = field(default=(), kw_only=True)
 
     def faults(self, names: Nameable) -> list[str]:
@@ -601,6 +654,29 @@ class ForceLaw(_Placed):
         """See ``Load``; a table is not where its points are."""
         return False
 
+    def in_own_units(self, units: Mapping[str, str], turns: Callable[[Any], bool]) -> Self:
+        """See ``Load``."""
+        return self._both(lambda name: self.without_quantities(units, turns(name)))
+
+    def converted(self, base: tuple[float, float, float], turns: Callable[[Any], bool]) -> Self:
+        """See ``Load``."""
+        return self._both(lambda name: self.in_units(base, turns(name)))
+
+    def _both(self, changed: Callable[[str | None], Self]) -> Self:
+        """The same changed as the freedom in which it acts asks, its coordinates and rates as the one that it reads does."""
+        out = changed(self.in_freedom)
+        if self.reads is None:
+            return out
+        read = changed(self.reads)
+        law = out.law
+        if isinstance(law, ForceTable):
+            law = law.replace(x=read.law.x, v=read.law.v)
+        return out.replace(law=law, free=read.free)
+
+    def coordinate(self, site: LoadSite) -> tuple[Array, Array]:
+        """See ``Law``."""
+        return super().coordinate(site) if self.reads is None else site.freedom(self.reads)
+
     def force(self, site: LoadSite, x: Array, v: Array) -> Array:
         """See ``Law``."""
         x = x - site.number(self.free)
@@ -623,7 +699,8 @@ class ForceLaw(_Placed):
 
     def parts(self) -> tuple[Self | None, Self | None]:
         """The whole, as stored where it is a table of the coordinate alone."""
-        return (self, None) if isinstance(self.law, ForceTable) and self.law.has_energy else (None, self)
+        stored = isinstance(self.law, ForceTable) and self.law.has_energy and self.reads is None
+        return (self, None) if stored else (None, self)
 
     def energy(self, site: LoadSite) -> Any:
         """``-scale int F dx``."""

@@ -305,11 +305,7 @@ class Mechanism(Parts, Shown):
                 for item in self.drives
                 if isinstance(item, Drive)
             ],
-            "loads": [
-                item.without_quantities(self.units, self.turns(item.in_freedom))
-                for item in self.loads
-                if isinstance(item, Load)
-            ],
+            "loads": [item.in_own_units(self.units, self.turns) for item in self.loads if isinstance(item, Load)],
             "couplings": [
                 item.in_own_units(self.units, [self.turns(name) for name in item.freedoms])
                 for item in self.couplings
@@ -382,7 +378,7 @@ class Mechanism(Parts, Shown):
     def bound_freedoms(self) -> set[str]:
         """Full names of the freedoms that drives, loads, couplings and the response name."""
         named = {d.freedom for d in self.drives} | {name for c in self.couplings for name in c.freedoms}
-        named |= {load.in_freedom for load in self.loads if load.in_freedom is not None}
+        named |= {name for load in self.loads for name in load.freedoms}
         return {self.full_name(name) for name in named | (self.response.freedoms if self.response else set())}
 
     # --- changed copies ----------------------------------------------------------------------------------------------
@@ -592,7 +588,7 @@ class Mechanism(Parts, Shown):
             pairs=[pair.in_units(base) for pair in self.pairs],
             couplings=[c.converted(base[0], [turns(name) for name in c.freedoms]) for c in self.couplings],
             drives=[drive.in_units(base, turns(drive.freedom)) for drive in self.drives],
-            loads=[load.in_units(base, turns(load.in_freedom)) for load in self.loads],
+            loads=[load.converted(base, turns) for load in self.loads],
             start={name: value if turns(name) else value * base[0] for name, value in self.start.items()},
             response=None if self.response is None else self.response.converted(base, turns),
             units={**self.units, **units},

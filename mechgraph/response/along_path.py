@@ -73,7 +73,7 @@ class AlongTerms:
         self.smooth = Loads(*(tuple(load for load in some if load.smooth) for some in parts))
         self.stored, self.rest = (tuple(load for load in some if not load.smooth) for some in parts)
         others = (*self.stored, *self.rest)
-        named = dict.fromkeys(load.in_freedom for load in others if load.in_freedom is not None)
+        named = dict.fromkeys(name for load in others for name in load.freedoms)
         self.columns = {name: i for i, name in enumerate(named)}
         links = dict.fromkeys(
             link for load in others if load.in_freedom is None or not load.by_position for link in load.links(m)

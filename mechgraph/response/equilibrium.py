@@ -453,7 +453,7 @@ class Linearized(Shown):
     def _told(self, shape: Mapping[str, complex]) -> list[str]:
         """The freedoms that tell a mode: those of which the declaration says something, then the largest; no two that move alike."""
         m, names = self.mechanism, self.mechanism.freedom_names()
-        said = {*m.start, *(d.freedom for d in m.drives), *(one.in_freedom for one in m.loads if one.in_freedom)}
+        said = {*m.start, *(d.freedom for d in m.drives), *(name for one in m.loads for name in one.freedoms)}
         said |= m.response.freedoms if m.response else set()
         said = {m.full_name(name) for name in said}
         largest = max(map(abs, shape.values()))

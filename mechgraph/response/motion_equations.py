@@ -49,7 +49,7 @@ import scipy
 from mechgraph import by_kernel
 from mechgraph.force.loads import Site, inertia_wrenches
 from mechgraph.kernel import build
-from mechgraph.kernel.tables import Integers, in_tables, layout, pointer, tables, why_not
+from mechgraph.kernel.tables import Integers, layout, pointer, tables, why_not, why_not_load
 from mechgraph.kinematics.layout import Tree
 from mechgraph.kinematics.motion_path import BLOCK
 from mechgraph.kinematics.rates import PassiveMotion, PassiveMotions, Rates, Velocities
@@ -511,10 +511,7 @@ def cannot(system: System, loads: Loads, held: bool) -> str | None:
         return "passive freedoms are held at rest"
     if system.n_freedoms * len(system.m.links) >= SPARSE_FROM:
         return f"it has {system.n_freedoms} freedoms and {len(system.m.links)} links; expected fewer than {SPARSE_FROM} of the product"
-    other = next((load for load in (*loads.stored, *loads.rest) if not in_tables(load)), None)
-    if other is not None:
-        return f"load {other.where.removesuffix(': ')} is a function, or a table over coordinate and rate"
-    return why_not(system)
+    return next(filter(None, map(why_not_load, (*loads.stored, *loads.rest))), None) or why_not(system)
 
 
 def library_for(system: System, loads: Loads, held: bool, engine: str) -> Any:

@@ -162,8 +162,9 @@ def _loads(s: Trajectory) -> Iterator[Extra]:
         found, name = s.load(i), f"loads[{i}] {load.kind}"
         turns = m.turns(load.in_freedom)
         if isinstance(load, Law):
-            yield f"{name} x", found.coordinate, (0 if turns else 1, 0, 0)
-            yield f"{name} v", found.rate, (0 if turns else 1, 0, -1)
+            read = m.turns(load.reads_freedom)
+            yield f"{name} x", found.coordinate, (0 if read else 1, 0, 0)
+            yield f"{name} v", found.rate, (0 if read else 1, 0, -1)
         if isinstance(load, Law) or load.in_freedom is not None:
             yield f"{name} force", found.force, (2 if turns else 1, 1, -2)
         else:

@@ -543,6 +543,9 @@ def _law(stage: DrawnPose, i: int, load: Law) -> DrawnPart:
     straight, turning = LAW_SHAPES[load.kind]
     if load.in_freedom is None:
         begin, end = stage.on(load.a, load.p), stage.on(load.b, load.q)
+        if load.along is not None:  # from the foot of point p on the line through q
+            u = stage.place.poses[load.a][:, :3, :3] @ (np.asarray(load.along) / np.linalg.norm(load.along))
+            begin = end - ((end - begin) * u).sum(axis=1, keepdims=True) * u
     else:
         pair, j, line, own = stage.freedom(load.in_freedom)
         size, X = stage.symbol_size(pair), stage.frames[own]

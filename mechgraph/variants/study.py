@@ -615,8 +615,9 @@ def study(
         Declared number (``crank.mass``, ``B.on_a.point.x``, ``loads[0].stiffness``, ``length[2]`` of a chain) -> distribution of
         ``scipy.stats`` or numbers.
     outputs : str, iterable or mapping
-        Quantities by name (``"A.effort"``, ``"B.force"``, ``"B:Fx"``, ``"coupler.center"``), or name -> quantity or function of a
-        Solution with the batch ``(variants, positions)``.
+        Quantities by name (``"A.effort"``, ``"B.force"``, ``"B:Fx"``, ``"coupler.center"``; of a named point ``"coupler.tip"``,
+        ``"coupler.tip.x"``, ``"coupler.tip.velocity"``), or name -> quantity or function of a Solution with the batch
+        ``(variants, positions)``.
     n : int
         Number of variants; on a grid, levels of every distribution (lists of numbers are taken as given).
     seed : int

@@ -20,6 +20,7 @@ from mechgraph import by_kernel
 from mechgraph.by_kernel import COMPILED, InKernel, in_kernel
 from mechgraph.determinacy.snapping import SnappedMechanism, declared_closure, meant, started
 from mechgraph.errors import DeclarationError, MechgraphError, did_you_mean, listed, near_names
+from mechgraph.fields import XYZ
 from mechgraph.force.reactions import MethodName
 from mechgraph.kinematics.motion_path import DriverPath, Status
 from mechgraph.kinematics.prescribed import DriverMotion, Motions
@@ -146,20 +147,21 @@ def _found(m: Mechanism, text: str) -> Callable[[Solution], Any] | None:
             return None
         return lambda s: getattr(s.link(owner), part)
     if point := _point(m, text):
-        link, name, rank = point
-        return lambda s: getattr(s.link(link).at(name), RANKS[rank])
+        link, name, rank, part = point
+        return lambda s: getattr(s.link(link).at(name), RANKS[rank])[..., part]
     return None
 
 
-def _point(m: Mechanism, text: str) -> tuple[str, str, int] | None:
-    """Link, name and derivative of ``bucket.tip``, ``bucket.tip.velocity`` or ``bucket.tip.acceleration``."""
+def _point(m: Mechanism, text: str) -> tuple[str, str, int, Any] | None:
+    """Link, name, derivative and component of ``bucket.tip``, ``bucket.tip.velocity``, ``bucket.tip.acceleration`` or ``bucket.tip.x``."""
     return next(
         (
-            (link.name, name, rank)
+            (link.name, name, rank, component)
             for link in m.links
             for name in link.points
             for rank, of in enumerate(RANKS)
-            if text == f"{link.name}.{name}{f'.{of}' if rank else ''}"
+            for component, tail in [(slice(None), ""), *((i, f".{axis}") for i, axis in enumerate(XYZ))]
+            if text == f"{link.name}.{name}{f'.{of}' if rank else ''}{tail}"
         ),
         None,
     )
