@@ -1,7 +1,8 @@
 """The gallery of the manual: thirty mechanisms, each with a picture, a film, its numbers and its source.
 
 A mechanism is drawn from what a solution gives of it: a link joins the points of its pairs, and the path of a pair's marker on its first
-link is the guide, slot or cam there. ``python docs/gallery.py`` draws them all below ``docs/_built``.
+link is the guide or slot there. Gears, pulleys, belts and cams of a planar one are those of ``mechgraph.show``.
+``python docs/gallery.py`` draws them all below ``docs/_built``.
 """
 
 from __future__ import annotations
@@ -19,11 +20,13 @@ import numpy as np
 
 import mechgraph as mg
 from mechgraph.quantities import FORCE, MOMENT, unit_of
+from mechgraph.show.scene import scene
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "docs" / "_built" / "gallery"
 SIZE, MARGIN, FRAMES, SECONDS = 220.0, 26.0, 36, 4
 COLORS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#6b3a00")
+BODIES = ("wheel", "face", "strand", "roller")
 VIEW = np.array([[0.82, -0.57, 0.0], [0.2, 0.29, 0.94]])
 """Right and up of a view from above and the side."""
 
@@ -136,11 +139,16 @@ class Film:
         }
         every = np.concatenate([path.reshape(-1, 3) for path in ends.values()])
         self.view = view(every)
+        self.found = scene(s)
+        self.t = np.searchsorted(self.found.positions, chosen)
+        # gears, pulleys, belts and cams of a planar mechanism
+        self.bodies = [one for one in self.found.parts if self.found.normal is not None and one.role in BODIES]
+        profiles = {(part.owner, part.link) for part in self.found.parts if part.role == "wheel" and part.shape.faces}
         self.lines: list[tuple[str, str, Any]] = []
         self.dots: list[tuple[str, Any]] = []
         self.circles: list[tuple[str, Any, Any]] = []
         for name in m.link_names():
-            points = [ends[key] for key in ends if key[1] == name]
+            points = [ends[key] for key in ends if key[1] == name and key not in profiles]
             joined = (
                 [(one, np.mean(points, axis=0)) for one in points] if len(points) > 3 else [*combinations(points, 2)]
             )
@@ -148,13 +156,15 @@ class Film:
         for p in m.pairs:
             inverse = np.linalg.inv(self.poses[p.a])
             path = np.einsum("tij,tj->ti", inverse[:, :3, :3], ends[p.name, p.b]) + inverse[:, :3, 3]
-            if np.linalg.norm(np.ptp(path, axis=0)) > 1e-6 * np.linalg.norm(np.ptp(every, axis=0)):
+            if (p.name, p.a) not in profiles and np.linalg.norm(np.ptp(path, axis=0)) > 1e-6 * np.linalg.norm(
+                np.ptp(every, axis=0)
+            ):
                 self.lines.append(("guide", p.a, self.seen(np.stack([self.at(p.a, q) for q in path], axis=1))))
             apart = ends[p.name, p.a], ends[p.name, p.b]
             if p.curve is None and p.a != m.frame and np.abs(apart[0] - apart[1]).max() > 1e-6 * np.ptp(every):
                 self.lines.append(("link", p.a, self.seen(np.stack(apart, axis=1))))  # it reaches to what slides on it
             self.dots.append(("foot" if m.frame in (p.a, p.b) else "pin", self.seen(ends[p.name, p.b][:, None])[:, 0]))
-        for gear in m.couplings:
+        for gear in m.couplings if self.found.normal is None else ():
             if hasattr(gear, "teeth"):
                 contact = s.coupling(gear.name).point.reshape(-1, 3)[chosen]
                 for name in (gear.a, gear.b):
@@ -180,7 +190,29 @@ class Film:
     def extent(self) -> Any:
         """All places in the picture."""
         round_ = [np.concatenate([at - r[:, None], at + r[:, None]]) for _, at, r in self.circles]
-        return np.concatenate([*(x.reshape(-1, 2) for _, _, x in self.lines), *(x for _, x in self.dots), *round_])
+        bodies = [self.seen(self.found.vertices(part, t)) for part in self.bodies for t in self.t[::4]]
+        return np.concatenate(
+            [*(x.reshape(-1, 2) for _, _, x in self.lines), *(x for _, x in self.dots), *round_, *bodies]
+        )
+
+    def body(self, part: Any, animated: Callable[..., str]) -> str:
+        """One of them: an outline that moves as its frame does."""
+        X, width = self.found.frames[part.frame][self.t], 1.0 if part.role == "wheel" else 2.5
+        at = self.placed(self.seen(X[:, :, 3]))
+        A = np.einsum("ij,tjk->tik", self.view, X[:, :, :3]) * self.scale * np.array([[1.0], [-1.0]])
+        if part.role == "strand":
+            ends = np.stack([at, at + A[:, :, 2]], axis=1)
+            points = [" ".join(f"{a:.1f},{b:.1f}" for a, b in row) for row in ends]
+            return f'<polyline points="{points[0]}" fill="none" stroke="#3e4c59" stroke-width="2">{animated("points", points)}</polyline>'
+        local = part.shape.vertices @ A[0].T
+        path = "".join("M" + "L".join(f"{a:.1f},{b:.1f}" for a, b in local[list(line)]) for line in part.shape.lines)
+        turn = np.unwrap(np.arctan2(*(A @ np.linalg.pinv(A[0]))[:, ::-1, 0].T))
+        moves = [f"{a:.2f} {b:.2f}" for a, b in at], [f"{angle:.2f}" for angle in np.rad2deg(turn)]
+        color = self.color(part.link or self.frame)
+        fill = "none" if part.role == "face" or not part.shape.faces else color
+        inner = f'<path d="{path}" fill="{fill}" fill-opacity="0.28" stroke="{color}" stroke-width="{width}"/>'
+        inner = f'<g transform="rotate({moves[1][0]})">{inner}{animated("transform", moves[1], "rotate")}</g>'
+        return f'<g transform="translate({moves[0][0]})">{inner}{animated("transform", moves[0], "translate")}</g>'
 
     def placed(self, points: Any) -> Any:
         """Places in the picture, in its units."""
@@ -194,16 +226,20 @@ class Film:
         """The elements of the picture; the film moves to and fro if the mechanism does not return."""
         closed = self.loop and all(np.abs(x[0] - x[-1]).max() * self.scale < 12 for _, x in self.dots)
 
-        def animated(attribute: str, values: list[str]) -> str:
+        def animated(attribute: str, values: list[str], transform: str = "") -> str:
             if not moving or len(set(values)) == 1:
                 return ""
             every = values if closed else values + values[-2:0:-1]
-            return f'<animate attributeName="{attribute}" dur="{SECONDS}s" repeatCount="indefinite" values="{";".join(every)}"/>'
+            kind = f'animateTransform type="{transform}"' if transform else "animate"
+            return f'<{kind} attributeName="{attribute}" dur="{SECONDS}s" repeatCount="indefinite" values="{";".join(every)}"/>'
 
         def drawn(kind: str, fixed: str, values: dict[str, list[str]]) -> str:
             first = " ".join(f'{name}="{value[0]}"' for name, value in values.items())
             return f"<{kind} {first} {fixed}>{''.join(animated(*item) for item in values.items())}</{kind}>"
 
+        # a card is small, and its film is not read closely: teeth from a third of the pixels on
+        bodies = [one for one in self.bodies if one.scales[0] <= 3.0 * self.scale < one.scales[1]]
+        yield from (self.body(part, animated) for part in bodies if part.role != "roller")
         for style, link, x in self.lines:
             how = 'stroke-width="5" stroke-linecap="round"' if style == "link" else 'stroke-width="1.6" opacity="0.65"'
             yield drawn(
@@ -222,6 +258,7 @@ class Film:
                     "r": [f"{v * self.scale:.1f}" for v in r],
                 },
             )
+        yield from (self.body(part, animated) for part in bodies if part.role == "roller")
         for style, x in self.dots:
             at = self.placed(x)
             fill = "#1f2933" if style == "foot" else "#ffffff"

@@ -18,6 +18,8 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import Wanted, is_numeric
 
 MOST_DPI, MOST_INCHES, PNG_DPI = 10_000, 400, 110
+MOST_PATHS = 800
+"""Most polygons that are written as such to a drawing (SVG, PDF); more, as of gears in space, are a picture in it."""
 
 
 def _sized(value: Any) -> bool:
@@ -142,6 +144,13 @@ class Painter(Protocol):
         """Fill a box that may have changed, just before everything is drawn."""
 
 
+def scale_in(box: Array, points: Array, camera: Array) -> float:
+    """Pixels of a unit of length where points ``(n, 3)``, seen with a camera, fill a box, with its margins."""
+    span = np.ptp(points @ camera[:2].T, axis=0)
+    room = (1.0 - np.array([2 * MARGIN[0], MARGIN[1] + MARGIN[2]])) * (box[1] - box[0])
+    return float(np.min(room / np.maximum(span, 1e-9 * span.max(initial=1e-300))))
+
+
 class FlatPainter:
     """On axes of two dimensions."""
 
@@ -176,7 +185,14 @@ class FlatPainter:
 
         order = np.argsort([float((p @ self.camera[2]).mean()) for p in corners], kind="stable")
         flat = [corners[i] @ self.camera[:2].T for i in order]
-        drawn = PolyCollection(flat, facecolors=faces[order], edgecolors=edges[order], linewidths=0.7, zorder=zorder)
+        drawn = PolyCollection(
+            flat,
+            facecolors=faces[order],
+            edgecolors=edges[order],
+            linewidths=0.7,
+            zorder=zorder,
+            rasterized=len(flat) > MOST_PATHS,
+        )
         return self.ax.add_collection(drawn, autolim=False)
 
     def lines(self, runs: Sequence[Array], **style: Any) -> Any:
@@ -251,7 +267,7 @@ class SpacePainter:
         most = max(map(len, corners))
         equal = [np.concatenate([p, np.repeat(p[-1:], most - len(p), axis=0)]) for p in corners]
         drawn = toolkit("art3d").Poly3DCollection(
-            equal, facecolors=faces, edgecolors=edges, linewidths=0.7, zorder=zorder
+            equal, facecolors=faces, edgecolors=edges, linewidths=0.7, zorder=zorder, rasterized=len(equal) > MOST_PATHS
         )
         return self.ax.add_collection3d(drawn, autolim=False)
 
@@ -281,6 +297,14 @@ def shaded(colour: str, corners: Sequence[Array], camera: Array, alpha: float = 
     out = np.tile(to_rgba(colour, alpha), (len(corners), 1))
     out[:, :3] *= bright[:, None]
     return out
+
+
+def tint(colour: str) -> str:
+    """A color, mixed with white: that of a body through whose outline others are seen."""
+    from matplotlib.colors import to_hex, to_rgb
+
+    r, g, b = (1.0 - 0.28 * (1.0 - part) for part in to_rgb(colour))
+    return str(to_hex((r, g, b)))
 
 
 def edges_of(faces: Array, rims: Sequence[bool], alpha: float = 1.0) -> Array:

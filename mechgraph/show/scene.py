@@ -22,9 +22,13 @@ from mechgraph.model.loads import Effort, Gravity, Law, Wrench
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.pairs import pair_type as evaluation
+from mechgraph.pairs.contact_types import is_open, takes_curves
+from mechgraph.pairs.curves import Travel, outside
+from mechgraph.pairs.travelling import AlongCurve, Beside
 from mechgraph.result.solution import Solution
 from mechgraph.show import shapes
 from mechgraph.show.shapes import FreedomLine, Shape, frame_along, lines_of, symbol
+from mechgraph.show.wheels import READABLE, belt_path, gears_of
 
 __all__ = ["Label", "DrawnPart", "DrawnPlace", "Scene", "place_of_states", "scene", "scene_at"]
 
@@ -126,7 +130,13 @@ def scene_at(
 ) -> Scene:
     """The scene of a mechanism that stands somewhere; a ``solution`` gives values to loads that vary, and to reactions."""
     stage = DrawnPose(m, place, len(positions))
-    parts = [*links(stage), *pairs(stage), *loads(stage, solution, positions)]
+    parts = [
+        *gearing(stage, solution, positions),
+        *cams(stage),
+        *links(stage),
+        *pairs(stage),
+        *loads(stage, solution, positions),
+    ]
     cases = np.asarray(positions) // (
         solution.batch[-1] if solution is not None and solution.batch else 1 + len(positions)
     )
@@ -147,6 +157,10 @@ FLAT_THICKNESS = 1e-6
 Role = Literal[
     "link",
     "plate",
+    "wheel",
+    "face",
+    "roller",
+    "strand",
     "tie",
     "guide",
     "body",
@@ -168,7 +182,9 @@ class DrawnPart:
 
     ``role`` says how it is painted: ``link`` (rods) and ``plate`` in the color of ``link``, ``guide`` likewise but translucent, ``body``
     (white) and ``dark`` of a pair symbol, ``axis`` (a line), ``tie`` (from a link to a point off it), ``foot`` (of the frame), ``center``
-    and ``point`` (one vertex), ``spring``, ``load``, ``drive``, ``reaction``. ``owner`` is the name of the pair, link, point or load.
+    and ``point`` (one vertex), ``spring``, ``load``, ``drive``, ``reaction``; ``wheel`` (a tint of the color of its link) and ``strand`` of
+    a belt. ``owner`` is the name of the pair, link, point, load, gear or belt. It is drawn where a unit of length has so many pixels as
+    ``scales`` says.
     """
 
     role: Role
@@ -177,6 +193,7 @@ class DrawnPart:
     frame: str
     shape: Shape
     dashed: bool = False
+    scales: tuple[float, float] = (0.0, np.inf)
 
 
 @dataclass(frozen=True)
@@ -221,10 +238,12 @@ class DrawnPose:
                 self.frames[f"pair:{pair.name}@{k}"] = frame
         ends = ((p, link, k) for p in m.pairs for link, k in ((p.a, 0), (p.b, p.type.f)))
         self.points = {(p.name, link): self.frames[f"pair:{p.name}@{k}"][:, :, 3] for p, link, k in ends}
+        self.wheels, _, self.belts = gears_of(m, {name: pose[0, :3] for name, pose in place.poses.items()})
         of_links = [
             self.on(k.name, c) for k in m.links for c in (*k.points.values(), *([k.center] if k.mass > 0 else []))
         ]
-        self.everything = np.concatenate([*self.points.values(), *of_links])
+        rims = [self.on(w.link, p) for w in self.wheels for p in w.extent()]
+        self.everything = np.concatenate([*self.points.values(), *of_links, *rims])
         self.normal = self._plane()
         self.size = float(np.linalg.norm(np.ptp(self.everything, axis=0))) or 1.0
         # half width of a symbol over the extent of the mechanism, where pairs leave room for it
@@ -267,14 +286,32 @@ class DrawnPose:
         return np.asarray(self.m.link(link).point(point) if isinstance(point, str) else point, dtype=float)
 
     def corners(self, link: str) -> list[Array]:
-        """What a link joins, in its own frame: points of the pairs that bear it, and where springs and other laws hold it."""
-        ends = (end for p in self.m.pairs if p.type.bears for end in zip((p.a, p.b), p.markers, strict=True))
+        """What a link joins, in its own frame: points of the pairs that bear it, and where springs and other laws hold it.
+
+        Not where something runs on its profile, which is drawn as such, nor where a guide of its own stands on the ground.
+        """
+        ends = (
+            (name, marker)
+            for p in self.m.pairs
+            if p.type.bears
+            for k, (name, marker) in enumerate(zip((p.a, p.b), p.markers, strict=True))
+            if not (
+                any(step.back == bool(k) and is_profile(p, step) for step in takes_curves(p.type))
+                or (not k and self.grounded(p))
+            )
+        )
         laws = (load for load in self.m.loads if isinstance(load, Law) and load.between_links)
         held = ((end, p) for load in laws for end, p in ((load.a, load.p), (load.b, load.q)) if end == link)
         return [
             *(np.asarray(marker.point, dtype=float) for name, marker in ends if name == link),
             *(self.local(link, p) for _, p in held),
         ]
+
+    def grounded(self, pair: Pair) -> bool:
+        """Whether a pair is drawn as a guide on hatched ground: in a plane, where it slides on the frame."""
+        lines = lines_of(pair.type, pair.pitch_per_radian)
+        slides = sum(not line.turns for line in lines)
+        return self.normal is not None and pair.a == self.m.frame and slides == 1 and not takes_curves(pair.type)
 
     def symbol_size(self, pair: Pair) -> float:
         """Half width of a symbol: less where another pair is near."""
@@ -301,6 +338,112 @@ class DrawnPose:
         right = np.cross(up, n)
         right *= np.sign(right[np.argmax(np.abs(right))])  # seen from where x points to the right
         return np.column_stack([right, np.cross(up, right), up])
+
+
+def gearing(stage: DrawnPose, solution: Solution | None, positions: Any) -> Iterator[DrawnPart]:
+    """Gears with teeth where these can be seen, plain else, with pitch circles; pulleys, and belts as thick as their tension asks."""
+    flat = stage.normal is not None
+    for wheel in stage.wheels:
+        frame, often = f"link:{wheel.link}", (0.0, np.inf)
+        if wheel.teeth:
+            often = (0.0, READABLE / (np.pi * wheel.module))
+            yield DrawnPart("wheel", wheel.name, wheel.link, frame, wheel.toothed(flat), scales=(often[1], np.inf))
+        yield DrawnPart("wheel", wheel.name, wheel.link, frame, wheel.plain(flat), scales=often)
+        if not wheel.is_worm:
+            yield DrawnPart("axis", wheel.name, wheel.link, frame, wheel.pitch_line(flat))
+        if not wheel.is_rack:
+            yield DrawnPart("wheel", wheel.name, wheel.link, frame, wheel.mark(flat))
+    for belt in stage.belts:
+        own = [stage.wheels[i] for i in belt.over]
+        centers = np.stack([stage.on(w.link, w.at) for w in own])
+        axis = stage.place.poses[own[0].link][:, :3, :3] @ own[0].axes[:, 2]
+        path, span = belt_path(centers, axis, [w.radius for w in own], belt.senses)
+        along = np.roll(path, -1, axis=1) - path
+        pull = _tensions(belt.name, along[:, span % 1 == 0], solution, positions)
+        most = float(np.nanmax(pull, initial=0.0)) or 1.0
+        for i, k in enumerate(span):
+            # half the width of a belt over a symbol: slack, and with the greatest tension
+            width = stage.symbol * (0.07 + 0.13 * 0.5 * (pull[:, int(np.floor(k))] + pull[:, int(np.ceil(k))]) / most)
+            frame = f"belt:{belt.name}:{i}"
+            stage.frames[frame] = stretched(along[:, i], path[:, i], np.linalg.norm(along[:, i], axis=1), width)
+            yield DrawnPart("strand", belt.name, "", frame, shapes.prism(6, 1.0, 0.0, 1.0))
+
+
+def _tensions(name: str, along: Array, solution: Solution | None, positions: Any) -> Array:
+    """Tensions ``(T, spans)`` of a belt whose spans run ``along (T, spans, 3)``: that of the tight one of two; alike where none is known.
+
+    The span that comes to the second pulley pulls it back, the one that leaves it draws it on.
+    """
+    if solution is None or not solution.has_forces:
+        return np.ones(along.shape[:2])
+    force = solution.coupling(name).force.reshape(-1, 3)[positions]
+    ways = along / np.linalg.norm(along, axis=2, keepdims=True) * np.array([-1.0, 1.0])[:, None]
+    share = (ways * force[:, None]).sum(axis=2)
+    return np.asarray(np.where(share == share.max(axis=1, keepdims=True), np.linalg.norm(force, axis=1)[:, None], 0.0))
+
+
+def cams(stage: DrawnPose) -> Iterator[DrawnPart]:
+    """Profiles, filled where they are closed, the walls of slots, and the rollers and balls that run there and on surfaces."""
+    flat = stage.normal is not None
+    half = 0.0 if flat else 0.5 * stage.symbol
+    for pair in stage.m.pairs:
+        for step in takes_curves(pair.type):
+            link, curve = pair.b if step.back else pair.a, step.curve
+            wide = 0.0 if is_open(pair) else pair.radius_b or 0.0
+            if curve is None or not (is_open(pair) or wide):
+                continue
+            curve = curve.base if isinstance(curve, Beside) else curve
+            travel = curve.once(Travel)
+            here = travel.at(_covered(stage, pair, link, travel))
+            if wide and travel.is_plane and not curve.is_closed:
+                yield DrawnPart("wheel", pair.name, link, f"link:{link}", _slot(here.x.T, here.y.T, wide))
+            elif wide:
+                walls = (
+                    [shapes.polyline((here.x + side * here.y).T) for side in (-wide, wide)] if travel.is_plane else []
+                )
+                yield from (DrawnPart("wheel", pair.name, link, f"link:{link}", wall) for wall in walls)
+            else:
+                x = (here.x - (outside(curve) * curve.roller * here.y if curve.roller else 0.0)).T
+                filled = is_profile(pair, step)
+                shape = shapes.slab(x[:-1], travel.guide, half) if filled else shapes.polyline(x)
+                yield DrawnPart("wheel" if filled else "face", pair.name, link, f"link:{link}", shape)
+        if radius := pair.radius_b:
+            turning = [j for j, line in enumerate(lines_of(pair.type, pair.pitch_per_radian)) if line.turns]
+            if len(turning) == 1:
+                axis = lines_of(pair.type, pair.pitch_per_radian)[turning[0]].direction
+                shape = shapes.prism(48, radius, -0.15 * stage.symbol, 0.15 * stage.symbol).along(axis)
+            else:
+                shape = shapes.ball(radius)
+            yield DrawnPart("roller", pair.name, "", f"pair:{pair.name}@{pair.type.f}", shape)
+
+
+def is_profile(pair: Pair, step: AlongCurve) -> bool:
+    """Whether a curve is the outline of a body that something runs on from outside."""
+    curve = step.curve
+    if curve is None or not (is_open(pair) and curve.is_closed):
+        return False
+    hollow = isinstance(curve, Beside) and curve.distance * outside(curve.base) < 0
+    return not hollow and curve.once(Travel).is_plane
+
+
+def _covered(stage: DrawnPose, pair: Pair, link: str, travel: Travel) -> Array:
+    """Arc lengths over a curve; of an endless line over what is touched, and some more."""
+    if np.isfinite(travel.begin):
+        return np.linspace(travel.begin, travel.end, 181)
+    X, touched = stage.place.poses[link], stage.frames[f"pair:{pair.name}@1"][:, :, 3]
+    here = travel.at(np.zeros(1))
+    s = (((touched - X[:, :3, 3])[:, None] @ X[:, :3, :3])[:, 0] - here.x[:, 0]) @ here.t[:, 0]
+    return np.array([s.min() - 2.0 * stage.symbol, s.max() + 2.0 * stage.symbol])
+
+
+def _slot(x: Array, y: Array, wide: float) -> Shape:
+    """The walls of a slot along points ``x (n, 3)`` with normals ``y``, round at its ends."""
+    turn = np.linspace(0.0, np.pi, 9)[1:-1, None]
+    ends = [
+        x[i] + wide * (s * np.cos(turn) * y[i] + np.sin(turn) * out / np.linalg.norm(out))
+        for i, s, out in ((-1, 1.0, x[-1] - x[-2]), (0, -1.0, x[0] - x[1]))
+    ]
+    return shapes.polyline(np.concatenate([x + wide * y, ends[0], (x - wide * y)[::-1], ends[1], (x + wide * y)[:1]]))
 
 
 def distinct(points: Iterable[Array], tolerance: float) -> Array:
@@ -353,12 +496,24 @@ def _body(stage: DrawnPose, link: str, corners: list[Array]) -> Iterator[DrawnPa
 
 
 def _feet(stage: DrawnPose) -> Iterator[DrawnPart]:
-    """A hatched foot under every pair point of the frame."""
+    """A hatched foot under every pair point of the frame; in a plane hatched ground along its guides, and around its rings."""
     name = stage.m.frame
     X = stage.frames[f"link:{name}"][0]
     foot = shapes.foot().moved(1.8 * stage.symbol * X[:, :3].T @ stage.upright)
     for at in distinct(stage.corners(name), FLAT_THICKNESS * stage.size):
         yield DrawnPart("foot", name, "", f"link:{name}", foot.moved(np.eye(3), at))
+    for wheel in stage.wheels if stage.normal is not None else ():
+        if wheel.link == name and wheel.internal:
+            turn = np.deg2rad(np.linspace(240.0, 300.0, 13))
+            out = stage.upright[:, [0]] * np.cos(turn) + stage.upright[:, [2]] * np.sin(turn)
+            away = out.T @ X[:, :3]
+            yield DrawnPart(
+                "foot",
+                wheel.name,
+                "",
+                f"link:{name}",
+                shapes.hatching(wheel.at + wheel.outer * away, away, 0.8 * stage.symbol),
+            )
 
 
 def rod(p: Array, q: Array, radius: float) -> Shape:
@@ -393,7 +548,12 @@ def pairs(stage: DrawnPose) -> Iterator[DrawnPart]:
     driven = {stage.m.full_name(d.freedom) for d in stage.m.drives}
     for pair in stage.m.pairs:
         size, lines = stage.symbol_size(pair), lines_of(pair.type, pair.pitch_per_radian)
+        if stage.grounded(pair):
+            yield _ground(stage, pair, lines, size)
+        touches = len(takes_curves(pair.type)) > 1  # two bodies, which are drawn themselves
         for e in symbol(pair.type, pair.pitch_per_radian, size, _strokes(stage, pair, lines, size)):
+            if touches and e.role != "body":
+                continue
             link = pair.a if e.role == "guide" else ""
             yield DrawnPart(e.role, pair.name, link, f"pair:{pair.name}@{e.frame}", e.shape, e.dashed)
         for name, line, single in zip(pair.freedom_names, lines, pair.type.drivable, strict=True):
@@ -403,6 +563,23 @@ def pairs(stage: DrawnPose) -> Iterator[DrawnPart]:
                 yield DrawnPart("axis", pair.name, "", frame, shapes.polyline([line.point - reach, line.point + reach]))
             if name in driven:
                 yield DrawnPart("drive", name, "", frame, freedom_arrow(line, 1.75 * size))
+
+
+def _ground(stage: DrawnPose, pair: Pair, lines: list[FreedomLine], size: float) -> DrawnPart:
+    """Hatched ground along the lower side of a guide, the left one of an upright guide."""
+    j = next(j for j, line in enumerate(lines) if not line.turns)
+    X, u = stage.frames[f"pair:{pair.name}@{lines[j].frame}"][0, :, :3], lines[j].direction
+    assert stage.normal is not None
+    side = np.cross(X @ u, stage.normal)
+    side *= -np.sign(side @ stage.upright @ np.array([1e-3, 0.0, 1.0]))
+    low, high = np.array(_strokes(stage, pair, lines, size)[j]) + np.array([-1.0, 1.0]) * shapes.PAD * size
+    run = np.linspace(low, high, max(int((high - low) / (0.55 * size)), 3))[:, None] * u + shapes.GUIDE * size * (
+        side @ X
+    )
+    away = np.broadcast_to(side @ X, run.shape)
+    return DrawnPart(
+        "foot", stage.m.frame, "", f"pair:{pair.name}@{lines[j].frame}", shapes.hatching(run, away, 0.6 * size)
+    )
 
 
 def _strokes(stage: DrawnPose, pair: Pair, lines: list[FreedomLine], size: float) -> list[tuple[float, float]]:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
+from itertools import groupby, pairwise
 from typing import Any, Literal
 
 import numpy as np
+import scipy
 
 from mechgraph.maths.se3 import Array
 from mechgraph.pairs.factors import Freedom
@@ -249,6 +250,33 @@ def ring(radius: float) -> Array:
 def polyline(points: Array | Sequence[Any]) -> Shape:
     """A line through points."""
     return Shape(np.asarray(points, dtype=float), lines=(tuple(range(len(points))),))
+
+
+def hatching(run: Array, away: Array, height: float) -> Shape:
+    """Ground along a line ``(n, 3)``: strokes of a height, slanting ``away (n, 3)`` from it."""
+    along = np.gradient(run, axis=0)
+    ends = run + height * (away - 0.7 * along / np.linalg.norm(along, axis=1, keepdims=True))
+    return together([polyline(run), *(polyline(stroke) for stroke in zip(run, ends, strict=True))])
+
+
+def slab(outline: Array, normal: Array, half: float) -> Shape:
+    """What a closed outline ``(n, 3)`` in a plane encloses, convex or not, as thick as twice ``half``; its lines are the outlines."""
+    n, frame = len(outline), frame_along(normal)
+    flat = (outline - outline.mean(axis=0)) @ frame[:, :2]
+    found = scipy.spatial.Delaunay(flat).simplices
+    begin, end = flat, np.roll(flat, -1, axis=0)
+    x, y = flat[found].mean(axis=1).T[:, :, None]
+    above = (begin[:, 1] > y) != (end[:, 1] > y)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        crossed = begin[:, 0] + (y - begin[:, 1]) * (end[:, 0] - begin[:, 0]) / (end[:, 1] - begin[:, 1])
+    inside = (above & (x < crossed)).sum(axis=1) % 2 == 1
+    faces, loop = [tuple(face) for face in found[inside].tolist()], (*range(n), 0)
+    if not half:
+        return Shape(outline, tuple(faces), (loop,))
+    sides = [(i, j, j + n, i + n) for i, j in pairwise(loop)]
+    both = [tuple(i + n for i in face) for face in faces]
+    vertices = np.concatenate([outline - half * frame[:, 2], outline + half * frame[:, 2]])
+    return Shape(vertices, (*faces, *both, *sides), (loop, tuple(i + n for i in loop)))
 
 
 def thread(radius: float, low: float, high: float, hand: float, turns: int = 3) -> Shape:

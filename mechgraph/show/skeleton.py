@@ -38,22 +38,29 @@ from mechgraph.show.canvas import (
     inside,
     new_axes,
     nice_length,
+    scale_in,
     shaded,
+    tint,
 )
 from mechgraph.show.curves import finely
 from mechgraph.show.scene import DrawnPart, Scene, scene
 
 BODY = "#f2f4f7"
-LINES = {"axis": (0.9, (0, (8, 2, 1.5, 2))), "tie": (0.9, (0, (2, 2))), "spring": (1.3, "-"), "load": (2.2, "-"),
-         "drive": (1.8, "-"), "reaction": (2.4, "-"), "foot": (0.8, "-")}  # fmt: skip
+LINES = {
+    "wheel": (0.9, "-"), "face": (2.2, "-"), "axis": (0.9, (0, (8, 2, 1.5, 2))), "tie": (0.9, (0, (2, 2))), "spring": (1.3, "-"),
+    "load": (2.2, "-"), "drive": (1.8, "-"), "reaction": (2.4, "-"), "foot": (0.8, "-"),
+}  # fmt: skip
 """Width and style of the lines of parts by their role."""
 SOLID = {
-    "body": BODY, "dark": "#52606d", "spring": BODY, "load": LOAD, "drive": INK, "reaction": REACTION,
+    "strand": "#3e4c59", "roller": BODY, "body": BODY, "dark": "#52606d", "spring": BODY, "load": LOAD, "drive": INK, "reaction": REACTION,
     "foot": "#d5dbe1",
 }  # fmt: skip
 """Colors of the polygons of parts by their role; others have that of their link."""
 LINE_COLOUR = {"axis": INK, "spring": "#3e4c59", "load": LOAD, "drive": INK, "reaction": REACTION, "foot": MUTED}
-ABOVE = {"plate": 2.0, "foot": 2.1, "guide": 3.0, "spring": 5.0, "load": 6.0, "drive": 6.0, "reaction": 6.5}
+ABOVE = {
+    "wheel": 1.7, "strand": 1.9, "plate": 2.0, "foot": 2.1, "face": 2.2, "guide": 3.0, "spring": 5.0, "load": 6.0, "drive": 6.0,
+    "reaction": 6.5,
+}  # fmt: skip
 """Height of roles over others; links and symbols lie together at 4, sorted by depth."""
 
 
@@ -74,8 +81,9 @@ def draw_skeleton(
 
     Links are rods between two pairs, plates between more; a circle with a dot is a mass center. Pair symbols follow from the
     freedoms: a drum rotates (with a thread: screw), a guide translates, a ball is spherical, a cross of pins universal, a square a
-    weld. Driven freedoms have an arrow in their positive sense; springs, dampers, forces and moments are drawn where they act.
-    A planar mechanism is drawn in its plane.
+    weld. Driven freedoms have an arrow in their positive sense; springs, dampers, forces and moments are drawn where they act. Gears
+    have their pitch circles and, from 8 pixels a tooth on, involute teeth that interleave; belts are the thicker the tighter they are;
+    cams have their profiles, rollers their radii. A planar mechanism is drawn in its plane, with its guides on hatched ground.
 
     Parameters
     ----------
@@ -237,9 +245,10 @@ class Drawing:
     def position(self, t: int) -> None:
         """Everything at one position."""
         heights: dict[float, list[tuple[DrawnPart, Array]]] = {}
+        scale = scale_in(inside(self.ax), self.scene.all_vertices(t), self.painter.camera)
         for part in self.scene.parts:
             vertices = self.scene.vertices(part, t)
-            if np.isnan(vertices).any():
+            if np.isnan(vertices).any() or not part.scales[0] <= scale < part.scales[1]:
                 continue
             heights.setdefault(ABOVE.get(part.role, 4.0), []).append((part, vertices))
             if part.role in ("center", "point"):
@@ -268,6 +277,8 @@ class Drawing:
             own = [vertices[list(face)] for face in part.shape.faces]
             alpha = {"plate": 0.2, "guide": 0.28}.get(part.role, 1.0)
             colour = SOLID.get(part.role) or self.colour[part.link]
+            if part.role == "wheel":
+                colour = tint(colour)
             shade = shaded(colour, own, self.painter.camera, alpha)
             rims = [i < part.shape.rims for i in range(len(own))]
             corners += own
@@ -353,7 +364,7 @@ class Drawing:
         out = []
         for part in self.scene.parts:
             vertices = self.scene.vertices(part, t)
-            if part.role in ("plate", "axis", "tie") or np.isnan(vertices).any():
+            if part.role in ("plate", "wheel", "axis", "tie") or np.isnan(vertices).any():
                 continue
             if part.role == "link":
                 u = np.linspace(0, 1, 25)[:, None]

@@ -123,6 +123,7 @@ class Figure:
         return {
             "frame": self.number[frame], "role": part.role, "colour": self.colours.get(part.link, ""), "dashed": part.dashed,
             "pair": names.index(part.owner) if part.owner in names else -1,
+            "scales": [0.0 if np.isinf(end) else float(end) for end in part.scales],
             "vertices": packed(shape.vertices), "triangles": triangles(shape), "lines": segments(shape),
         }  # fmt: skip
 

@@ -13,6 +13,7 @@
  * @property {Packed} vertices
  * @property {number[]} triangles
  * @property {number[]} lines ends of segments
+ * @property {number[]} scales pixels of a unit of length from which on it is seen, and up to which, 0 for ever
  *
  * @typedef {{ text: string, kind: string, frame: number, pair: number, at: number[] }} Label
  * @typedef {{ name: string, type: string, title: string, a: string, b: string, frame: number, at: number[], rows: string[][] }} Pair

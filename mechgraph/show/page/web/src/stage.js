@@ -170,6 +170,10 @@ export class Stage {
     const own = piece.colour || ink;
     /** @type {Record<string, Paint>} */
     const ways = {
+      wheel: { solid: [tint(own), 1], line: [own, 1, 1.2] },
+      face: { line: [own, 1, 3] },
+      roller: { solid: [body, 1], line: [ink, 1, 1.2] },
+      strand: { solid: [ink, 1] },
       link: { solid: [own, 1] },
       plate: { solid: [own, 0.28] },
       guide: { solid: [own, 0.22], line: [own, 0.9, 1] },
@@ -213,7 +217,19 @@ export class Stage {
       const color = piece.role === "center" ? piece.colour || this.colours.ink : this.colours.ink;
       out.push(new THREE.Points(geometry, new THREE.PointsMaterial({ color, size: 7 * Math.min(devicePixelRatio, 2), sizeAttenuation: false })));
     }
+    for (const one of out) one.userData = { scales: piece.scales };
     return out;
+  }
+
+  /** Details where they are large enough to be seen, else what stands for them. */
+  detail() {
+    const scale = (this.box.clientHeight * this.camera.zoom) / (this.camera.top - this.camera.bottom);
+    for (const group of this.frames) {
+      for (const solid of group.children) {
+        const [from, to] = solid.userData["scales"];
+        solid.visible = scale >= from && (!to || scale < to);
+      }
+    }
   }
 
   /**
@@ -404,6 +420,7 @@ export class Stage {
       ring.position.copy(this.place(ring.userData["frame"], ring.userData["at"]));
       ring.quaternion.copy(this.camera.quaternion);
     }
+    this.detail();
     this.renderer.render(this.scene, this.camera);
     const { clientWidth: width, clientHeight: height } = this.box;
     const wishes = this.labels.map(({ label, width: w, height: h }) => {
@@ -442,6 +459,15 @@ export class Stage {
 function lines(ends, color, opacity, linewidth) {
   const material = new THREE.LineMaterial({ color, opacity, transparent: opacity < 1, linewidth });
   return new THREE.LineSegments2(new THREE.LineSegmentsGeometry().setPositions(ends), material);
+}
+
+/**
+ * A color, mixed with white.
+ * @param {string} color of six hexadecimal digits
+ */
+function tint(color) {
+  const parts = [1, 3, 5].map((i) => Math.round(255 - 0.28 * (255 - parseInt(color.slice(i, i + 2), 16))));
+  return `#${parts.map((part) => part.toString(16).padStart(2, "0")).join("")}`;
 }
 
 /** @param {THREE.Object3D} group */

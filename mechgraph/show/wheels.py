@@ -1,0 +1,439 @@
+"""Gears, racks, worms and pulleys as they are drawn: pitch circles, involute teeth that interleave, belts around pulleys.
+
+A tooth at the radius r has half the angle ``psi(r) = pi / (2 z) + 2 x tan a / z + inv a_t - inv a_r``, ``cos a_r = r_b / r``, with the base
+radius r_b and ``inv a = tan a - a``. Inside a ring the same holds for the spaces.
+
+A span of a belt from pulley i to pulley j, which turn in the senses s (1 or -1) about one axis z, a distance D apart along e, runs along
+``t = cos g e - sin g (z x e)``, ``sin g = (s_j r_j - s_i r_i) / D``, and meets each pulley at ``c - s r (z x t)``.
+
+Source: Litvin and Fuentes, Gear Geometry and Applied Theory, 2004, chapter 10.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mechgraph.maths.se3 import Array
+from mechgraph.model.couplings import Axes, Belt, BevelGears, Contact, Rack, SpurGears, WormGear
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.show.shapes import Shape, polyline
+
+TIP, ROOT, RIM = 1.0, 1.25, 1.6
+"""Heights of teeth over and below the pitch line, and thickness of what bears them, over the module."""
+FLANK, AROUND, ARC = 5, 64, 25
+"""Points along a flank, around a circle, and along a belt on a pulley."""
+READABLE = 8.0
+"""Pixels from which on a tooth is drawn as one."""
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """Teeth, or the groove of a pulley (``teeth`` 0), on a link.
+
+    ``axes (3, 3)``: the direction of the first tooth, one at right angles, and the axis, as columns, in the link's frame; of a rack the
+    direction of its teeth, that in which they point, and across. ``phase``: by what part of a tooth the first one is off. ``radius``: of
+    the pitch circle; infinite of a rack. ``cone``: half the angle of the pitch cone. ``length``: of a rack or worm.
+    """
+
+    name: str
+    link: str
+    at: Array
+    axes: Array
+    teeth: float
+    radius: float
+    module: float
+    pressure: float = float(np.deg2rad(20.0))
+    helix: float = 0.0
+    shift: float = 0.0
+    internal: bool = False
+    width: float = 0.0
+    cone: float = 0.0
+    length: float = 0.0
+    phase: float = 0.0
+
+    @property
+    def is_rack(self) -> bool:
+        """Whether its teeth lie in a row."""
+        return bool(np.isinf(self.radius))
+
+    @property
+    def is_worm(self) -> bool:
+        """Whether its teeth wind around it."""
+        return abs(self.helix) > np.pi / 4 and not self.cone
+
+    @property
+    def outer(self) -> float:
+        """The greatest radius of what is drawn."""
+        if not self.teeth:
+            return self.radius
+        return self.radius + self.module * (ROOT + RIM if self.internal else TIP + self.shift)
+
+    def count(self, at: Array) -> Array:
+        """Which tooth is at points ``(..., 3)`` of the link, as a real number that grows about the axis; whole in the middle of teeth."""
+        x, y, z = np.moveaxis((np.asarray(at) - self.at) @ self.axes, -1, 0)
+        if self.is_rack:
+            return np.asarray((x - z * np.tan(self.helix)) / (np.pi * self.module) - self.phase)
+        return np.asarray(
+            self.teeth * (np.arctan2(y, x) - z * np.tan(self.helix) / self.radius) / (2 * np.pi) - self.phase
+        )
+
+    def extent(self) -> Array:
+        """Points that show where it is, in the link's frame."""
+        if self.is_rack:
+            return np.array([self.at + s * self.length / 2 * self.axes[:, 0] for s in (-1.0, 1.0)])
+        return _circle(self.outer) @ self.axes.T + self.at
+
+    # --- shapes --------------------------------------------------------------------------------------------------------
+
+    def flank(self) -> tuple[Array, Array]:
+        """Half the thickness of a tooth, over the pitch, and heights over the pitch line, from root to tip."""
+        m, x = self.module, self.shift
+        tip, root = (1.0 - x, -ROOT - x) if self.internal else (1.0 + x, -ROOT + x)
+        if self.is_rack:
+            h = np.linspace(-ROOT * m, TIP * m, FLANK)
+            return 0.25 - h * np.tan(self.pressure) / (np.pi * m), h
+        sign = -1.0 if self.internal else 1.0
+        transverse = np.arctan(np.tan(self.pressure) / np.cos(self.helix))
+        base = self.radius * np.cos(transverse)
+        low, high = self.radius + sign * root * m, self.radius + sign * tip * m
+        r = (
+            np.linspace(max(low, base), max(high, base), FLANK)
+            if sign > 0
+            else np.linspace(low, max(high, base), FLANK)
+        )
+        angle = np.arccos(np.clip(base / r, -1.0, 1.0))
+        inv = np.tan(transverse) - transverse - (np.tan(angle) - angle)
+        half = 0.25 + (2.0 * x * np.tan(self.pressure) + self.teeth * inv) / (2 * np.pi)
+        if self.internal:
+            half = 0.5 - half
+        if low < base and sign > 0:
+            half, r = np.append(half[0], half), np.append(low, r)
+        return np.clip(half, 0.02, 0.48), r - self.radius
+
+    def place(self, u: Array, h: Array, s: float) -> Array:
+        """Points ``(n, 3)`` of the link at places ``u`` along the pitch line, in teeth, heights over it, and ``s`` across."""
+        if self.is_rack:
+            local = np.stack(
+                [np.pi * self.module * (u + self.phase) + s * np.tan(self.helix), h + 0 * u, s + 0 * u], axis=-1
+            )
+        else:
+            turn = 2 * np.pi * (u + self.phase) / max(self.teeth, 1.0)
+            rho, z, more = self.radius + h, s + 0 * u, s * np.tan(self.helix) / self.radius
+            if self.cone:
+                apex = -self.radius / np.tan(self.cone)
+                scale = 1.0 + s * np.sin(self.cone) / self.radius
+                rho = scale * (self.radius + h * np.cos(self.cone))
+                z = apex + scale * (-h * np.sin(self.cone) - apex) + 0 * u
+                more = np.tan(self.helix) * np.log(scale) / np.sin(self.cone)
+            local = np.stack([rho * np.cos(turn + more), rho * np.sin(turn + more), z], axis=-1)
+        return np.asarray(local @ self.axes.T + self.at)
+
+    def _levels(self, flat: bool) -> tuple[float, ...]:
+        """Where across the face it is cut: in the middle alone of a plane drawing."""
+        if flat:
+            return (0.0,)
+        width = self.width or min(
+            8.0 * self.module if self.teeth else 0.25 * self.radius, 0.6 * min(self.radius, self.length or np.inf)
+        )
+        return (-width, 0.0) if self.cone else (-width / 2, width / 2)
+
+    def toothed(self, flat: bool) -> Shape:
+        """Its teeth on their body, with the outline as a line where it is flat."""
+        if self.is_worm:
+            return self._thread()
+        half, h = self.flank()
+        n = len(half)
+        if self.is_rack:
+            first = np.ceil(-self.length / (2 * np.pi * self.module) - self.phase)
+            k = first + np.arange(max(int(self.length / (np.pi * self.module)), 1))
+        else:
+            k = np.arange(int(self.teeth))
+        u = (k[:, None] + np.concatenate([-half, half[::-1]])).ravel()
+        return self._solid(u, np.tile(np.concatenate([h, h[::-1]]), len(k)), n, flat)
+
+    def plain(self, flat: bool) -> Shape:
+        """Its pitch circle as a disc, a ring or a bar, where teeth are too small to be seen; what a pulley is."""
+        if self.is_worm:
+            return self._thread()
+        if self.is_rack:
+            return self._solid(
+                np.array([-0.5, 0.5]) * self.length / (np.pi * self.module) - self.phase, np.zeros(2), 1, flat
+            )
+        u = np.arange(AROUND) / AROUND * max(self.teeth, 1.0)
+        return self._solid(u, np.zeros(AROUND), 1, flat)
+
+    def _solid(self, u: Array, h: Array, n: int, flat: bool) -> Shape:
+        """Convex faces of teeth with ``n`` points a flank (1: none) on a disc, ring or bar, between the levels."""
+        behind = self.is_rack or self.internal
+        levels = self._levels(flat)
+        count, teeth = len(u), len(u) // (2 * n)
+        sheets = [self.place(u, h, s) for s in levels]
+        base = np.arange(teeth) * 2 * n
+        feet = np.stack([base, base + 2 * n - 1], axis=1).ravel() if n > 1 else np.arange(count)
+        faces: list[tuple[int, ...]] = [
+            (b + i, b + i + 1, b + 2 * n - 2 - i, b + 2 * n - 1 - i) for b in base.tolist() for i in range(n - 1)
+        ]
+        closed = not self.is_rack
+        around = [*zip(feet.tolist(), np.roll(feet, -1).tolist(), strict=True)][: len(feet) if closed else -1]
+        if behind:
+            back = (self.module * RIM) * (-1.0 if self.is_rack else 1.0) + h[feet[0]]
+            rest = [self.place(u[feet], np.full(len(feet), back), s) for s in levels]
+            sheets = [np.concatenate(both) for both in zip(sheets, rest, strict=True)]
+            number = {int(f): count + i for i, f in enumerate(feet)}
+            faces += [(i, j, number[j], number[i]) for i, j in around]
+            rim = list(range(count, count + len(feet)))
+        else:
+            faces.append(tuple(feet.tolist()))
+            rim = []
+        loop = list(range(count))
+        runs = (
+            [[*loop, *rim[::-1], loop[0]]] if self.is_rack else [[*loop, loop[0]], *([[*rim, rim[0]]] if rim else [])]
+        )
+        if flat:
+            return Shape(sheets[0], tuple(faces), tuple(map(tuple, runs)))
+        size = len(sheets[0])
+        both = [tuple(i + size * side for i in face) for side in (0, 1) for face in faces]
+        both += [(i, j, j + size, i + size) for run in runs for i, j in pairwise(run)]
+        return Shape(np.concatenate(sheets), tuple(both))
+
+    def _thread(self) -> Shape:
+        """A worm: trapezoids along its axis that wind around it."""
+        m = self.module
+        pitch = 2 * np.pi * self.radius / (np.tan(abs(self.helix)) * self.teeth)
+        h = m * np.array([-ROOT, TIP, TIP, -ROOT])
+        half = pitch / 4 - h[:2] * np.tan(self.pressure)
+        z = np.concatenate([-half, half[::-1]])
+        starts = np.arange(np.floor(-self.length / (2 * pitch)), np.ceil(self.length / (2 * pitch)) + 1) * pitch
+        z, rho = (starts[:, None] + z).ravel(), self.radius + np.tile(h, len(starts))
+        turn = np.linspace(0.0, 2 * np.pi, AROUND // 2 + 1)
+        shift = np.sign(self.helix) * pitch * self.teeth * (turn - 2 * np.pi * self.phase / self.teeth) / (2 * np.pi)
+        along = np.clip(z + (shift % pitch)[:, None], -self.length / 2, self.length / 2)
+        local = np.stack([rho * np.cos(turn)[:, None], rho * np.sin(turn)[:, None], along], axis=-1)
+        rows, n = local.shape[:2]
+        faces = [
+            (i * n + j, i * n + j + 1, (i + 1) * n + j + 1, (i + 1) * n + j)
+            for i in range(rows - 1)
+            for j in range(n - 1)
+        ]
+        ends = [tuple(i * n + j for i in range(rows - 1)) for j in (0, n - 1)]
+        return Shape(local.reshape(-1, 3) @ self.axes.T + self.at, (*faces, *ends))
+
+    def pitch_line(self, flat: bool) -> Shape:
+        """The pitch circle, or line of a rack, in front of its teeth."""
+        if self.is_rack:
+            ends = np.array([-0.5, 0.5]) * self.length / (np.pi * self.module) - self.phase
+            return polyline(self.place(ends, np.zeros(2), self._levels(flat)[-1]))
+        u = np.linspace(0.0, max(self.teeth, 1.0), AROUND + 1)
+        return polyline(self.place(u, np.zeros(AROUND + 1), self._levels(flat)[-1]))
+
+    def mark(self, flat: bool) -> Shape:
+        """A short line at its zero, which shows that it turns."""
+        low, high = (1.02, 1.08) if self.internal else (0.5, 0.8)
+        run = np.outer(np.array([low, high]) * self.radius, self.axes[:, 0]) + self.at
+        return polyline(run + self._levels(flat)[-1] * self.axes[:, 2])
+
+
+def _circle(radius: float) -> Array:
+    turn = np.arange(16) * np.pi / 8
+    return radius * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+
+
+class DrawnMesh(NamedTuple):
+    """Two wheels by number, the pitch point and the direction in which both pitch lines run there, global."""
+
+    a: int
+    b: int
+    point: Array
+    along: Array
+
+
+def interleaved(wheels: Sequence[Wheel], meshes: Iterable[DrawnMesh], poses: Mapping[str, Array]) -> list[Wheel]:
+    """The wheels turned so far that teeth stand in the gaps of those with which they mesh, at poses ``(3, 4)`` of the links.
+
+    From wheel to wheel: where meshes close a ring, the last one shows whether the teeth fit.
+    """
+    out, fixed, left = list(wheels), set[int](), list(meshes)
+    while left:
+        mesh = next((one for one in left if one.a in fixed or one.b in fixed), left[0])
+        left.remove(mesh)
+        known, other = (mesh.b, mesh.a) if mesh.b in fixed and mesh.a not in fixed else (mesh.a, mesh.b)
+        if other in fixed:
+            continue
+        fixed |= {known, other}
+        place, sense = {}, {}
+        for i in (known, other):
+            X = poses[out[i].link]
+            step = 1e-4 * max(out[i].module, 1e-12) * mesh.along
+            here, ahead = ((p - X[:, 3]) @ X[:, :3] for p in (mesh.point, mesh.point + step))
+            place[i] = float(out[i].count(here))
+            sense[i] = float(np.sign(out[i].count(ahead) - place[i]))
+        off = sense[other] * (sense[known] * place[known] + 0.5)
+        out[other] = replace(out[other], phase=out[other].phase + (place[other] - off) % 1.0)
+    return out
+
+
+def belt_path(centers: Array, axis: Array, radii: Sequence[float], senses: Sequence[float]) -> tuple[Array, Array]:
+    """Points ``(T, n ARC, 3)`` of a closed belt over pulleys with ``centers (n, T, 3)``, which turn about ``axis (T, 3)`` in their senses.
+
+    And the span of every piece behind a point: ``k`` from pulley k to the next one, ``k - 0.5`` on pulley k.
+    """
+    n = len(radii)
+    runs = []
+    for i in range(n):
+        j = (i + 1) % n
+        d = centers[j] - centers[i]
+        d = d - (d * axis).sum(axis=1, keepdims=True) * axis
+        D = np.linalg.norm(d, axis=1, keepdims=True)
+        e = d / D
+        sine = (senses[j] * radii[j] - senses[i] * radii[i]) / D
+        runs.append(np.sqrt(np.maximum(1.0 - sine**2, 0.0)) * e - sine * np.cross(axis, e))
+    points, number = [], []
+    for i in range(n):
+        before, behind = runs[i - 1], runs[i]
+        turn = np.arctan2((np.cross(before, behind) * axis).sum(axis=1), (before * behind).sum(axis=1))
+        wrap = senses[i] * ((senses[i] * turn + 1e-9) % (2 * np.pi) - 1e-9)
+        for part in np.linspace(0.0, 1.0, ARC):
+            a = (part * wrap)[:, None]
+            t = np.cos(a) * before + np.sin(a) * np.cross(axis, before)
+            points.append(centers[i] - senses[i] * radii[i] * np.cross(axis, t))
+            number.append(i - 0.5 if part < 1.0 else float(i))
+    return np.stack(points, axis=1), np.array(number)
+
+
+class DrawnBelt(NamedTuple):
+    """A belt over wheels by number, in order, which it turns in the ``senses``; global."""
+
+    name: str
+    over: tuple[int, ...]
+    senses: tuple[float, ...]
+
+
+class Seat(NamedTuple):
+    """Where a gear sits: its link, the pose ``(3, 4)`` of that, a point of its axis and its axes as columns, global."""
+
+    link: str
+    pose: Array
+    point: Array
+    axes: Array
+
+    def wheel(
+        self, name: str, at: Array, axes: Array, teeth: float, radius: float, module: float, **more: Any
+    ) -> Wheel:
+        """A wheel with its middle ``at`` a global point."""
+        R = self.pose[:, :3]
+        return Wheel(name, self.link, (at - self.pose[:, 3]) @ R, R.T @ axes, teeth, radius, module, **more)
+
+
+def gears_of(m: Mechanism, poses: Mapping[str, Array]) -> tuple[list[Wheel], list[DrawnMesh], list[DrawnBelt]]:
+    """Wheels of all gears and belts, one where several share it, with meshes and belts; with the links at poses ``(3, 4)``."""
+    wheels: list[Wheel] = []
+    meshes, belts = [], []
+
+    def number(new: Wheel) -> int:
+        for i, old in enumerate(wheels):
+            same = (old.link, old.teeth) == (new.link, new.teeth) and np.isclose(old.radius, new.radius)
+            if same and np.allclose(
+                old.at, new.at, atol=1e-6 * min(new.radius, 1e6 * new.module)
+            ):  # the same wheel, but for rounding
+                return i
+        wheels.append(new)
+        return len(wheels) - 1
+
+    for c in m.couplings:
+        if not isinstance(c, Contact):
+            continue
+        seats = [_seat(m, poses, q, link) for q, link in zip((c.a, c.b), c.gears(m), strict=True)]
+        p, z, q, w = (v[:, None] for seat in seats for v in (seat.point, seat.axes[:, 2]))
+        P = c.lines(Axes(p, z, q, w))[0][:, 0, 0]
+        a, b = (number(wheel) for wheel in DRAWN[type(c)](c, P, *seats))
+        if isinstance(c, Belt):
+            belts.append(DrawnBelt(c.name, (a, b), (1.0, -1.0 if c.crossed else 1.0)))
+        else:
+            along = np.cross(seats[0].axes[:, 2], P - seats[0].point)
+            meshes.append(DrawnMesh(a, b, P, along / np.linalg.norm(along)))
+    return interleaved(wheels, meshes, poses), meshes, belts
+
+
+def _seat(m: Mechanism, poses: Mapping[str, Array], freedom: str, link: str) -> Seat:
+    pair = m.pairs[m.freedom(freedom)[0]]
+    X, pose = pair.markers[int(pair.b == link)].pose(), poses[link]
+    return Seat(link, pose, pose[:, :3] @ X[:, 3] + pose[:, 3], pose[:, :3] @ X[:, :3])
+
+
+def _foot(seat: Seat, P: Array) -> tuple[Array, float]:
+    """The middle of the wheel that has a pitch point, and its radius."""
+    z = seat.axes[:, 2]
+    at = seat.point + ((P - seat.point) @ z) * z
+    return at, float(np.linalg.norm(P - at))
+
+
+def _spur(c: Any, P: Array, *seats: Seat) -> Iterator[Wheel]:
+    for k, seat in enumerate(seats):
+        at, r = _foot(seat, P)
+        teeth, helix = c.teeth[k], c.rims[k][2]
+        more = {"pressure": c.pressure_angle, "helix": helix, "internal": c.internal and teeth == max(c.teeth)}
+        yield seat.wheel(f"{c.name}.{'ab'[k]}", at, seat.axes, teeth, r, 2 * r * np.cos(helix) / teeth, **more)
+
+
+def _bevel(c: Any, P: Array, *seats: Seat) -> Iterator[Wheel]:
+    (p, z), (q, w) = ((seat.point, seat.axes[:, 2]) for seat in seats)
+    apex = p + np.linalg.lstsq(np.stack([z, -w], axis=1), q - p)[0][0] * z
+    for k, seat in enumerate(seats):
+        at, r = _foot(seat, P)
+        side = np.sign((at - apex) @ seat.axes[:, 2]) or 1.0
+        cone = np.arctan2(r, abs((at - apex) @ seat.axes[:, 2]))
+        more = {"pressure": c.pressure_angle, "helix": (-1.0) ** k * c.spiral_angle, "cone": float(cone)}
+        yield seat.wheel(
+            f"{c.name}.{'ab'[k]}", at, seat.axes @ np.diag([1.0, side, side]), c.teeth[k], r, c.module, **more
+        )
+
+
+def _worm(c: Any, P: Array, worm: Seat, wheel: Seat) -> Iterator[Wheel]:
+    at, r = _foot(wheel, P)
+    axial, hand = 2 * r / c.teeth[1], -1.0 if c.left_hand else 1.0
+    lead = np.arctan2(axial * c.teeth[0], 2 * c.radius)
+    m, reach = (
+        axial * np.cos(lead),
+        2 * np.sqrt(2 * r * axial),
+    )  # as long as the tips of the wheel reach into it, and some more
+    more = {"pressure": c.pressure_angle, "helix": hand * (np.pi / 2 - lead), "length": reach + 2 * axial}
+    yield worm.wheel(f"{c.name}.a", _foot(worm, P)[0], worm.axes, c.teeth[0], c.radius, m, **more)
+    yield wheel.wheel(
+        f"{c.name}.b",
+        at,
+        wheel.axes,
+        c.teeth[1],
+        r,
+        m,
+        pressure=c.pressure_angle,
+        helix=hand * lead,
+        width=1.4 * c.radius,
+    )
+
+
+def _rack(c: Any, P: Array, pinion: Seat, rack: Seat) -> Iterator[Wheel]:
+    at, x = _foot(pinion, P)[0], rack.axes[:, 2]
+    y = (at - P) / np.linalg.norm(at - P)
+    yield pinion.wheel(f"{c.name}.a", at, pinion.axes, 0, c.radius, 0.1 * c.radius)
+    yield rack.wheel(
+        f"{c.name}.b", P, np.column_stack([x, y, np.cross(x, y)]), 0, np.inf, 0.1 * c.radius, length=6.0 * c.radius
+    )
+
+
+def _pulleys(c: Any, P: Array, *seats: Seat) -> Iterator[Wheel]:
+    for k, seat in enumerate(seats):
+        z = seat.axes[:, 2]
+        yield seat.wheel(
+            f"{c.name}.{'ab'[k]}", seat.point + ((P - seat.point) @ z) * z, seat.axes, 0, c.radii[k], 0.05 * c.radii[k]
+        )
+
+
+DRAWN: dict[type[Contact], Callable[..., Iterator[Wheel]]] = {
+    SpurGears: _spur, BevelGears: _bevel, WormGear: _worm, Rack: _rack, Belt: _pulleys,
+}  # fmt: skip
+"""The wheels of a coupling from its pitch point and where both sit, by its class."""
