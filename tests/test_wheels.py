@@ -148,7 +148,7 @@ def test_length_and_wrap_of_belts() -> None:
         steps = np.linalg.norm(np.diff(np.concatenate([path, path[:, :1]], axis=1), axis=1), axis=2)[0]
         on = number % 1 > 0
         # arcs are drawn by chords: c = 2 r sin(arc / 2 r)
-        r = np.array([radii[int(k + 0.5) % 2] for k in number[on]])
+        r = np.array([radii[int(np.ceil(k)) % 2] for k in number[on]])
         assert steps[~on].sum() + (2 * r * np.arcsin(steps[on] / (2 * r))).sum() == pytest.approx(length, abs=1e-4)
         if senses == (1.0, 1.0):
             first = r == radii[0]

@@ -349,7 +349,7 @@ def gearing(stage: DrawnPose, solution: Solution | None, positions: Any) -> Iter
             often = (0.0, READABLE / (np.pi * wheel.module))
             yield DrawnPart("wheel", wheel.name, wheel.link, frame, wheel.toothed(flat), scales=(often[1], np.inf))
         yield DrawnPart("wheel", wheel.name, wheel.link, frame, wheel.plain(flat), scales=often)
-        if not wheel.is_worm:
+        if wheel.teeth and not wheel.is_worm:
             yield DrawnPart("axis", wheel.name, wheel.link, frame, wheel.pitch_line(flat))
         if not wheel.is_rack:
             yield DrawnPart("wheel", wheel.name, wheel.link, frame, wheel.mark(flat))
@@ -363,7 +363,8 @@ def gearing(stage: DrawnPose, solution: Solution | None, positions: Any) -> Iter
         most = float(np.nanmax(pull, initial=0.0)) or 1.0
         for i, k in enumerate(span):
             # half the width of a belt over a symbol: slack, and with the greatest tension
-            width = stage.symbol * (0.07 + 0.13 * 0.5 * (pull[:, int(np.floor(k))] + pull[:, int(np.ceil(k))]) / most)
+            tension = (1.0 - k % 1.0) * pull[:, int(np.floor(k))] + k % 1.0 * pull[:, int(np.ceil(k))]
+            width = stage.symbol * (0.07 + 0.13 * tension / most)
             frame = f"belt:{belt.name}:{i}"
             stage.frames[frame] = stretched(along[:, i], path[:, i], np.linalg.norm(along[:, i], axis=1), width)
             yield DrawnPart("strand", belt.name, "", frame, shapes.prism(6, 1.0, 0.0, 1.0))

@@ -280,7 +280,7 @@ def interleaved(wheels: Sequence[Wheel], meshes: Iterable[DrawnMesh], poses: Map
 def belt_path(centers: Array, axis: Array, radii: Sequence[float], senses: Sequence[float]) -> tuple[Array, Array]:
     """Points ``(T, n ARC, 3)`` of a closed belt over pulleys with ``centers (n, T, 3)``, which turn about ``axis (T, 3)`` in their senses.
 
-    And the span of every piece behind a point: ``k`` from pulley k to the next one, ``k - 0.5`` on pulley k.
+    And the span of every piece behind a point: ``k`` from pulley k to the next one, from ``k - 1`` to ``k`` on pulley k.
     """
     n = len(radii)
     runs = []
@@ -297,11 +297,11 @@ def belt_path(centers: Array, axis: Array, radii: Sequence[float], senses: Seque
         before, behind = runs[i - 1], runs[i]
         turn = np.arctan2((np.cross(before, behind) * axis).sum(axis=1), (before * behind).sum(axis=1))
         wrap = senses[i] * ((senses[i] * turn + 1e-9) % (2 * np.pi) - 1e-9)
-        for part in np.linspace(0.0, 1.0, ARC):
-            a = (part * wrap)[:, None]
+        for j in range(ARC):
+            a = (j / (ARC - 1) * wrap)[:, None]
             t = np.cos(a) * before + np.sin(a) * np.cross(axis, before)
             points.append(centers[i] - senses[i] * radii[i] * np.cross(axis, t))
-            number.append(i - 0.5 if part < 1.0 else float(i))
+            number.append(float(i) if j == ARC - 1 else i - 1 + (j + 0.5) / (ARC - 1))
     return np.stack(points, axis=1), np.array(number)
 
 
