@@ -138,6 +138,22 @@ def test_a_spring_along_a_direction_is_drawn_along_it() -> None:
     np.testing.assert_allclose(X[:, :, 2], [[2, 0, 0], [3, 0, 0]], atol=1e-12)
 
 
+def test_mass_centers_are_left_out_where_asked() -> None:
+    m = mg.load("four-bar")
+    assert {p.role for p in scene(m).parts} - {p.role for p in scene(m, centers=False).parts} == {"center", "tie"}
+
+
+def test_a_guide_of_a_plane_mechanism_stands_on_hatched_ground() -> None:
+    """Under its guide, as long as that; a pin of the frame keeps its foot, and there is none at the slide."""
+    found = scene(mg.kinematics(mg.load("slider-crank")))
+    guide, *feet = parts(found, "guide") + parts(found, "foot")
+    ground = [foot for foot in feet if foot.frame.startswith("pair:")]
+    assert (len(feet), len(ground)) == (2, 1)
+    along = [found.vertices(part, 0)[:, 0] for part in (guide, ground[0])]
+    assert along[1].max() == pytest.approx(along[0].max())
+    assert found.vertices(ground[0], 0)[:, 1].max() == pytest.approx(found.vertices(guide, 0)[:, 1].min())
+
+
 def test_reactions_of_a_plane_mechanism_are_drawn_in_its_plane_and_others_only_where_unique() -> None:
     """Along the axes of a four-bar nothing is unique, in its plane all is; a spherical one has no force that is known."""
     s = mg.solve(mg.load("four-bar"))

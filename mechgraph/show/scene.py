@@ -86,10 +86,11 @@ class Scene:
         return np.asarray(X[:, :3] @ label.at + X[:, 3])
 
 
-def scene(drawn: Solution | Mechanism, *, forces: bool = False) -> Scene:
+def scene(drawn: Solution | Mechanism, *, forces: bool = False, centers: bool = True) -> Scene:
     """The scene of a solution at its solved positions, or of a mechanism where its loops are closed.
 
-    ``forces`` adds the reaction forces of the pairs (on link b, at its marker) as arrows, where the solution has forces.
+    ``forces`` adds the reaction forces of the pairs (on link b, at its marker) as arrows, where the solution has forces; ``centers`` are
+    the mass centers.
 
     Raises
     ------
@@ -98,9 +99,12 @@ def scene(drawn: Solution | Mechanism, *, forces: bool = False) -> Scene:
     """
     if isinstance(drawn, Mechanism):
         system, x = assembled(drawn)
-        return scene_at(drawn, place_of_states(system, x[:, None]), np.zeros(1, dtype=np.intp))
-    good, place = place_of(drawn)
-    return scene_at(drawn.mechanism, place, good, drawn, forces=forces)
+        found = scene_at(drawn, place_of_states(system, x[:, None]), np.zeros(1, dtype=np.intp))
+    else:
+        good, place = place_of(drawn)
+        found = scene_at(drawn.mechanism, place, good, drawn, forces=forces)
+    shown = found.parts if centers else tuple(part for part in found.parts if part.role not in ("center", "tie"))
+    return replace(found, parts=shown)
 
 
 def place_of(s: Solution) -> tuple[Any, DrawnPlace]:

@@ -74,6 +74,7 @@ def draw_skeleton(
     traces: bool | Sequence[str] = True,
     labels: bool = True,
     forces: bool = False,
+    centers: bool = True,
     highlight: Sequence[str | tuple[str, int]] = (),
     view: tuple[float, float] = (24.0, -58.0),
 ) -> Any:
@@ -101,6 +102,8 @@ def draw_skeleton(
         Names of pairs (with their type) and links.
     forces : bool
         Arrows of the reaction forces of link a on link b; hatched if the force is indeterminate.
+    centers : bool
+        Mass centers.
     highlight : sequence
         Names of pairs, or a loop (``report.loops[0]``); all other links are gray.
     view : (2,) tuple of float
@@ -125,7 +128,7 @@ def draw_skeleton(
     >>> from mechgraph import show
     >>> ax = show.draw_skeleton(mg.load("four-bar"))
     """
-    found = scene(s, forces=forces)
+    found = scene(s, forces=forces, centers=centers)
     m, size = found.mechanism, 1 if isinstance(s, Mechanism) else int(np.asarray(s.status).size)
     chosen = [item if isinstance(item, str) else item[0] for item in highlight]
     names = [p.name for p in m.pairs]
@@ -389,6 +392,7 @@ def animate(
     frames: int | Sequence[int] | None = None,
     fps: Positive = 20.0,
     forces: bool = False,
+    centers: bool = True,
     traces: bool | Sequence[str] = True,
     labels: bool = True,
     view: tuple[float, float] = (24.0, -58.0),
@@ -410,7 +414,7 @@ def animate(
         Number of frames, evenly spread over the solved positions, or flat indices of positions. Default: all, at most 72.
     fps : float
         Frames per second.
-    forces, traces, labels, view
+    forces, centers, traces, labels, view
         As in ``draw_skeleton``.
     size, dpi
         Of a frame: inches, and pixels per inch.
@@ -438,7 +442,7 @@ def animate(
     """
     target = format_of(path, FORMATS)
     writable(path)
-    found = scene(s, forces=forces)
+    found = scene(s, forces=forces, centers=centers)
     chosen = _chosen(found, frames)
     if faults := trace_faults(found, traces):
         raise DeclarationError(f"animation of {found.mechanism.name!r}", faults)
