@@ -257,14 +257,25 @@ def interleaved(wheels: Sequence[Wheel], meshes: Iterable[DrawnMesh], poses: Map
 
     From wheel to wheel: where meshes close a ring, the last one shows whether the teeth fit.
     """
-    out, fixed, left = list(wheels), set[int](), list(meshes)
-    while left:
-        mesh = next((one for one in left if one.a in fixed or one.b in fixed), left[0])
-        left.remove(mesh)
-        known, other = (mesh.b, mesh.a) if mesh.b in fixed and mesh.a not in fixed else (mesh.a, mesh.b)
-        if other in fixed:
+    out, fixed = list(wheels), set[int]()
+    met: dict[int, list[DrawnMesh]] = {}
+    for mesh in meshes:
+        met.setdefault(mesh.a, []).append(mesh)
+        met.setdefault(mesh.b, []).append(mesh)
+    reached: list[tuple[int, int, DrawnMesh]] = []
+    for first in met:
+        if first in fixed:
             continue
-        fixed |= {known, other}
+        fixed.add(first)
+        queue = [first]
+        for known in queue:
+            for mesh in met[known]:
+                other = mesh.a + mesh.b - known
+                if other not in fixed:
+                    fixed.add(other)
+                    queue.append(other)
+                    reached.append((known, other, mesh))
+    for known, other, mesh in reached:
         place, sense = {}, {}
         for i in (known, other):
             X = poses[out[i].link]
@@ -332,17 +343,19 @@ class Seat(NamedTuple):
 def gears_of(m: Mechanism, poses: Mapping[str, Array]) -> tuple[list[Wheel], list[DrawnMesh], list[DrawnBelt]]:
     """Wheels of all gears and belts, one where several share it, with meshes and belts; with the links at poses ``(3, 4)``."""
     wheels: list[Wheel] = []
+    on_link: dict[str, list[int]] = {}
     meshes, belts = [], []
 
     def number(new: Wheel) -> int:
-        for i, old in enumerate(wheels):
-            same = (old.link, old.teeth) == (new.link, new.teeth) and np.isclose(old.radius, new.radius)
-            if same and np.allclose(
-                old.at, new.at, atol=1e-6 * min(new.radius, 1e6 * new.module)
-            ):  # the same wheel, but for rounding
+        own = on_link.setdefault(new.link, [])
+        for i in own:
+            old = wheels[i]
+            near = 1e-6 * min(new.radius, 1e6 * new.module)  # the same wheel, but for rounding
+            if old.teeth == new.teeth and np.isclose(old.radius, new.radius) and np.allclose(old.at, new.at, atol=near):
                 return i
         wheels.append(new)
-        return len(wheels) - 1
+        own.append(len(wheels) - 1)
+        return own[-1]
 
     for c in m.couplings:
         if not isinstance(c, Contact):
