@@ -290,7 +290,7 @@ class DrawnPose:
         return np.asarray(self.m.link(link).point(point) if isinstance(point, str) else point, dtype=float)
 
     def corners(self, link: str) -> list[Array]:
-        """What a link joins, in its own frame: points of the pairs that bear it, and where springs and other laws hold it.
+        """What a link joins, in its own frame: points of the pairs that bear it, middles of its gears, and where springs hold it.
 
         Not where something runs on its profile, which is drawn as such, nor where a guide of its own stands on the ground.
         """
@@ -306,8 +306,10 @@ class DrawnPose:
         )
         laws = (load for load in self.m.loads if isinstance(load, Law) and load.between_links)
         held = ((end, p) for load in laws for end, p in ((load.a, load.p), (load.b, load.q)) if end == link)
+        shafts = (w.at for w in self.wheels if w.link == link and link != self.m.frame and not w.is_rack)
         return [
             *(np.asarray(marker.point, dtype=float) for name, marker in ends if name == link),
+            *shafts,
             *(self.local(link, p) for _, p in held),
         ]
 

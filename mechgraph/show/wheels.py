@@ -138,7 +138,7 @@ class Wheel:
         if flat:
             return (0.0,)
         width = self.width or min(
-            8.0 * self.module if self.teeth else 0.25 * self.radius, 0.6 * min(self.radius, self.length or np.inf)
+            6.0 * self.module if self.teeth else 0.25 * self.radius, 0.6 * min(self.radius, self.length or np.inf)
         )
         return (-width, 0.0) if self.cone else (-width / 2, width / 2)
 
