@@ -492,3 +492,11 @@ def test_the_command_line_takes_the_plane() -> None:
     spatial = run("check", "rcsr", "--planar")
     assert spatial.returncode == 2
     assert "does not move in a plane" in spatial.stderr
+
+
+def test_sizes_of_forces_where_positions_are_out_of_reach() -> None:
+    """The self-stresses of a spatial four-bar are NaN where it was not solved, and so is the size; no error."""
+    m = mg.load("four-bar").replace(drives=["D"])
+    s = mg.solve(m, {"D": [0.1, 3.0]}, on_reach="flag")
+    assert s.status[1] != "ok"
+    assert np.isfinite(s["A"].magnitude).tolist() == [True, False]

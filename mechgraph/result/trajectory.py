@@ -107,7 +107,7 @@ def _sizes(states: Array) -> Array:
     vectors, stress = states[:, 0], np.moveaxis(states[:, 1:], -1, 0)
     if not stress.shape[-1]:
         return np.asarray(np.linalg.norm(vectors, axis=0))
-    ways, sizes, _ = np.linalg.svd(stress, full_matrices=False)
+    ways, sizes, _ = np.linalg.svd(np.nan_to_num(stress), full_matrices=False)  # NaN where a position was not solved, as its vectors
     loose = sizes > STRESSES.unique
     along = np.einsum("tij,it->tj", ways, vectors) * loose
     left = vectors - np.einsum("tij,tj->it", ways, along)
