@@ -20,6 +20,7 @@ from mechgraph.errors import (
     DeadPointError,
     DeclarationError,
     FileError,
+    FrictionError,
     IndeterminateError,
     MechgraphError,
     MechgraphWarning,
@@ -47,6 +48,7 @@ from mechgraph.maths import inertia
 from mechgraph.maths.tolerances import Tolerances
 from mechgraph.model import parts
 from mechgraph.model.couplings import Belt, BevelGears, Coupling, Rack, SpurGears, WormGear
+from mechgraph.model.friction import Friction
 from mechgraph.model.loads import Damper, Effort, ForceLaw, ForceTable, Gravity, Spring, TorsionSpring, Wrench
 from mechgraph.model.mechanism import Mechanism, chain
 from mechgraph.model.motion import Drive, Motion
@@ -78,15 +80,15 @@ __all__ = [
     "Assemblies", "AssembliesOver", "AssemblyError", "Belt", "BevelGears", "Bookkeeping", "Branches", "Chain",
     "Compiled", "Component", "ContentError", "Coupling", "Curve", "Damper", "DeadPointError", "DeclarationError",
     "Decomposition", "DeterminacyReport", "Drive", "Effort", "Event", "Families", "FileError", "ForceLaw",
-    "ForceTable", "Formulation", "FreeBody", "Freedom", "Gravity", "Group", "Hertz", "Identity", "IndeterminateError",
-    "Journal", "Link", "Marker", "Mechanism", "MechgraphError", "MechgraphWarning", "Misfit", "MissingExtraError", "Motion",
-    "MultipleJoint", "OverTime", "Pair", "PairType", "Rack", "ReachError", "Response", "ResponseError",
-    "ResponseSetup", "ShapeError", "Solution", "Spring", "SpurGears", "Stiffness", "Stop", "Structure", "Study", "StudyError",
-    "Surface", "SystemGroup", "Tolerances", "TorsionSpring", "Transmission", "WormGear", "Wrench", "assemble",
-    "assemblies", "atlas", "branches", "chain", "check", "compile", "equilibrium", "formulate", "free_body", "groups",
-    "identify", "inertia", "kinematics", "library", "linearize", "load", "load_chains", "multiple_joints",
-    "over_time", "pair_types", "parts", "respond", "save", "save_chains", "solve", "split_joint", "structure", "study",
-    "system_groups", "transmission", "write_report",
+    "ForceTable", "Formulation", "FreeBody", "Freedom", "Friction", "FrictionError", "Gravity", "Group", "Hertz",
+    "Identity", "IndeterminateError", "Journal", "Link", "Marker", "Mechanism", "MechgraphError", "MechgraphWarning",
+    "Misfit", "MissingExtraError", "Motion", "MultipleJoint", "OverTime", "Pair", "PairType", "Rack", "ReachError",
+    "Response", "ResponseError", "ResponseSetup", "ShapeError", "Solution", "Spring", "SpurGears", "Stiffness",
+    "Stop", "Structure", "Study", "StudyError", "Surface", "SystemGroup", "Tolerances", "TorsionSpring",
+    "Transmission", "WormGear", "Wrench", "assemble", "assemblies", "atlas", "branches", "chain", "check", "compile",
+    "equilibrium", "formulate", "free_body", "groups", "identify", "inertia", "kinematics", "library", "linearize",
+    "load", "load_chains", "multiple_joints", "over_time", "pair_types", "parts", "respond", "save", "save_chains",
+    "solve", "split_joint", "structure", "study", "system_groups", "transmission", "write_report",
 ]  # fmt: skip
 
 

@@ -268,6 +268,32 @@ class ReachError(PathError):
     """
 
 
+class FrictionError(PathError):
+    """A position has no finite forces with friction.
+
+    Attributes: ``kind``, ``"jams"`` or ``"no finite force"``; ``factor``, by how much friction would have to fall; ``solution``.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> mg.FrictionError("jams", {"A.Rz": 0.0}, kind="jams", factor=0.8).factor
+    0.8
+    """
+
+    def __init__(
+        self, message: str, value: dict[str, float], solution: Any = None, *, kind: str = "jams", factor: float = 1.0
+    ) -> None:
+        super().__init__(message, value, solution)
+        self.kind, self.factor = kind, factor
+
+    def __reduce__(self) -> Any:
+        return _remade_friction, (str(self), self.value, self.solution, self.kind, self.factor)
+
+
+def _remade_friction(message: str, value: dict[str, float], solution: Any, kind: str, factor: float) -> FrictionError:
+    return FrictionError(message, value, solution, kind=kind, factor=factor)
+
+
 class DeadPointError(PathError):
     """The drivers do not determine the motion at this position (dead point or change point).
 

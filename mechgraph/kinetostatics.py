@@ -45,6 +45,7 @@ from mechgraph.errors import (
     AssemblyError,
     DeadPointError,
     DeclarationError,
+    FrictionError,
     IndeterminateError,
     MechgraphWarning,
     ReachError,
@@ -285,7 +286,7 @@ ReachName = Literal["raise", "flag"]
 RedundantName = Literal["nan", "minimum_norm", "elastic"]
 ON_REACH: tuple[ReachName, ...] = ("raise", "flag")
 REDUNDANT: tuple[RedundantName, ...] = ("nan", "minimum_norm", "elastic")
-SOLVED = (Status.OK.value, Status.CHANGE_POINT.value, Status.ACTUATORS_REST.value)
+SOLVED = (Status.OK.value, Status.CHANGE_POINT.value, Status.ACTUATORS_REST.value, Status.FRICTION_OPEN.value)
 """Outcomes that are no reason to raise."""
 DEAD = (
     "The drivers do not determine the motion there. Drive another freedom, omit the position, or pass on_reach='flag'"
@@ -293,6 +294,13 @@ DEAD = (
 FLAG = "Pass on_reach='flag' to keep the reachable positions"
 WITHOUT_BOUND, BEFORE_END = 1e3, 0.01
 """Slides of so many lengths L that have doubled within so much of the path before its end grow without bound."""
+RUBBING = {
+    Status.JAMS: "jams: the normal forces grow without bound at {:.4g} times the friction declared. Less friction, longer guides, or a "
+    "drive closer to the axis would move it; pass on_reach='flag' to keep the other positions",
+    Status.NO_FINITE_FORCE: "has no finite force: the solution ends at {:.4g} times the friction declared. Pass on_reach='flag' to keep "
+    "the other positions",
+}
+"""Why friction has no answer at a position, by its outcome."""
 REFUSED = {
     Status.DEAD_POINT: f"is a dead point{{meet}}. {DEAD}",
     Status.BEYOND_DEAD_POINT: f"is beyond a dead point; reached {{at}}{{meet}}. {DEAD}",
@@ -308,11 +316,20 @@ REFUSED = {
 def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exception | None:
     """The named error for the first position that was not solved, with the solution so far."""
     bad = np.flatnonzero(~np.isin(solution.status.reshape(-1), SOLVED))
-    if not bad.size or outcome.found is None:
+    if not bad.size:
         return None
     first = int(bad[0])
     status = Status(solution.status.reshape(-1)[first])
     wanted = (line.values("position", outcome.batch)[:, first] * line.unit).tolist()
+    if status in RUBBING:
+        factor = float(outcome.trajectory.friction_factor(first))
+        values = dict(zip(line.drive.names, wanted, strict=True))
+        text = (
+            f"mechanism {line.m.name!r}: position {first} ({_listed(values.items())}) {RUBBING[status].format(factor)}"
+        )
+        return FrictionError(text, values, solution, kind=status.value, factor=factor)
+    if outcome.found is None:
+        return None
     dead = status in (Status.DEAD_POINT, Status.BEYOND_DEAD_POINT)
     nodes = outcome.found.nodes_of(int(outcome.found.track[first]))
     last, still = outcome.found.reached[:, first], False

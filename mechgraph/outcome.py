@@ -13,6 +13,7 @@ from mechgraph.determinacy.finite_motion import branches
 from mechgraph.determinacy.mobility import stand_still
 from mechgraph.errors import DeclarationError
 from mechgraph.force.block import BlockForces, ForceTask, forces_of_block
+from mechgraph.force.friction import OUTCOMES
 from mechgraph.kinematics.assembly import CLOSED
 from mechgraph.kinematics.motion_path import BLOCK, DriverPath, Positions, Status, continued, in_blocks
 from mechgraph.kinematics.prescribed import DriverMotion
@@ -129,7 +130,11 @@ class Outcome:
                 self.trajectory.put(motion.part(np.flatnonzero(rest)), None)
                 motion = motion.part(np.flatnonzero(~rest))
         if len(motion.places):
-            self.trajectory.put(motion, self._forces(motion, f))
+            forces = self._forces(motion, f)
+            self.trajectory.put(motion, forces)
+            if forces.outcome is not None:
+                for number in np.unique(forces.outcome[forces.outcome > 0]):
+                    self.trajectory.mark(motion.places[forces.outcome == number], OUTCOMES[number])
 
     def _forces(self, motion: BlockMotion, f: FactoredClosure) -> BlockForces:
         line = self.line
@@ -151,6 +156,7 @@ class Outcome:
         with np.errstate(over="ignore", invalid="ignore"):
             found = forces_of_block(task, motion.rates, f, coordinates, motion.places)
             finite = np.isfinite(found.balance + found.power) | self.contradicting[motion.places]
+            finite |= False if found.outcome is None else found.outcome > 0
         if not finite.all():
             too_large = "forces are beyond the largest number (1.8e308): masses, loads or rates are too large"
             raise DeclarationError(f"solve {line.m.name!r}", [too_large])

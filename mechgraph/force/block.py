@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy
 
 from mechgraph.errors import DeclarationError
 from mechgraph.force.elastic import elastic_split
+from mechgraph.force.friction import Rubbed, places_of, rubbed
 from mechgraph.force.loads import Site, inertia_wrenches, kinetic_power
 from mechgraph.force.reactions import (
     METHODS,
@@ -114,7 +116,9 @@ class BlockForces:
     ``hold_terms (p, T)`` of the passive motions. ``multipliers (n, T)`` of the closure rows behind those of
     the loops with ``multiplier_stress (n, s, T)``, of which ``coupled_stress (F, s, T)`` are the efforts in freedoms.
     Where stiffness splits reactions: those that misfits lock in ``locked (6, P, T)``, and those of a misfit of one in every component
-    that is not rigid ``of_misfit (6, P, k, T)``.
+    that is not rigid ``of_misfit (6, P, k, T)``. With friction: its part of the efforts ``friction (F, T)``, what of it pairs take up
+    themselves ``taken (6, P, T)``, ``normals (m, T)`` forces at all places, ``outcome (T,)`` and ``factor (T,)``, at rest the least and
+    greatest efforts between which drives may be ``range (F, 2, T)``.
     """
 
     reactions: Array
@@ -136,6 +140,12 @@ class BlockForces:
     hold_terms: Array
     locked: Array | None = None
     of_misfit: Array | None = None
+    friction: Array | None = None
+    taken: Array | None = None
+    normals: Array | None = None
+    outcome: Array | None = None
+    factor: Array | None = None
+    range: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -159,6 +169,7 @@ def forces_of_block(
     """Forces at positions with user coordinates ``(F, T)`` that stand at the ``places`` of the flat batch."""
     here = rates.here
     site = Site(here, rates, coordinates, task.batch, places, task.t)
+    site.solves_friction = True
     site.collect(task.loads)
     given, applied, inertia = site.scaled_efforts(), site.applied(), inertia_wrenches(here, rates)
     loads = applied + inertia
@@ -171,12 +182,21 @@ def forces_of_block(
     wrenches = METHODS[task.method](ForceProblem(here, loads, given, task.driven, f))
     lines = ContactLines(here)
     found, flank = _least_on_flanks(here, wrenches, f, task, lines)
+    dry = [load for load in task.loads if load.follows_reactions]
+    rubs = ranges = None
+    if dry:
+        solve = _FrictionProblem(here, task, f, found, lines, flank, dry)
+        found, rubs = solve.moving(rates.dq)
+        ranges = solve.at_rest(rates.dq, given)
+        given = given + rubs.efforts
     own = np.zeros_like(found.efforts)
     own[task.driven] = (found.efforts - given - found.coupled)[task.driven]
     acting = own + given + found.coupled
     totals = here.pair_sums(here.E * acting) + found.reactions
     if lines:
         totals = totals + lines.relief(found.multipliers, flank)
+    if rubs is not None:
+        totals = totals + rubs.taken
     parts = (own, given, found.coupled)
     balance, wrench = _balance(here, found.reactions, totals, loads, (applied, inertia, held, *parts))
     power, term = _power(rates, totals, applied if held is None else applied + held, parts, inertia)
@@ -200,6 +220,7 @@ def forces_of_block(
         hold_terms,
         found.locked,
         found.of_misfit,
+        *((rubs.efforts, rubs.taken, rubs.normals, rubs.outcome, rubs.factor, ranges) if rubs else ()),
     )
 
 
@@ -298,9 +319,81 @@ def _least(
     )
 
 
+class _FrictionProblem:
+    """Reactions with friction beside those without it, for any directions of motion."""
+
+    def __init__(
+        self,
+        here: Configuration,
+        task: ForceTask,
+        f: FactoredClosure,
+        found: _FreeForces,
+        lines: ContactLines,
+        flank: Array,
+        dry: Sequence[Any],
+    ) -> None:
+        self.here, self.task, self.f, self.found, self.lines, self.flank, self.dry = (
+            here,
+            task,
+            f,
+            found,
+            lines,
+            flank,
+            dry,
+        )
+        self.unit: dict[int, dict[str, Array]] = {}
+        s, nothing = here.system, np.zeros_like(found.efforts)
+        still = self._answer(nothing) if found.locked is not None else None
+        for k in dict.fromkeys(s.m.place_of_pair(load.of) for load in dry):
+            first = int(s.first_column[k])
+            for column in range(first, first + s.m.pairs[k].type.f):
+                efforts = nothing.copy()
+                efforts[column] = 1.0
+                one = self._answer(efforts)
+                self.unit[column] = one if still is None else {name: one[name] - still[name] for name in one}
+
+    def _answer(self, efforts: Array) -> dict[str, Array]:
+        """Forces under given efforts ``(F, T)`` alone."""
+        here = self.here
+        problem = ForceProblem(here, np.zeros((6, len(here.system.m.links), here.T)), efforts, self.task.driven, self.f)
+        wrenches = METHODS[self.task.method](problem)
+        wrenches = _relieved(wrenches, self.lines, self.flank) if self.lines else wrenches
+        one = _least(here, wrenches, self.f, self.task, self.lines, self.flank)
+        return {name: getattr(one, name) for name in ("reactions", "efforts", "multipliers", "coupled")}
+
+    def moving(self, dq: Array, at_rest: bool = False) -> tuple[_FreeForces, Rubbed]:
+        """Forces with the friction of a motion with rates ``dq (F, T)``, and what that is; NaN where it has no solution, or none alone."""
+        found, of = self.found, {column: one["reactions"] for column, one in self.unit.items()}
+        places = places_of(self.here, dq, found.reactions, self.dry, at_rest)
+        stress = found.stress.wrenches
+        unknown = stress[:, :, :0] if self.task.redundant == "minimum_norm" else stress
+        rubs = rubbed(self.here, places, found.reactions, of, unknown)
+        sums = {
+            name: getattr(found, name) + sum(one[name] * rubs.efforts[c] for c, one in self.unit.items())
+            for name in ("reactions", "efforts", "multipliers", "coupled")
+        }
+        sums["reactions"] = sums["reactions"] - rubs.taken
+        return replace(found, **sums), rubs
+
+    def at_rest(self, dq: Array, given: Array) -> Array:
+        """Efforts of drives ``(F, 2, T)`` on the verge of motion to - and to +, the others held; infinite where it jams, NaN in motion."""
+        out = np.full((len(dq), 2, self.here.T), np.nan)
+        rest = ~dq.any(axis=0)
+        if not rest.any():
+            return out
+        moved = self.f.sensitivity()
+        for j, column in enumerate(self.task.driven):
+            for side, sense in enumerate((-1.0, 1.0)):
+                found, rubs = self.moving(sense * moved[:, j], at_rest=True)
+                effort = (found.efforts - given - rubs.efforts - found.coupled)[column]
+                effort = np.where((rubs.outcome == 1) | (rubs.outcome == 2), sense * np.inf, effort)
+                out[column, side, rest] = effort[rest]
+        return out
+
+
 def _elastic(here: Configuration, found: _FreeForces) -> _FreeForces:
     """Reactions and efforts as stiffness splits them; the self-stresses that stay unknown."""
-    split, stress = elastic_split(here, found.reactions, found.stress), found.stress
+    split, stress = elastic_split(here, found.reactions, found.efforts, found.stress), found.stress
 
     def of(multiples: Array) -> Array:
         return np.asarray(np.einsum("cpit,it->cpt", stress.wrenches, multiples))

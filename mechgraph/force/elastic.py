@@ -81,14 +81,14 @@ def seats_of(here: Configuration) -> Seats:
     return Seats(compliance, misfit, loose.astype(bool), push)
 
 
-def elastic_split(here: Configuration, reactions: Array, stress: Stress) -> ElasticSplit:
-    """The multiples of a basis of all self-stresses that come about in reactions ``(6, P, T)``, at every position."""
+def elastic_split(here: Configuration, reactions: Array, efforts: Array, stress: Stress) -> ElasticSplit:
+    """The multiples of all self-stresses that come about in reactions ``(6, P, T)`` beside ``efforts (F, T)``, at every position."""
     seats, T = seats_of(here), here.T
     N = np.moveaxis(component_values(here, stress.wrenches), -1, 0)
     own = component_values(here, reactions).T
     s, K = N.shape[2], N.shape[1]
     out = ElasticSplit(np.zeros((s, T)), np.zeros((s, T)), np.zeros((s, s, T)), np.zeros((s, K, T)), seats.soft)
-    size = np.abs(own).max(initial=0.0)
+    size = max(float(np.abs(own).max(initial=0.0)), float(np.abs(efforts).max(initial=0.0)))
     for t in range(T):
         _split_at(t, seats, N[t], own[t], out, size)
     return out
@@ -97,7 +97,7 @@ def elastic_split(here: Configuration, reactions: Array, stress: Stress) -> Elas
 def _split_at(t: int, seats: Seats, N: Array, own: Array, out: ElasticSplit, size: float) -> None:
     """Fill in one position: self-stresses ``N (K, s)``, reactions ``own (K,)``; ``size`` of the largest reaction of all positions."""
     C, s = seats.compliance, N.shape[1]
-    free, fixed = _conditions(N[seats.loose], own[seats.loose], s)
+    free, fixed = _conditions(N[seats.loose], own[seats.loose], s, size)
     if fixed is None:  # the loads ask for what carries nothing: no self-stress is known
         out.left[:, :, t] = np.eye(s)
         return
@@ -137,12 +137,12 @@ def _split_at(t: int, seats: Seats, N: Array, own: Array, out: ElasticSplit, siz
         out.unit[:, :, t] = Zs @ np.linalg.solve(Zs.T @ N.T @ (C[:, None] * N) @ Zs, (N @ Zs).T)
 
 
-def _conditions(A: Array, b: Array, s: int) -> tuple[Array, Array | None]:
-    """The null space of conditions ``A y + b = 0``, and a solution; None where there is none."""
+def _conditions(A: Array, b: Array, s: int, size: float = 0.0) -> tuple[Array, Array | None]:
+    """The null space of conditions ``A y + b = 0``, and a solution; None where there is none beside reactions of a ``size``."""
     if not len(A):
         return np.eye(s), np.zeros(s)
     ways, sizes, turn = np.linalg.svd(A, full_matrices=True)
     r = int((sizes > STRESSES.unique * max(sizes.max(initial=0.0), 1.0)).sum())
     y = -turn[:r].T @ ((ways[:, :r].T @ b) / sizes[:r])
-    met = np.abs(A @ y + b).max() <= STRESSES.unique * max(np.abs(b).max(), 1e-300)
+    met = np.abs(A @ y + b).max() <= STRESSES.unique * max(np.abs(b).max(), size, 1e-300)
     return turn[r:].T, y if met else None

@@ -56,6 +56,7 @@ class Site:
         self.wrenches = np.zeros((6, len(self.m.links), here.T))
         self.efforts = np.zeros((system.n_freedoms, here.T))
         self.largest = 0.0
+        self.solves_friction = False
 
     def collect(self, loads: tuple[Load, ...]) -> None:
         """Evaluate all loads."""
@@ -107,6 +108,11 @@ class Site:
     def second_link(self, name: str) -> str:
         """Link b of the pair of a freedom."""
         return self.m.ends_of(name)[1]
+
+    def freedoms_of(self, pair: str) -> tuple[str, ...]:
+        """Names of the single freedoms of a pair."""
+        p = self.m.pair(pair)
+        return tuple(name for name, single in zip(p.freedom_names, p.type.drivable, strict=True) if single)
 
     def time(self) -> Array | None:
         """Time of every position, ``(T,)``; None where the motion has no times."""

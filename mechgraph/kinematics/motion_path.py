@@ -52,6 +52,9 @@ class Status(Enum):
     NOT_CLOSED = "loops not closed"
     NOT_FOLLOWED = "not followed"
     BEYOND_TOLERANCE = "beyond tolerance"
+    JAMS = "jams"
+    NO_FINITE_FORCE = "no finite force"
+    FRICTION_OPEN = "friction not determined"
 
 
 def in_blocks(places: Index, most: int = BLOCK) -> list[Index]:

@@ -15,7 +15,8 @@ from urllib.parse import quote
 
 from mechgraph.fields import FLAG, INTEGER, NUMBERS, OTHER, SIX, TABLE, TABLES, TEXT, FieldFormat, Formatted, Schema
 from mechgraph.model.couplings import COUPLINGS
-from mechgraph.model.loads import LOADS, ForceTable
+from mechgraph.model.friction import LOADS
+from mechgraph.model.loads import ForceTable
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Pair

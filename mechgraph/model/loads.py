@@ -91,6 +91,9 @@ class LoadSite(Protocol):
     def second_link(self, name: str) -> str:
         """Link b of the pair of a freedom."""
 
+    def freedoms_of(self, pair: str) -> tuple[str, ...]:
+        """Names of the single freedoms of a pair."""
+
     def add_force(self, link: str, force: Array, at: Array) -> None:
         """Force ``(3, T)`` on a link at the position ``at``."""
 
@@ -182,6 +185,11 @@ class Load(Described, ABC):
     def break_times(self) -> tuple[float, ...]:
         """Times at which it is known not to be smooth."""
         return tuple(np.ravel(getattr(self, "breaks", ())).tolist())
+
+    @property
+    def follows_reactions(self) -> bool:
+        """Whether it depends on the reactions, and is solved with them."""
+        return False
 
     @property
     def smooth(self) -> bool:
@@ -825,5 +833,7 @@ class Effort(Load):
         site.add_effort(self.freedom, site.values(self.value, site.second_link(self.freedom), 1)[0])
 
 
-LOADS: dict[str, type[Load]] = {c.kind: c for c in (Gravity, Wrench, Effort, Spring, TorsionSpring, Damper, ForceLaw)}
-"""Load classes by the name of their kind in files."""
+BASIC_LOADS: dict[str, type[Load]] = {
+    c.kind: c for c in (Gravity, Wrench, Effort, Spring, TorsionSpring, Damper, ForceLaw)
+}
+"""Load classes that act by themselves, by the name of their kind in files."""

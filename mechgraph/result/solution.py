@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 from urllib.parse import quote
 
@@ -580,6 +580,69 @@ class Solution(Shown):
         What supports the frame bears it: it is the sum of the loads on all links and of their inertia.
         """
         return self._values.shaking()
+
+    @property
+    def losses(self) -> dict[str, Array]:
+        """Power lost in the pairs with friction, by name, ``(...)``; never negative."""
+        return self._values.losses()
+
+    @property
+    def self_locking(self) -> Array:
+        """Whether the mechanism stays at rest with all drives off ``(...)``: effort 0 is within the range of every drive."""
+        ends = [
+            self[self.whole.pairs[k].name].effort_range[..., j, :] for k, j in map(self.whole.freedom, self.actuated)
+        ]
+        rest = np.ones(self.batch, dtype=bool)
+        for low, high in (np.moveaxis(end, -1, 0) for end in ends):
+            rest &= (low < high) & (low <= 0) & (high >= 0)
+        return rest
+
+    def efficiency(self, out: str | Iterable[str], into: str | Iterable[str] | None = None) -> Array:
+        """Return ``-power of out / power of into``, ``(...)``.
+
+        Parameters
+        ----------
+        out : str or iterable of str
+            Drives (``"A"``) or loads (``"loads[1]"``) that take power out of the mechanism.
+        into : str or iterable of str, optional
+            Those that bring it. Default: all drives.
+
+        Returns
+        -------
+        (...) array
+            NaN where ``into`` brings no power; 0 where ``out`` has to be driven too.
+
+        Raises
+        ------
+        DeclarationError
+            No such drive or load.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> screw = mg.Pair("A", "H", "frame", "nut", point=(0, 0, 0), axis=(0, 0, 1), pitch=0.002)
+        >>> lift = [mg.Wrench("nut", force=(0, 0, -1000), point=(0, 0, 0)), mg.Friction("A", mu=0.1, radius=0.01)]
+        >>> m = mg.Mechanism("jack", pairs=[screw], drives=["A"], loads=lift)
+        >>> mg.solve(m, {"A": mg.Motion(0.0, velocity=1.0)}).efficiency("loads[0]").round(4)
+        array(0.6533)
+        """
+        taken = -self._power_of(out)
+        brought = self._power_of(self.actuated if into is None else into)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(brought > 0, np.maximum(taken, 0.0) / brought, np.nan)
+
+    def _power_of(self, names: str | Iterable[str]) -> Array:
+        """Power that drives and loads bring, ``(...)``."""
+        total = np.zeros(self.batch)
+        for name in (names,) if isinstance(names, str) else tuple(names):
+            found = re.fullmatch(r"loads\[(\d+)\]", name)
+            if found:
+                total = total + self.load(int(found[1])).power
+            else:
+                k, j = self.whole.freedom(self.whole.full_name(name))
+                pair = self[self.whole.pairs[k].name]
+                total = total + pair.effort[..., j] * pair.velocity[..., j]
+        return total
 
     @property
     def misfit_sensitivity(self) -> dict[str, dict[str, Array]]:

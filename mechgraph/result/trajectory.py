@@ -18,6 +18,7 @@ from mechgraph.determinacy.uniqueness import labels_of
 from mechgraph.equations.terms import State
 from mechgraph.errors import DeclarationError, MechgraphError
 from mechgraph.force.block import BlockForces, hold_names, is_idle
+from mechgraph.force.friction import places_of
 from mechgraph.force.loads import Site, inertia_wrenches, kinetic_energy, user_poses, user_twists
 from mechgraph.force.reactions import PairFrames, given_effort_loads, user_state, user_wrench
 from mechgraph.kinematics.motion_path import Status, in_blocks
@@ -28,6 +29,7 @@ from mechgraph.maths.linear import EVERY, Place
 from mechgraph.maths.newton import Work
 from mechgraph.maths.se3 import Array, Index, cross, rotate, rotate_back, shift_wrench
 from mechgraph.maths.tolerances import MOTIONS, PATH, STRESSES
+from mechgraph.model.friction import Friction
 from mechgraph.model.loads import Law, Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.pairs.pair_type import PairType
@@ -57,7 +59,8 @@ MOVED = ("x", "dq", "ddq", "closure")
 """What is kept of the motion at every position."""
 KEPT = (
     "reactions", "efforts", "given", "loads", "hold", "stress", "stress_efforts", "coupled", "multipliers", "multiplier_stress",
-    "coupled_stress", "shaking", "balance", "power", "holds", "hold_terms", "locked", "of_misfit",
+    "coupled_stress", "shaking", "balance", "power", "holds", "hold_terms",
+    "locked", "of_misfit", "friction", "taken", "normals", "factor", "range",
 )  # fmt: skip
 """Fields of ``BlockForces`` that are kept for every position."""
 
@@ -107,7 +110,9 @@ def _sizes(states: Array) -> Array:
     vectors, stress = states[:, 0], np.moveaxis(states[:, 1:], -1, 0)
     if not stress.shape[-1]:
         return np.asarray(np.linalg.norm(vectors, axis=0))
-    ways, sizes, _ = np.linalg.svd(np.nan_to_num(stress), full_matrices=False)  # NaN where a position was not solved, as its vectors
+    ways, sizes, _ = np.linalg.svd(
+        np.nan_to_num(stress), full_matrices=False
+    )  # NaN where a position was not solved, as its vectors
     loose = sizes > STRESSES.unique
     along = np.einsum("tij,it->tj", ways, vectors) * loose
     left = vectors - np.einsum("tij,tj->it", ways, along)
@@ -439,6 +444,7 @@ class Trajectory:
         def effect(block: BlockMotion) -> Array:
             here, rates = block.here, block.rates
             site = Site(here, rates, self._coordinates[:, block.places], batch, asked[block.places], t)
+            site.solves_friction = True
             site.collect((load,))
             wrenches, efforts = site.applied(), site.scaled_efforts()
             power = (rates.V * wrenches).sum(axis=(0, 1)) + (rates.dq * efforts).sum(axis=0)
@@ -511,7 +517,10 @@ class Trajectory:
         states = np.concatenate([efforts[:, None], stress], axis=1)
         E = self._evaluated(lambda block: block.here.E[:, columns])
         reactions = np.concatenate([self._of("reactions")[:, pair][:, None], self._of("stress")[:, pair]], axis=1)
-        return np.asarray(reactions + np.einsum("cft,fst->cst", E, states))
+        out = np.asarray(reactions + np.einsum("cft,fst->cst", E, states))
+        if "taken" in self._kept:
+            out[:, 0] += self._kept["taken"][:, pair]
+        return out
 
     def _through_contacts(self, name: str, columns: slice) -> Array:
         """Efforts ``(f, ..., T)`` of multipliers that act where gears touch each other, not through the pairs of these freedoms."""
@@ -581,6 +590,52 @@ class Trajectory:
         loose = _touched(np.concatenate([self._components(pair)[2], self._stress_of_drives(columns)[driven]]))
         labels = labels_of(self.whole.pairs[pair], driven)
         return {name: self._out(~part) for (_, name), part in zip(labels, loose, strict=True)}
+
+    def friction(self, pair: int) -> Array:
+        """Its part of the applied efforts, ``(..., f)``."""
+        columns = self._columns(pair)
+        unit = np.where(self._system.is_length[columns], self._L, self._L**2)[:, None]
+        return self._out(unit * self._kept.get("friction", 0.0 * self._force("efforts"))[columns])
+
+    def friction_factor(self, place: int) -> float:
+        """By how much friction would have to fall at a flat position that jams."""
+        return float(self._kept["factor"][place])
+
+    def effort_range(self, pair: int) -> Array:
+        """Least and greatest effort of drives at rest, ``(..., f, 2)``; the effort itself in what does not rub."""
+        columns = self._columns(pair)
+        own = self._efforts(columns)[0]
+        unit = np.where(self._system.is_length[columns], self._L, self._L**2)[:, None, None]
+        ends = np.repeat(own[:, None], 2, axis=1)
+        if "range" in self._kept:
+            found = unit * self._kept["range"][columns]
+            ends = np.where(np.isnan(found), ends, found)
+        return self._out(ends)
+
+    def normal_forces(self, pair: int) -> Array:
+        """Normal forces at the places of a pair that rub, ``(..., n)``."""
+        dry = [load for load in self.loads if isinstance(load, Friction)]
+        mine = [load for load in dry if load.of == self.whole.pairs[pair].name]
+        if not mine or "normals" not in self._kept:
+            return self._out(np.zeros((0, self._count)))
+
+        def count(loads: list[Friction]) -> int:
+            block = next(iter(self._motions), None) or self._motion(np.flatnonzero(self._solved)[:1])
+            return len(places_of(block.here, block.rates.dq, np.zeros((6, len(self.whole.pairs), block.here.T)), loads))
+
+        first = count(dry[: dry.index(mine[0])])
+        return self._out(self._L * self._kept["normals"][first : first + count(mine)])
+
+    def losses(self) -> dict[str, Array]:
+        """Power lost in pairs with friction, by name, ``(...)``."""
+        dry = {i: load.of for i, load in enumerate(self.loads) if isinstance(load, Friction)}
+        out = {name: np.zeros(self.batch) for name in dry.values()}
+        for name in out:
+            k = self.whole.place_of_pair(name)
+            out[name] = out[name] - (self.friction(k) * self.coordinates(k, 1)).sum(axis=-1)
+        for i, name in dry.items():
+            out[name] = out[name] - self.load(i).power
+        return out
 
     def locked_in(self, pair: int) -> dict[str, Array]:
         """What misfits lock in of the components, by name, ``(...)``; zero where stiffness does not split reactions."""

@@ -266,6 +266,24 @@ class PairResult(Shown):
         return self._values.components(self._index)
 
     @property
+    def friction(self) -> Array:
+        """Dry friction in the freedoms ``(..., f)``: a part of ``applied_effort``."""
+        return self._values.friction(self._index)
+
+    @property
+    def normal_forces(self) -> Array:
+        """Normal forces ``(..., n)`` at the places that rub, in the order of the axes of the pair; preload included."""
+        return self._values.normal_forces(self._index)
+
+    @property
+    def effort_range(self) -> Array:
+        """Least and greatest effort of a drive at rest ``(..., f, 2)``: between them friction holds it, with ``static``, other drives held.
+
+        The ends are on the verge of motion to - and to +; infinite where it jams. In motion, and without friction, both are the effort.
+        """
+        return self._values.effort_range(self._index)
+
+    @property
     def locked_in(self) -> dict[str, Array]:
         """What misfits lock in of the components, without any load, ``(...)`` by name; ``solve(..., redundant="elastic")``."""
         return self._values.locked_in(self._index)

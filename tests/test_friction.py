@@ -1,0 +1,293 @@
+"""Dry friction in kinetostatics against the formulas of textbooks.
+
+Screws, collars: J. E. Shigley and C. R. Mischke, Mechanical Engineering Design, 1989, chapter 8. Friction circle: J. E. Shigley and J. J.
+Uicker, Theory of Machines and Mechanisms, 1995, chapter 13.
+"""
+
+import numpy as np
+import pytest
+
+import mechgraph as mg
+
+Z, Y, X = (0, 0, 1), (0, 1, 0), (1, 0, 0)
+MU, RADIUS = 0.2, 0.02
+RHO = RADIUS * np.sin(np.arctan(MU))
+W = 100.0
+
+
+def moved(m: mg.Mechanism, rate: float = 1.0, **more: object) -> mg.Solution:
+    return mg.solve(m, {m.drives[0].freedom: mg.Motion(0.0, velocity=rate)}, **more)
+
+
+def shaft(*forces: mg.Wrench, **friction: object) -> mg.Mechanism:
+    pin = mg.Pair("A", "R", "frame", "wheel", point=(0, 0, 0), axis=Z)
+    dry = mg.Friction("A", **{"mu": MU, "radius": RADIUS, **friction})
+    return mg.Mechanism("shaft", [mg.Link("frame"), mg.Link("wheel")], [pin], ["A"], [*forces, dry])
+
+
+def force(x: float, y: float, at: tuple[float, float, float], link: str = "wheel") -> mg.Wrench:
+    return mg.Wrench(link, force=(x, y, 0), point=at)
+
+
+@pytest.mark.parametrize("method", ["loop_wrench", "newton_euler", "printed"])
+@pytest.mark.parametrize("engine", ["dense", "sparse", "auto"])
+def test_pulley(engine: str, method: str) -> None:
+    """Parallel ropes at R: P/W = (R + rho)/(R - rho) when the load rises, its inverse when it sinks."""
+    R = 0.1
+    P = W * (R + RHO) / (R - RHO)
+    for rate, pull in ((1.0, P), (-1.0, W * W / P)):
+        s = moved(shaft(force(0, -W, (R, 0, 0)), force(0, -pull, (-R, 0, 0))), rate, engine=engine, method=method)
+        assert abs(s["A"].effort[0]) < 1e-11
+        assert s["A"].friction[0] == pytest.approx(-rate * RHO * (W + pull), rel=1e-12)
+        assert abs(s.checks.power) < 1e-12
+        assert s["A"].normal_forces[0] == pytest.approx(W + pull)
+
+
+def test_bell_crank() -> None:
+    """Ropes at right angles: (P b - W a)^2 = rho^2 (P^2 + W^2)."""
+    a, b = 0.1, 0.15
+    P = max(np.roots([b * b - RHO**2, -2 * a * b * W, (a * a - RHO**2) * W * W]))
+    s = moved(shaft(force(0, -W, (a, 0, 0)), force(-P, 0, (0, b, 0))))
+    assert abs(s["A"].effort[0]) < 1e-11
+
+
+def test_the_whole_reaction_or_its_normal_part() -> None:
+    circle, total = (moved(shaft(force(0, -W, (0, 0, 0)), model=model))["A"].effort[0] for model in ("circle", "total"))
+    assert total / circle == pytest.approx(np.hypot(1.0, MU), rel=1e-12)
+
+
+@pytest.mark.parametrize("a", [0.0, 0.02, 0.05, 0.2])
+def test_a_load_beside_a_bearing_of_some_length(a: float) -> None:
+    b = 0.1
+    s = moved(shaft(force(0, -W, (0, 0, a)), length=b))
+    assert s["A"].effort[0] == pytest.approx(RHO * W * max(1.0, 2 * a / b), rel=1e-12)
+
+
+def test_a_collar_bears_the_axial_force() -> None:
+    s = moved(shaft(mg.Wrench("wheel", force=(0, 0, -W), point=(0, 0, 0)), thrust_radius=0.03))
+    assert s["A"].effort[0] == pytest.approx(MU * 0.03 * W, rel=1e-12)
+
+
+def jack(mu: float = 0.1, flank: float = 0.0, pitch: float = 0.002, **more: object) -> mg.Mechanism:
+    screw = mg.Pair("A", "H", "frame", "nut", point=(0, 0, 0), axis=Z, pitch=pitch)
+    dry = mg.Friction("A", mu=mu, radius=0.01, flank=flank, **more)
+    return mg.Mechanism(
+        "jack",
+        [mg.Link("frame"), mg.Link("nut")],
+        [screw],
+        ["A"],
+        [mg.Wrench("nut", force=(0, 0, -W), point=(0, 0, 0)), dry],
+    )
+
+
+@pytest.mark.parametrize("flank", [0.0, np.deg2rad(15)])
+@pytest.mark.parametrize("pitch", [0.002, -0.002, 0.0005])
+def test_screw(flank: float, pitch: float) -> None:
+    """W r tan(lead +- phi); efficiency tan(lead) / tan(lead + phi), below one half where it locks."""
+    lead = np.arctan(abs(pitch) / 0.01)
+    phi = np.arctan(0.1 / np.cos(np.arctan(np.tan(flank) * np.cos(lead))))
+    up, down = (moved(jack(flank=flank, pitch=pitch), np.sign(pitch) * way) for way in (1, -1))
+    assert np.sign(pitch) * up["A"].effort[0] == pytest.approx(W * 0.01 * np.tan(lead + phi), rel=1e-12)
+    assert np.sign(pitch) * down["A"].effort[0] == pytest.approx(W * 0.01 * np.tan(lead - phi), rel=1e-9)
+    efficiency = up.efficiency("loads[0]")
+    assert efficiency == pytest.approx(np.tan(lead) / np.tan(lead + phi), rel=1e-12)
+    assert abs(up.checks.power) < 1e-12
+    assert up.losses["A"] == pytest.approx(-up["A"].friction[0] * up["A"].velocity[0])
+    still = mg.solve(jack(flank=flank, pitch=pitch), {"A": 0.0})
+    assert bool(still.self_locking) == (lead < phi)
+    if lead < phi:
+        assert efficiency < 0.5
+
+
+def collar(mu: float, e: float = 0.2, b: float = 0.1) -> mg.Mechanism:
+    """A collar on a guide, lifted by a pusher at e beside it."""
+    pairs = [
+        mg.Pair("A", "P", "frame", "collar", point=(0, 0, 0), axis=Z),
+        mg.Pair("D", "P", "frame", "pusher", point=(e, 0, -1), axis=Z),
+        mg.Pair("K", "Sp", "pusher", "collar", point=(e, 0, 0), axis=Z),
+    ]
+    links = [mg.Link(name) for name in ("frame", "collar", "pusher")]
+    loads = [mg.Wrench("collar", force=(0, 0, -W), point=(0, 0, 0)), mg.Friction("A", mu=mu, length=b)]
+    return mg.Mechanism("collar", links, pairs, ["D"], loads)
+
+
+def test_a_collar_lifted_beside_its_guide_jams() -> None:
+    """P = W / (1 - 2 mu e / b); it jams from e = b / (2 mu) on."""
+    assert moved(collar(0.2))["D"].effort[0] == pytest.approx(W / (1 - 0.8), rel=1e-11)
+    for mu in (0.2501, 0.3, 1.0):
+        with pytest.raises(mg.FrictionError, match="jams") as error:
+            moved(collar(mu))
+        assert (error.value.kind, error.value.factor) == ("jams", pytest.approx(0.25 / mu, rel=1e-9))
+        assert moved(collar(mu), on_reach="flag").status == "jams"
+
+
+def test_a_guide_that_is_embraced_or_embraces() -> None:
+    """The friction of a shoe acts at the side of the guide; that of two shoes that press on opposite sides cancels but for the width."""
+    for w in (0.02, -0.02):
+        m = collar(0.1).replace(
+            loads=[
+                mg.Wrench("collar", force=(0, 0, -W), point=(0, 0, 0)),
+                mg.Friction("A", mu=0.1, length=0.1, width=w),
+            ]
+        )
+        s = moved(m)
+        # both shoes press on opposite sides, F = M / b each: the couples of their friction cancel but for the width
+        n = s["A"].normal_forces[..., :2]
+        P, arm = s["D"].effort[0], 0.2
+        assert pytest.approx(0.1 * n.sum(), rel=1e-11) == P - W
+        assert abs(n[..., 0] - n[..., 1]).max() < 1e-9
+        # about the axis of the guide: P e = F b + mu F w / 2 - mu F w / 2
+        assert P * arm == pytest.approx(n[..., 0].item() * 0.1, rel=1e-11)
+
+
+def test_a_shaft_that_turns_is_pulled_along() -> None:
+    w, v = 10.0, 0.05
+    pair = mg.Pair("A", "C", "frame", "shaft", point=(0, 0, 0), axis=Z)
+    dry = mg.Friction("A", mu=MU, radius=RADIUS)
+    m = mg.Mechanism(
+        "shaft",
+        pairs=[pair],
+        drives=["A.Rz", "A.Tz"],
+        loads=[mg.Wrench("shaft", force=(30.0, 0, 0), point=(0, 0, 0)), dry],
+    )
+    s = mg.solve(m, {"A.Rz": mg.Motion(0.0, velocity=w), "A.Tz": mg.Motion(0.0, velocity=v)})
+    speed = np.hypot(v, RADIUS * w)
+    N = 30 / np.hypot(1.0, MU * RADIUS * w / speed)
+    assert s["A"].effort == pytest.approx([MU * N * RADIUS**2 * w / speed, MU * N * v / speed], rel=1e-12)
+
+
+def test_a_ball_rubs_against_its_angular_velocity() -> None:
+    """A conical pendulum on a ball held by its drive: the couple is rho |F| against the angular velocity."""
+    pairs = [
+        mg.Pair("S", "S", "frame", "arm", point=(0, 0, 0)),
+        mg.Pair("A", "R", "frame", "crank", point=(0, 0, -1), axis=Z),
+        mg.Pair("B", "Sg", "crank", "arm", point=(0.2, 0, -1), axis=X),
+    ]
+    links = [mg.Link("frame"), mg.Link("arm", 2.0, (0.1, 0, -0.5)), mg.Link("crank")]
+    m = mg.Mechanism("cone", links, pairs, ["A"], [mg.Gravity((0, 0, -9.81))])
+    dry = mg.Friction("S", mu=MU, radius=RADIUS)
+    smooth, rough = (moved(m, 5.0, loads=loads) for loads in (m.loads, [*m.loads, dry]))
+    V = rough.link("arm").angular_velocity
+    lost = RHO * np.linalg.norm(rough["S"].force) * np.linalg.norm(V)
+    assert rough.losses["S"] == pytest.approx(lost, rel=1e-11)
+    assert (rough["A"].effort - smooth["A"].effort) * 5.0 == pytest.approx(lost, rel=1e-9)
+    assert abs(rough.checks.power) < 1e-12
+
+
+def test_slider_crank_rough_everywhere() -> None:
+    """What the crank brings is what the load takes and what is lost; dT/dmu at 0 = sum of the normal forces times their speeds, over w."""
+    r, l, w = 0.05, 0.15, 20.0
+    pairs = [
+        mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=Z), mg.Pair("B", "R", "crank", "rod", point=(r, 0, 0), axis=Z),
+        mg.Pair("C", "R", "rod", "piston", point=(r + l, 0, 0), axis=Z), mg.Pair("D", "P", "frame", "piston", point=(r + l, 0, 0), axis=X),
+    ]  # fmt: skip
+    push = mg.Wrench("piston", force=(-1000.0, 0, 0), point=(r + l, 0, 0))
+    m = mg.Mechanism("slider-crank", pairs=pairs, drives=["A"], loads=[push])
+    given = {"A": mg.Motion(np.linspace(0.2, 6.0, 40), velocity=w)}
+
+    def rough(mu: float) -> mg.Solution:
+        dry = [mg.Friction(name, mu=mu, radius=0.01) for name in "ABC"] + [mg.Friction("D", mu=mu)]
+        return mg.solve(m, given, loads=[push, *dry])
+
+    smooth, s, tiny = mg.solve(m, given), rough(0.1), rough(1e-7)
+    lost = sum(s.losses.values())
+    assert (lost > 0).all()
+    assert np.allclose(s["A"].effort[:, 0] * w + s.load(0).power, lost, rtol=1e-11)
+    assert np.abs(s.checks.power).max() < 1e-12
+    slope = sum(0.01 * smooth[k].magnitude * np.abs(smooth[k].velocity[:, 0]) for k in "ABC")
+    slope = slope + smooth["D"].magnitude * np.abs(smooth["D"].velocity[:, 0])
+    assert np.allclose(
+        (tiny["A"].effort - smooth["A"].effort)[:, 0] / 1e-7, slope / w, rtol=1e-4, atol=1e-6 * slope.max() / w
+    )
+
+
+def test_links_swapped_moved_and_in_other_units() -> None:
+    m = collar(0.2)
+    swapped = m.replace(pairs=[m.pairs[0].replace(a="collar", b="frame"), *m.pairs[1:]])
+    assert moved(swapped)["D"].effort[0] == pytest.approx(moved(m)["D"].effort[0], rel=1e-11)
+    pose = np.eye(4)
+    pose[:3, :3] = [[0, 0, 1], [1, 0, 0], [0, 1, 0]]
+    pose[:3, 3] = 0.3, -0.2, 0.5
+    assert moved(m.moved(pose))["D"].effort[0] == pytest.approx(moved(m)["D"].effort[0], rel=1e-11)
+    si = jack().replace(units={"length": "m", "mass": "kg", "time": "s"})
+    mm = si.to_units(length="mm", mass="t")
+    assert moved(mm)["A"].effort[0] == pytest.approx(1e3 * moved(si)["A"].effort[0], rel=1e-11)
+
+
+def test_friction_of_what_is_not_unique_is_not_determined() -> None:
+    bearings = [
+        mg.Pair(k, "R", "frame", "shaft", point=(0, 0, z), axis=Z) for k, z in (("A", 0.0), ("B", 0.3), ("C", 0.5))
+    ]
+    dry = [mg.Friction(k, mu=MU, radius=RADIUS) for k in "ABC"]
+    m = mg.Mechanism(
+        "shaft", pairs=bearings, drives=["A"], loads=[mg.Wrench("shaft", force=(W, 0, 0), point=(0, 0, 0.2)), *dry]
+    )
+    s = moved(m)
+    assert s.status == "friction not determined"
+    assert np.isnan(s["A"].effort).all()
+    least = moved(m, redundant="minimum_norm")
+    forces = sum(np.hypot(least[k].components["Fx"], least[k].components["Fy"]) for k in "ABC")
+    assert least["A"].effort[0] == pytest.approx(RHO * forces, rel=1e-9)
+    soft = m.replace(
+        pairs=[p.replace(stiffness=dict.fromkeys(("Fx", "Fy", "Fz"), 1e7) | {"Mx": 0, "My": 0}) for p in m.pairs]
+    )
+    elastic = moved(soft, redundant="elastic")
+    forces = sum(np.hypot(elastic[k].components["Fx"], elastic[k].components["Fy"]) for k in "ABC")
+    assert elastic["A"].effort[0] == pytest.approx(RHO * forces, rel=1e-9)
+
+
+def test_a_planar_mechanism_in_space_rubs_without_locked_in_forces() -> None:
+    """Redundant out of the plane, where loads bring nothing: friction is that of the plane."""
+    m = mg.load("four-bar")
+    dry = [mg.Friction(p.name, mu=0.1, radius=0.02) for p in m.pairs]
+    given = {"A": mg.Motion([0.3, 1.0], velocity=5.0)}
+    s = mg.solve(m, given, loads=[*m.loads, *dry])
+    flat = m.to_planar()
+    t = mg.solve(flat, given, loads=[*flat.loads, *dry])
+    assert (s.status == "ok").all()
+    assert np.allclose(s["A"].effort, t["A"].effort, rtol=1e-10)
+
+
+def test_at_rest_any_effort_between_holds() -> None:
+    m = shaft(force(0, -W, (0.01, 0, 0)), static=0.3)
+    s = mg.solve(m, {"A": 0.0})
+    rho = RADIUS * np.sin(np.arctan(0.3))
+    assert s["A"].effort[0] == pytest.approx(W * 0.01)
+    assert s["A"].effort_range[0] == pytest.approx([W * (0.01 - rho), W * (0.01 + rho)], rel=1e-11)
+    assert not s.self_locking
+    assert mg.solve(shaft(force(0, -W, (0.001, 0, 0))), {"A": 0.0}).self_locking
+    low, high = mg.solve(collar(0.3), {"D": 0.0})["D"].effort_range[0]
+    assert (low, high) == (pytest.approx(W / (1 + 1.2), rel=1e-11), np.inf)
+
+
+def test_preload_and_viscous() -> None:
+    s = moved(shaft(force(0, -W, (0, 0, 0)), preload=50.0, viscous=0.7), 2.0)
+    assert s["A"].effort[0] == pytest.approx(RHO * (W + 50.0) + 1.4, rel=1e-12)
+    assert s.losses["A"] == pytest.approx(2.0 * s["A"].effort[0], rel=1e-12)
+
+
+def test_no_friction_is_the_smooth_result() -> None:
+    smooth, dry = (moved(collar(0.0).replace(loads=loads)) for loads in (collar(0.0).loads[:1], collar(0.0).loads))
+    assert smooth["D"].effort == dry["D"].effort
+
+
+def test_faults_and_files(tmp_path) -> None:
+    m = jack()
+    mg.save(m, tmp_path / "jack.toml")
+    assert mg.load(tmp_path / "jack.toml") == m
+    for more, words in (
+        ({"of": "Q"}, "unknown pair 'Q'"), ({"mu": -0.1}, "mu = -0.1"), ({"static": 0.05}, "static"),
+        ({"width": 0.1}, "width: has no meaning"),
+        ({"radius": None}, "radius"), ({"mu": 8.0}, "no finite force"),
+    ):  # fmt: skip
+        given = {"of": "A", "mu": 0.1, "radius": 0.01, **more}
+        with pytest.raises(mg.DeclarationError, match=words):
+            m.replace(loads=[mg.Friction(given.pop("of"), **given)])
+    heavy = m.replace(links=[mg.Link("frame"), mg.Link("nut", 1.0, (0, 0, 0), np.eye(3))], drives=[])
+    with pytest.raises(mg.MechgraphError, match="solve and study alone"):
+        mg.respond(heavy, (0, 0.1), start={"A": 0.0})
+    with pytest.raises(mg.DeclarationError):
+        mg.compile(m)
+    weld = mg.Pair("A", "W", "frame", "b", point=(0, 0, 0))
+    with pytest.raises(mg.DeclarationError, match="nothing of it rubs"):
+        mg.Mechanism("w", pairs=[weld], loads=[mg.Friction("A", mu=0.1)])
