@@ -110,13 +110,12 @@ def _sizes(states: Array) -> Array:
     vectors, stress = states[:, 0], np.moveaxis(states[:, 1:], -1, 0)
     if not stress.shape[-1]:
         return np.asarray(np.linalg.norm(vectors, axis=0))
-    ways, sizes, _ = np.linalg.svd(
-        np.nan_to_num(stress), full_matrices=False
-    )  # NaN where a position was not solved, as its vectors
+    solved = np.isfinite(stress).all(axis=(1, 2))
+    ways, sizes, _ = np.linalg.svd(np.where(solved[:, None, None], stress, 0.0), full_matrices=False)
     loose = sizes > STRESSES.unique
     along = np.einsum("tij,it->tj", ways, vectors) * loose
     left = vectors - np.einsum("tij,tj->it", ways, along)
-    return np.where(loose.sum(axis=-1) == len(vectors), np.nan, np.linalg.norm(left, axis=0))
+    return np.where(solved & (loose.sum(axis=-1) < len(vectors)), np.linalg.norm(left, axis=0), np.nan)
 
 
 def _touched(stress: Array, scale: float = 1.0) -> Mask:
