@@ -303,9 +303,11 @@ class Group:
     freedoms : int
         Freedoms of its pairs that are neither driven nor held fixed.
     redundancy : int
-        Dependent closure equations of its loops, 6 contours + couplings - freedoms.
+        Dependent closure equations of its loops, 6 contours (in a planar mechanism 3) + couplings - freedoms.
     class_, order : int
         Class (largest closed contour or number of pairs on a link) and number of outer pairs.
+    planar : bool
+        Whether it is one of a planar mechanism.
 
     Examples
     --------
@@ -328,11 +330,13 @@ class Group:
     redundancy: int
     class_: int
     order: int
+    planar: bool = False
 
     @property
     def family(self) -> float | None:
         """Freedoms that no link of its contours has, their mean where they differ (the apparent family); None without contours."""
-        return self.redundancy / self.contours if self.contours else None
+        # three freedoms that no link of a planar mechanism has are no constraints there
+        return self.redundancy / self.contours + 3 * self.planar if self.contours else None
 
 
 @dataclass(frozen=True, repr=False)
@@ -536,6 +540,7 @@ class _Maker:
             self.rows.position.graph.width * contours + len(mine.couplings) - free,
             klass,
             order,
+            self.m.planar,
         ), links
 
     def _round(self, mine: LinkSet, outer: Sequence[int]) -> list[int]:

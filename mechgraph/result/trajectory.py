@@ -110,7 +110,7 @@ def _sizes(states: Array) -> Array:
     vectors, stress = states[:, 0], np.moveaxis(states[:, 1:], -1, 0)
     if not stress.shape[-1]:
         return np.asarray(np.linalg.norm(vectors, axis=0))
-    solved = np.isfinite(stress).all(axis=(1, 2))
+    solved = np.asarray(np.isfinite(stress).all(axis=(1, 2)))
     ways, sizes, _ = np.linalg.svd(np.where(solved[:, None, None], stress, 0.0), full_matrices=False)
     loose = sizes > STRESSES.unique
     along = np.einsum("tij,it->tj", ways, vectors) * loose
