@@ -498,3 +498,38 @@ def test_magnitudes_of_positions_that_are_not_solved_are_not_there() -> None:
     s = mg.solve(mg.load("slider-crank"), {"D": np.linspace(0.0, 2.0, 5)}, on_reach="flag")
     assert (s.status != "ok").any()
     assert (np.isnan(s["B"].magnitude) == (s.status != "ok")).all()
+
+
+# --- stiffness, films, catalogue parts -----------------------------------------------------------------------------------
+
+
+def test_redundant_reactions_split_by_stiffness_in_the_plane() -> None:
+    pairs = [p.replace(stiffness={"Fx": 1e6, "Fy": 2e6}) for p in cranks(3).pairs]
+    pairs[4] = pairs[4].replace(misfit={"Fy": 1e-5})
+    m = cranks(3).replace(pairs=pairs, loads=[mg.Wrench("plate", force=(1, 2), moment=0.3, point=(1, 0.5))])
+    twin = mg.solve(m.to_spatial(), {"A0": [0.3, 0.4]}, redundant="elastic")["B1"].force
+    for engine in ENGINES:
+        for method in METHODS:
+            s = mg.solve(m, {"A0": [0.3, 0.4]}, redundant="elastic", engine=engine, method=method)
+            assert np.allclose(s["B1"].force[:, :2], twin[:, :2], rtol=1e-9)
+
+
+def test_stiffness_and_misfit_go_along_into_the_plane() -> None:
+    """The marker of a slide is turned so that x stands on the plane: its y takes over from x, with the sign of the misfit."""
+    spatial = slider_crank().to_spatial()
+    seats = {"stiffness": {"Fx": 7.0, "Fy": 8.0, "Mx": 1.0, "My": 2.0}, "misfit": {"Fx": 1e-3}}
+    pairs = [*spatial.pairs[:3], spatial.pair("D").replace(second=(0, 1, 0), **seats)]
+    flat = spatial.replace(pairs=pairs).to_planar()
+    assert flat.pair("D").stiffness.by_component == {"Fy": 7.0, "Mx": 2.0}
+    assert flat.pair("D").misfit.by_component == {"Fy": -1e-3}
+    assert "D stiffness Fy" in flat.description
+
+
+def test_a_part_with_two_numbers_a_point_is_planar() -> None:
+    boom = [mg.Pair("O", "R", "frame", "boom", point=(0, 0))]
+    jack = mg.parts.cylinder("jack", "frame", (0.5, -1), "boom", (1, 0))
+    links = [mg.Link("frame"), mg.Link("boom", 10.0, (1, 0), 5.0)]
+    m = mg.Mechanism("crane", links, boom, ["jack.lift.Tz"], [mg.Gravity((0, -9.81))], parts=[jack], planar=True)
+    assert mg.check(m).verdict == "Determinate (planar): 1 driver, 9 unknowns, 9 equations; every reaction is unique."
+    arm = 1.0 * 1.0 / np.hypot(0.5, 1.0)  # of the line of the eyes about O
+    assert mg.solve(m, {"jack.lift.Tz": 0.0})["jack.lift"].effort == pytest.approx(10 * 9.81 * 1.0 / arm, rel=1e-9)

@@ -25,8 +25,10 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.plane import dropped, lifted
 from mechgraph.pairs.contact_types import row_of
+from mechgraph.pairs.factors import Component
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.pairs.plane import held_in_plane, in_plane, instead_of
+from mechgraph.pairs.seats import SEATS, Stiffness
 from mechgraph.quantities import is_numeric, unknown, wrong
 
 LEVEL = 1e-9
@@ -168,7 +170,26 @@ class _Flat:
                 what = f"pair {pair.name!r}: {row.symbol} has no counterpart in the plane where it stands; replace it yourself, a ball in a"
                 raise DeclarationError(self.where, [f"{what} groove by Ps with curve=mg.Curve.line(...)"])
             changes |= made[0] if pair.on_a is None else {"on_a": Marker(**made[0]), "on_b": Marker(**made[1])}
+            changes |= self._seats(pair, axes, new, there)
         return pair.replace(**changes)
+
+    def _seats(self, pair: Pair, axes: Array, new: PairType, there: Array) -> dict[str, Any]:
+        """Stiffness and misfit by the components that the pair has in the plane, those along the same lines."""
+        out: dict[str, Any] = {}
+        for what in SEATS:
+            given = getattr(pair, what)
+            values: dict[str, float] = {}
+            for name, value in {} if given is None else given.by_component.items():
+                old = next(c for c in pair.type.reactions or () if c.name == name)
+                along = {c.name: float(_directed(c, there) @ _directed(old, axes)) for c in new.reactions or ()}
+                found = next((other for other, size in along.items() if abs(abs(size) - 1.0) < LEVEL), None)
+                if found is None:
+                    self.lost.append(f"{pair.name} {what} {name}")
+                else:
+                    values[found] = value if what == Stiffness.what else value * np.sign(along[found])
+            if given is not None:
+                out[what] = values or None
+        return out
 
     def _marker(self, pair: Pair, side: Any, end: _End, slides: bool, same: bool) -> dict[str, Any]:
         """Point, axis and second direction in the plane; not the ``same`` as before, they coincide on both links where these stand."""
@@ -182,6 +203,12 @@ class _Flat:
         else:
             axis, second = np.array([0.0, 0.0, end.side]), end.first
         return {"point": (*point[:2].tolist(), 0.0), "axis": tuple(axis.tolist()), "second": tuple(second.tolist())}
+
+
+def _directed(part: Component, axes: Array) -> Array:
+    """The wrench of a component ``(6,)`` in the axes of its marker."""
+    wrench = np.array(part.wrench)
+    return np.concatenate([axes @ wrench[:3], axes @ wrench[3:]])
 
 
 def to_spatial(m: Mechanism, z: Mapping[str, float] | None = None) -> Mechanism:

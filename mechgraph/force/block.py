@@ -293,7 +293,7 @@ def _least(
     totals, multipliers = wrenches.totals, wrenches.multipliers
     if task.redundant == "elastic" and not f.complete:
         every = f.self_stresses(every=True)
-        others = -every[6 * here.system.graph.n_loops :]
+        others = -every[here.system.graph.loop_rows :]
         wrenches = replace(wrenches, stress=here.pair_wrenches(every), multiplier_stress=others)
     stress = _stress(here, wrenches, f, task)
     s = stress.wrenches.shape[2]

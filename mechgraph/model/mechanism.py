@@ -32,7 +32,7 @@ from mechgraph.model.loads import Gravity, Load
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.model.parts import Parts as Catalogued
-from mechgraph.model.plane import in_space, pair_in_plane, pair_in_space, spatial_row
+from mechgraph.model.plane import in_space, is_flat, pair_in_plane, pair_in_space, spatial_row
 from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.pairs.contact_types import row_of, travels
 from mechgraph.pairs.pair_type import TABLE, PairType
@@ -324,7 +324,9 @@ class Mechanism(Parts, Shown):
                 self._set(pairs=tuple(map(pair_in_space, self.pairs)))
             return
         self._set(
-            links=tuple(in_space(link) if isinstance(link, Link) else link for link in self.links),
+            links=tuple(
+                in_space(link) if isinstance(link, Link) and not is_flat(link) else link for link in self.links
+            ),
             pairs=tuple(map(pair_in_plane, self.pairs)),
             loads=tuple(in_space(load) if isinstance(load, Load) else load for load in self.loads),
         )

@@ -30,7 +30,7 @@ from mechgraph.fields import (
     plain,
 )
 from mechgraph.maths.se3 import Array
-from mechgraph.model.pair import Marker, Pair
+from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.pairs.plane import MARKERS, in_plane, instead_of, reach_of
 from mechgraph.quantities import is_numeric, real_array, shown
@@ -86,9 +86,31 @@ def _padded(value: Any, about: FieldFormat) -> Any:
     return value
 
 
+def is_flat(item: Any) -> bool:
+    """Whether a link or pair of a planar mechanism is seen at once to be as it should; False where it takes a closer look."""
+    if type(item) is Pair:
+        if item.on_a is not None or item.contact is not None or item.says_more or not isinstance(item.type, PairType):
+            return False
+        p, z, x, normal = item.point, item.axis, item.second, item.type.normal
+        if not all(type(v) is tuple and len(v) == 3 for v in (p, z, x)) or p[2]:
+            return False
+        return bool(not (z[0] or z[1]) if normal == 2 else normal == 0 and not (z[2] or x[0] or x[1]))
+    if type(item) is Link:
+        c, tensor = item.center, item.inertia
+        if item.points or not (c is None or (type(c) is tuple and len(c) == 3 and not c[2])):
+            return False
+        if tensor is None:
+            return True
+        rows = (
+            type(tensor) is tuple and len(tensor) == 3 and all(type(row) is tuple and len(row) == 3 for row in tensor)
+        )
+        return rows and not (tensor[0][2] or tensor[1][2])
+    return False
+
+
 def pair_in_plane(pair: Any) -> Any:
     """A pair with its row in the plane, and the normal of the plane where its marker says none; itself where it has none there."""
-    if not isinstance(pair, Pair):
+    if not isinstance(pair, Pair) or is_flat(pair):
         return pair
     pair = in_space(pair)
     spatial = spatial_row(pair.type)
@@ -203,10 +225,10 @@ def plane_faults(links: Iterable[Any], pairs: Iterable[Any], loads: Iterable[Any
     """What leaves the plane, one line each."""
     found: list[str] = []
     for link in links:
-        if isinstance(link, Described):
+        if isinstance(link, Described) and not is_flat(link):
             found += _leaving(link, f"link {shown(getattr(link, 'name', ''))}: ")
     for pair in pairs:
-        if isinstance(pair, Pair) and isinstance(pair.type, PairType):
+        if isinstance(pair, Pair) and isinstance(pair.type, PairType) and not is_flat(pair):
             found += _pair_faults(pair)
     for load in loads:
         if isinstance(load, Described):
