@@ -55,6 +55,8 @@ def in_space(item: Item) -> Item:
 
 
 def _in_space(value: Any, about: FieldFormat) -> Any:
+    if value is None and about.normal and about.kind is DIRECTION:
+        return NORMAL
     if value is None or isinstance(value, str) or callable(value):
         return value
     if about.kind is POINTS and isinstance(value, Mapping):
@@ -71,7 +73,7 @@ def _padded(value: Any, about: FieldFormat) -> Any:
     array = real_array(value)
     if array is None:
         return value
-    if about.normal:
+    if about.normal and about.kind is not DIRECTION:
         if array.ndim == 0 or array.shape[-1:] == (1,):
             one = array.reshape(*array.shape[:-1], 1)
             return plain(np.concatenate([np.zeros((*one.shape[:-1], 2)), one], axis=-1))
@@ -258,7 +260,8 @@ def _leaves(value: Any, about: FieldFormat) -> bool:
         return False
     if about.kind is TENSOR:
         return array.shape == (3, 3) and bool(np.abs(array[:2, 2]).max() > ROUNDING * np.abs(array).max())
-    if about.kind not in (*INSIDE, POINTS) or array.ndim == 0 or array.shape[-1] != 3:
+    direction = about.kind is DIRECTION and about.normal
+    if not (direction or about.kind in (*INSIDE, POINTS)) or array.ndim == 0 or array.shape[-1] != 3:
         return False
     return bool(array[..., :2].any() if about.normal else array[..., 2].any())
 
@@ -266,6 +269,8 @@ def _leaves(value: Any, about: FieldFormat) -> bool:
 def _third(about: FieldFormat) -> str:
     if about.kind is TENSOR:
         return f"products of inertia with z leave the plane; expected 0, or a number, the moment of inertia about z ({DROPPED})"
+    if about.kind is DIRECTION:
+        return "expected an axis that stands on the x-y plane; leave it out"
     if about.normal:
         return f"turns out of the plane; expected a number, the moment about z ({DROPPED})"
     return f"leaves the plane; expected z = 0, or two numbers ({DROPPED})"
