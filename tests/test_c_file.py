@@ -72,9 +72,10 @@ def solved(library: ctypes.CDLL, name: str, m: mg.Mechanism, q: list[float]) -> 
 
 
 @pytest.mark.usefixtures("compiled")
-@pytest.mark.parametrize("name", ["rcsr-csr", "bricard-cube", "rssr"])
+@pytest.mark.parametrize("name", ["rcsr-csr", "bricard-cube", "rssr", "planar marghitu-2-1"])
 def test_c_gives_what_solve_gives(name, tmp_path):
-    m = mg.load(name)
+    m = mg.load(name.removeprefix("planar "))
+    m = m.to_planar() if name.startswith("planar") else m
     t = tabled(m)
     write_c(t, tmp_path / "press.c")
     q = (t.home + 0.1).tolist()
