@@ -302,6 +302,21 @@ def test_what_leaves_the_plane_is_named_all_at_once() -> None:
     assert len(error.value.faults) == 7
 
 
+def test_what_is_no_number_is_a_fault_in_the_plane_too() -> None:
+    odd = np.eye(3) * 1j
+    for what in ("center", "inertia", "points"):
+        links = [mg.Link("f"), mg.Link("a", 1.0, **{"center": (0, 0), what: odd})]
+        with pytest.raises(mg.DeclarationError, match=what):
+            mg.Mechanism("x", links, [mg.Pair("A", "R", "f", "a", point=(0, 0))], planar=True)
+    for symbol, axis in (("R", Z), ("P", (1, 0))):
+        for what in ("point", "axis", "second", "roller", "on_a"):
+            pair = mg.Pair("A", symbol, "f", "a", **{"point": (0, 0), "axis": axis, what: odd})
+            with pytest.raises(mg.DeclarationError):
+                mg.Mechanism("x", pairs=[pair], planar=True)
+    with pytest.raises(mg.DeclarationError, match="planar"):
+        mg.Mechanism("x", pairs=[mg.Pair("A", "R", "f", "a")], planar=np.zeros(2))  # type: ignore[arg-type]
+
+
 def test_two_numbers_are_for_planar_mechanisms() -> None:
     with pytest.raises(mg.DeclarationError, match="two where planar=True"):
         mg.Mechanism("x", pairs=[mg.Pair("A", "R", "f", "a", point=(0, 0), axis=Z)])

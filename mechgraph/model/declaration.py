@@ -29,6 +29,7 @@ from mechgraph.fields import (
     TABLES,
     TEXT,
     Formatted,
+    same,
     sound_tol,
     tolerance_fault,
 )
@@ -312,7 +313,7 @@ def declaration_faults(m: Parts) -> list[str]:
         faults += [fault for link in m.links for fault in link.faults()]
     if m.planar is not True and m.planar is not False:
         faults.append(wrong(m.planar, "planar", "true or false"))
-    if m.planar:
+    if m.planar is True:
         faults += plane_faults(m.links, m.pairs, m.loads)
     names, pair_names = _texts(m.link_names()), _texts([pair.name for pair in m.pairs])
     faults += _repeated(names, "link") + _repeated(pair_names, "pair")
@@ -396,7 +397,8 @@ def _links_are_sound(links: Sequence[Link]) -> bool:
     placed = [link.center for link in links if link.center is not None]
     if mass is None or (mass < 0).any() or column(placed, (3,)) is None:
         return False
-    if any(link.faults() for link in links if link.points is not NO_POINTS and link.points != {}):
+    named = [link for link in links if link.points is not NO_POINTS and not same(link.points, {})]
+    if any(link.faults() for link in named):
         return False
     if any(link.center is None and (link.mass > 0 or link.inertia is not None) for link in links):
         return False

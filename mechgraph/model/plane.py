@@ -28,9 +28,10 @@ from mechgraph.fields import (
     axes_of,
     filled_second,
     plain,
+    same,
 )
 from mechgraph.maths.se3 import Array
-from mechgraph.model.pair import Link, Marker, Pair
+from mechgraph.model.pair import NO_POINTS, Link, Marker, Pair
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.pairs.plane import MARKERS, in_plane, instead_of, reach_of
 from mechgraph.quantities import is_numeric, real_array, shown
@@ -99,7 +100,7 @@ def is_flat(item: Any) -> bool:
         return bool(not (z[0] or z[1]) if normal == 2 else normal == 0 and not (z[2] or x[0] or x[1]))
     if type(item) is Link:
         c, tensor = item.center, item.inertia
-        if item.points or not (c is None or (type(c) is tuple and len(c) == 3 and not c[2])):
+        if item.points is not NO_POINTS or not (c is None or (type(c) is tuple and len(c) == 3 and not c[2])):
             return False
         if tensor is None:
             return True
@@ -127,7 +128,7 @@ def pair_in_plane(pair: Any) -> Any:
                     changes[side] = marker.replace(**_normal_said(marker, row.normal))
         elif pair.point is not None or pair.axis is not None:
             changes = _normal_said(pair, row.normal)
-        if any(getattr(pair, name) != value for name, value in changes.items()):
+        if any(not same(getattr(pair, name), value) for name, value in changes.items()):
             pair = pair.replace(**changes)
     if pair.type is row:
         return pair
@@ -144,11 +145,11 @@ def _normal_said(marker: Any, normal: int) -> dict[str, Any]:
             return {"axis": NORMAL, "second": filled_second(NORMAL) if second is None else second}
         if is_numeric(axis, (3,)) and _along_normal(axis):
             exact = (0.0, 0.0, float(axis[2]))
-            return {"axis": exact, "second": filled_second(exact) if second == filled_second(axis) else second}
+            return {"axis": exact, "second": filled_second(exact) if same(second, filled_second(axis)) else second}
         return {}
     if not is_numeric(axis, (3,)) or _along_normal(axis):
         return {}
-    if second is None or second == filled_second(axis):
+    if second is None or same(second, filled_second(axis)):
         second = NORMAL
     elif is_numeric(second, (3,)) and _along_normal(second):
         second = (0.0, 0.0, float(second[2]))
@@ -304,6 +305,8 @@ def _pair_faults(pair: Pair) -> Iterator[str]:
 
 
 def _placed(side: Any) -> bool:
+    if not isinstance(side, Pair | Marker):
+        return False
     return is_numeric(side.axis, (3,)) and is_numeric(side.second, (3,)) and not _parallel(side)
 
 

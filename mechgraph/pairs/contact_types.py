@@ -648,7 +648,7 @@ def shape_faults_of(pair: Any, where: str, tol: float) -> Iterator[str | None]:
         yield from cut_faults(pair.contact, where)
     elif isinstance(pair.curve, Curve):
         yield from curve_faults(pair.type, pair.curve, pair.curve_b, pair.roller, pair.point, where)
-    elif pair.curve_b is not None or pair.roller:
+    elif pair.curve_b is not None or pair.roller is not None:
         yield f"{where}has a curve_b or a roller, but no curve; give curve=, or exchange links a and b"
     elif takes_curves(pair.type) and pair.has_geometry:
         yield f"{where}type {pair.type.symbol} needs a curve, such as curve=mg.Curve.circle(radius=...)"
