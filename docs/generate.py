@@ -50,7 +50,7 @@ GROUPS: Mapping[str, tuple[str, str, tuple[str, ...]]] = {
                 "WormGear",
                 "Rack",
             ),
-            *("Belt", "Curve", "Surface", "Hertz", "Journal", "Stiffness", "Misfit"),
+            *("Belt", "Pulley", "BeltDrive", "Curve", "Surface", "Hertz", "Journal", "Stiffness", "Misfit"),
             *(f"inertia.{name}" for name in ("rod", "box", "cylinder", "sphere", "from_components")),
             *(f"parts.{name}" for name in PARTS),
         ),

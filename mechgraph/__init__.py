@@ -47,6 +47,7 @@ from mechgraph.kinetostatics import Transmission, assemble, kinematics, solve, t
 from mechgraph.maths import inertia
 from mechgraph.maths.tolerances import Tolerances
 from mechgraph.model import parts
+from mechgraph.model.belts import BeltDrive, Pulley
 from mechgraph.model.couplings import Belt, BevelGears, Coupling, Rack, SpurGears, WormGear
 from mechgraph.model.friction import Friction
 from mechgraph.model.loads import Damper, Effort, ForceLaw, ForceTable, Gravity, Spring, TorsionSpring, Wrench
@@ -77,18 +78,19 @@ if TYPE_CHECKING:
     from mechgraph.show.page.write import write_report
 
 __all__ = [
-    "Assemblies", "AssembliesOver", "AssemblyError", "Belt", "BevelGears", "Bookkeeping", "Branches", "Chain",
-    "Compiled", "Component", "ContentError", "Coupling", "Curve", "Damper", "DeadPointError", "DeclarationError",
-    "Decomposition", "DeterminacyReport", "Drive", "Effort", "Event", "Families", "FileError", "ForceLaw",
-    "ForceTable", "Formulation", "FreeBody", "Freedom", "Friction", "FrictionError", "Gravity", "Group", "Hertz",
-    "Identity", "IndeterminateError", "Journal", "Link", "Marker", "Mechanism", "MechgraphError", "MechgraphWarning",
-    "Misfit", "MissingExtraError", "Motion", "MultipleJoint", "OverTime", "Pair", "PairType", "Rack", "ReachError",
-    "Response", "ResponseError", "ResponseSetup", "ShapeError", "Solution", "Spring", "SpurGears", "Stiffness",
-    "Stop", "Structure", "Study", "StudyError", "Surface", "SystemGroup", "Tolerances", "TorsionSpring",
-    "Transmission", "WormGear", "Wrench", "assemble", "assemblies", "atlas", "branches", "chain", "check", "compile",
-    "equilibrium", "formulate", "free_body", "groups", "identify", "inertia", "kinematics", "library", "linearize",
-    "load", "load_chains", "multiple_joints", "over_time", "pair_types", "parts", "respond", "save", "save_chains",
-    "solve", "split_joint", "structure", "study", "system_groups", "transmission", "write_report",
+    "Assemblies", "AssembliesOver", "AssemblyError", "Belt", "BeltDrive", "BevelGears", "Bookkeeping", "Branches",
+    "Chain", "Compiled", "Component", "ContentError", "Coupling", "Curve", "Damper", "DeadPointError",
+    "DeclarationError", "Decomposition", "DeterminacyReport", "Drive", "Effort", "Event", "Families", "FileError",
+    "ForceLaw", "ForceTable", "Formulation", "FreeBody", "Freedom", "Friction", "FrictionError", "Gravity", "Group",
+    "Hertz", "Identity", "IndeterminateError", "Journal", "Link", "Marker", "Mechanism", "MechgraphError",
+    "MechgraphWarning", "Misfit", "MissingExtraError", "Motion", "MultipleJoint", "OverTime", "Pair", "PairType",
+    "Pulley", "Rack", "ReachError", "Response", "ResponseError", "ResponseSetup", "ShapeError", "Solution", "Spring",
+    "SpurGears", "Stiffness", "Stop", "Structure", "Study", "StudyError", "Surface", "SystemGroup", "Tolerances",
+    "TorsionSpring", "Transmission", "WormGear", "Wrench", "assemble", "assemblies", "atlas", "branches", "chain",
+    "check", "compile", "equilibrium", "formulate", "free_body", "groups", "identify", "inertia", "kinematics",
+    "library", "linearize", "load", "load_chains", "multiple_joints", "over_time", "pair_types", "parts", "respond",
+    "save", "save_chains", "solve", "split_joint", "structure", "study", "system_groups", "transmission",
+    "write_report",
 ]  # fmt: skip
 
 

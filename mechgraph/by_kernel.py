@@ -22,7 +22,6 @@ from mechgraph.kinematics.state import ROUNDINGS, ClosureSolver, Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.newton import Work
 from mechgraph.maths.se3 import Array, Index
-from mechgraph.model.couplings import Contact
 from mechgraph.model.loads import Load
 from mechgraph.outcome import Call, Outcome, Starts, system_at
 from mechgraph.result.trajectory import BlockMotion
@@ -241,5 +240,5 @@ def gives_forces(line: Started) -> bool:
         line.options.method == "loop_wrench"
         and line.options.redundant != "elastic"
         and line.acting is line.columns
-        and not any(isinstance(c, Contact) for c in line.m.couplings)
+        and not any(c.steps for c in line.m.couplings)
     )

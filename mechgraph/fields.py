@@ -504,6 +504,11 @@ def _points_fault(value: Any, what: str, minimum: float | None) -> str | None:
     return None
 
 
+def _names_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    good = isinstance(value, list | tuple) and all(isinstance(name, str) and name for name in value)
+    return None if good else wrong(value, what, "a list of names")
+
+
 def _interval_fault(value: Any, what: str, minimum: float | None) -> str | None:
     return (
         None
@@ -620,6 +625,7 @@ FUNCTION = FieldKind(
 )
 BREAKS = FieldKind("rising numbers", {"not": {}}, None, None, True, _rising_fault)
 """Where a function is not smooth; files hold no functions."""
+NAMES = FieldKind("names", {"type": "array", "items": {"type": "string", "minLength": 1}}, fault=_names_fault)
 NUMBERS = FieldKind("n numbers", {"type": "array", "items": {"type": "number"}})
 FACTS = FieldKind("table", {"type": "object"}, dict)
 COEFFICIENTS = FieldKind(

@@ -66,7 +66,6 @@ from mechgraph.maths.linear import independent_rows
 from mechgraph.maths.newton import Nodes
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import MOTIONS, PATH, Tolerances
-from mechgraph.model.couplings import Contact
 from mechgraph.model.loads import Effort, Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import declared
@@ -74,7 +73,7 @@ from mechgraph.outcome import FollowedPositions, Options, Outcome, Starts
 from mechgraph.quantities import door, wrong
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import OK, ranges
-from mechgraph.result.views import PositionLabels
+from mechgraph.result.views import CouplingResult, PositionLabels
 
 Made = TypeVar("Made")
 
@@ -789,8 +788,9 @@ def _wrenches(s: Solution, link: str, guide: str) -> list[tuple[Array, Array, Ar
             p = s.contact(pair.name).center if pair.type.touching else s.link(pair.b).point(pair.markers[1].point)[0]
             found.append((total[..., 3:], total[..., :3] - np.cross(p, total[..., 3:]), p))
     for coupling in m.couplings:
-        if isinstance(coupling, Contact) and link in coupling.gears(m):
+        if coupling.steps and link in coupling.gears(m):
             result = s.coupling(coupling.name)
+            assert isinstance(result, CouplingResult)
             found.append((result.force, np.zeros_like(result.force), result.point))
     return found
 

@@ -486,8 +486,10 @@ def further_doors(folder: Path) -> list[Door]:
     def waiting(kind: Callable, what: str) -> Callable:
         return lambda *args, **more: mg.respond(swung, [0.0, 0.001], **{what: [kind(*args, **more)]})
 
+    hinge = mg.Pair("A", "R", "frame", "p", point=(0, 0, 0), axis=Z)
+
     def geared(kind: Callable, second: mg.Pair) -> Callable:
-        shafts = [mg.Pair("A", "R", "frame", "p", point=(0, 0, 0), axis=Z), second]
+        shafts = [hinge, second]
         return lambda *args, **more: mg.Mechanism("g", None, shafts, couplings=[kind(*args, **more)])
 
     spur, bevel, worm = (
@@ -498,7 +500,29 @@ def further_doors(folder: Path) -> list[Door]:
     on_curve = lambda kind: ready(kind, "Ps")
     on_surface = lambda kind: ready(kind, "Sp")
     frame = {"frame": "minimizing", "guide": None}
+    disc = mg.Pulley("q", "w", (1.5, 0, 0), Z, radius=0.1)
+
+    def belted(**more: Any) -> object:
+        return mg.Mechanism(
+            "b",
+            None,
+            [hinge, spur],
+            gears=[mg.Pulley("p", "p", (0, 0, 0), Z, radius=0.2), disc],
+            couplings=[mg.BeltDrive(**more)],
+        )
+
+    def placed(*args: Any, **more: Any) -> object:
+        return mg.Mechanism("b", None, [hinge, spur], gears=[mg.Pulley(*args, **more)])
+
     return [
+        (
+            "BeltDrive",
+            belted,
+            (),
+            {"name": "b", "over": ["p", "q"], "backs": [], "length": None, "pretension": 3.0, "toothed": True},
+        ),
+        ("Mechanism.gear", placed("p", "w", (1.5, 0, 0), Z, 0.1).gear, ("p",), {}),
+        ("Pulley", placed, ("p", "w", (1.5, 0, 0), Z), {"teeth": 20, "pitch": 0.1}),
         ("Belt", geared(mg.Belt, spur), ("g", "A", "B", (0.3, 0.2)), {"crossed": False}),
         (
             "BevelGears",

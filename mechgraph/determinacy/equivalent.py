@@ -201,6 +201,8 @@ def _in_place_of_gears(parts: _Parts) -> list[str]:
         if not isinstance(c, Contact)
     ]
     for (_, contact), (G, _) in zip(lines.contacts, lines.wrenches, strict=True):
+        if not isinstance(contact, Contact):
+            continue
         first, last = contact.steps[0], contact.steps[-1]
         one, other = m.pairs[first.pair], m.pairs[last.pair]
         wheel_a, wheel_b = (one.a if first.sense > 0 else one.b), (other.b if last.sense > 0 else other.a)

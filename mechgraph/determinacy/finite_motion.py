@@ -298,7 +298,8 @@ class _Curvature:
         """Residuals ``(self-stresses + drivers, T)``."""
         here = Configuration(self.system, np.repeat(self.x[:, None], a.shape[1], axis=1))
         dq = self.N @ a
-        bias = here.closure_bias(here.bias(dq, here.link_twists(dq)))
+        V = here.link_twists(dq)
+        bias = here.closure_bias(here.bias(dq, V), V)
         return np.concatenate([self.stress.T @ bias, self.given @ a - 1.0])
 
     def at(self, a: Array) -> _CurvaturePoint:

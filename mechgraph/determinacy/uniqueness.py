@@ -25,12 +25,13 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from mechgraph.force.reactions import PairFrames, at_pair_points
+from mechgraph.force.reactions import PairFrames, at_pair_points, pretension_conditions
 from mechgraph.graph.linkgraph import labels_of_bipartite
 from mechgraph.kinematics.solver import PROBES, SEED, ClosureRank, EngineName, closure_rank
 from mechgraph.kinematics.state import Configuration, ContactLines
 from mechgraph.maths.se3 import Array, Index, null_space
 from mechgraph.maths.tolerances import STRESSES
+from mechgraph.model.belts import pretensions
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.pairs.factors import Component
@@ -626,11 +627,22 @@ def uniqueness(
     # number of self-stresses up to which all of them tell what is unique; more are represented by random ones
     few = closure.count - closure.rank <= 48
     probes = closure.orthonormal_stress() if few else closure.random_stress(np.random.default_rng(SEED), PROBES)
-    coefficients = np.abs(here.system.coupling_matrix[:, :, 0]).max(axis=1, initial=0.0)
+    probes = _without_pretension(here, probes)
+    coefficients = np.abs(here.coupling_coefficients[:, :, 0]).max(axis=1, initial=0.0)
     multipliers = probes[here.system.graph.loop_rows :]
     states = _on_every_flank(here, probes)
     table = np.concatenate([components.table(one) for one in states], axis=1)
     return Uniqueness(components, closure, table, np.tile(coefficients[:, None] * multipliers, len(states)), probes)
+
+
+def _without_pretension(here: Configuration, probes: Array) -> Array:
+    """Self-stresses ``(rows, s)`` of which the given pretension of belts decides none."""
+    if not here.system.m.once(pretensions):
+        return probes
+    _, C, _ = pretension_conditions(here)
+    A = C[..., 0] @ probes[here.system.graph.loop_rows :]
+    decides = np.abs(A).max(axis=1, initial=0.0) > STRESSES.unique * np.abs(C).max(axis=(1, 2))
+    return np.asarray(probes @ null_space(A[decides], STRESSES.unique))
 
 
 def pair_states(here: Configuration, rows: Array) -> Array:

@@ -8,7 +8,7 @@ and 2.6.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -55,6 +55,7 @@ from mechgraph.equations.terms import (
 from mechgraph.errors import counted
 from mechgraph.files import Format, format_of, write_whole
 from mechgraph.graph.linkgraph import LinkGraph, link_graph
+from mechgraph.model.lines import moving_lines
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Pair
 from mechgraph.pairs.factors import ConstantScrew
@@ -200,18 +201,27 @@ class MotionWords:
             yield Block((*words, "=", "1"), KINDS[POSITION], self.loop_name(i))
         for g, coupling in enumerate(self.m.couplings):
             constant = Symbol("K", "C", name=coupling.name)
-            yield Block((*summed(self.coupled(g, POSITION)), "=", constant), KINDS[POSITION], coupling.name)
+            relation: Sequence[str | Symbol] = summed(self.coupled(g, POSITION))
+            if self.moves(g):
+                relation = [Symbol("f", "C", name=coupling.name)]
+            yield Block((*relation, "=", constant), KINDS[POSITION], coupling.name)
 
     def loop_name(self, i: int) -> str:
         """What a loop is called."""
         return f"loop {i + 1}"
 
+    def moves(self, g: int) -> bool:
+        """Whether the row of a coupling is evaluated from poses: its coefficients ``c`` change with them."""
+        return self.m.couplings[g].name in self.m.once(moving_lines)
+
     def coupled(self, g: int, which: int) -> list[Signed]:
         """The terms of a coupling."""
         out: list[Signed] = []
-        for freedom, c in self.m.couplings[g].terms:
+        moving = self.moves(g)
+        for i, (freedom, c) in enumerate(self.m.couplings[g].terms):
             k, j = self.m.freedom(freedom)
-            out.append(("+" if c > 0 else "-", (*factor(abs(c)), self.freedoms[k][j].numbers[which])))
+            size = (Symbol("c", f"{g + 1}{i + 1}", name=freedom),) if moving else factor(abs(c))
+            out.append(("+" if c > 0 else "-", (*size, self.freedoms[k][j].numbers[which])))
         return out
 
     def closure(self, which: int) -> LinearSystem:
@@ -223,10 +233,18 @@ class MotionWords:
             blocks.append(Block((*summed(terms), "=", "0"), KINDS[which], self.loop_name(i)))
             equations += [self._loop_row(which, i, part) for part in range(6)[self.m.span]]
         for g, coupling in enumerate(self.m.couplings):
-            blocks.append(Block((*summed(self.coupled(g, which)), "=", "0"), KINDS[which], coupling.name))
             places = [self.m.freedom(freedom) for freedom in coupling.freedoms]
             row = tuple(Term(self.first[k] + j, 1.0, coupling=(g, i)) for i, (k, j) in enumerate(places))
-            equations.append(ScalarEquation(f"coupling {coupling.name}", coupling.name, "closure", row))
+            bias = [Symbol("N", "C", name=coupling.name)] if which == ACCELERATION and self.moves(g) else []
+            known = tuple(KnownSymbol(symbol, "row_biases", (g,), 1.0) for symbol in bias)
+            blocks.append(
+                Block(
+                    (*summed(self.coupled(g, which)), *(w for b in bias for w in ("+", b)), "=", "0"),
+                    KINDS[which],
+                    coupling.name,
+                )
+            )
+            equations.append(ScalarEquation(f"coupling {coupling.name}", coupling.name, "closure", row, known=known))
         return LinearSystem(self.m, tuple(self.unknowns(which)), tuple(equations), tuple(blocks), tuple(screws))
 
     def _loop_row(self, which: int, i: int, part: int) -> ScalarEquation:

@@ -468,6 +468,7 @@ class MovingState(State):
     inertias (6, 6, N, T) : the inertia of every link about the global origin, twist to wrench.
     applied (6, N, T) : the applied part of ``loads``.
     gyroscopic (6, N, T) : the inertia wrench of every link were the accelerations of all freedoms zero.
+    row_biases (couplings, T) : velocity part of the second rate of the relation of every coupling, zero of a linear one.
     """
 
     accelerations: Array
@@ -476,6 +477,7 @@ class MovingState(State):
     inertias: Array
     applied: Array
     gyroscopic: Array
+    row_biases: Array
 
     def of_first(self, pairs: int, freedoms: int) -> MovingState:
         """The same of the first pairs alone."""

@@ -25,6 +25,7 @@ from mechgraph.force.reactions import (
     least_under_signs,
     orthonormal_stress,
     pair_power,
+    pretensioned,
     reaction_map,
     reaction_part,
     row_efforts,
@@ -35,6 +36,7 @@ from mechgraph.kinematics.state import Configuration, ContactLines, FactoredClos
 from mechgraph.maths.linear import add_at
 from mechgraph.maths.se3 import Array, Index, cross, rotate_back
 from mechgraph.maths.tolerances import MOTIONS
+from mechgraph.model.belts import pretensions
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 
@@ -179,7 +181,7 @@ def forces_of_block(
         passive = f.motions() if task.idle is None else f.sensitivity()[:, task.idle]
         held, holds, hold_terms = hold(here, task.passive, passive, loads, given, site.largest)
         loads = loads + held
-    wrenches = METHODS[task.method](ForceProblem(here, loads, given, task.driven, f))
+    wrenches = pretensioned(here, METHODS[task.method](ForceProblem(here, loads, given, task.driven, f)), f)
     lines = ContactLines(here)
     found, flank = _least_on_flanks(here, wrenches, f, task, lines)
     dry = [load for load in task.loads if load.follows_reactions]
@@ -274,9 +276,10 @@ def _kept_on_flanks(
         x = f.part(one, alone).self_stresses(every=True)
         change = -x[here.system.graph.loop_rows :]
         own = Wrenches(totals[..., one], alone.pair_wrenches(x), multipliers[:, one], change)
+        own = pretensioned(alone, own, f.part(one, alone))
         y, flank[:, t] = least_under_signs(alone, own, ContactLines(alone), _acting(here, task))
         totals[..., t] += own.stress[..., 0] @ y
-        multipliers[:, t] += change[..., 0] @ y
+        multipliers[:, t] += own.multiplier_stress[..., 0] @ y
     return replace(wrenches, totals=totals, multipliers=multipliers), flank
 
 
@@ -443,6 +446,11 @@ def _least_multipliers(
     Minimizes ``|r + R x|^2 + w^2 |e + M x|^2``, then the same with ``M (x - x_1)`` in place of ``e + M x``: what the weight took from the
     reactions in the first is given back, up to w^4 (method of multipliers, Bertsekas 1982).
     """
+    if here.system.m.once(pretensions):
+        fault = (
+            "redundant='minimum_norm' beside belts with a pretension, of so many self-stresses, takes engine='dense'"
+        )
+        raise DeclarationError(f"mechanism {here.system.m.name!r}", [fault])
     efforts = pair_power(here, totals)
     points = at_pair_points(here, reaction_part(here, totals, efforts)).swapaxes(0, 1).reshape(-1, here.T)
     R = [reaction_map(here, t) for t in range(here.T)]

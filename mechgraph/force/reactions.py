@@ -25,12 +25,15 @@ import scipy
 from mechgraph.equations.build import BookkeepingName, formulate
 from mechgraph.equations.formulation import Formulation
 from mechgraph.equations.terms import MovingState, State
+from mechgraph.errors import DeclarationError
 from mechgraph.force.loads import inertia_wrenches, user_poses, user_twists
 from mechgraph.kinematics.rates import Rates
 from mechgraph.kinematics.state import Configuration, ContactLines, FactoredClosure
 from mechgraph.maths.linear import Choice, ChosenSystem, add_at, choose, least_solution
 from mechgraph.maths.se3 import Array, Index, batch_last, cross, shift_wrench
 from mechgraph.maths.tolerances import STRESSES
+from mechgraph.model.belts import BeltDrive, pretensions
+from mechgraph.model.lines import moving_lines
 from mechgraph.model.parameters import Parameters
 
 
@@ -196,6 +199,59 @@ def loop_wrench(problem: ForceProblem) -> Wrenches:
     loops = here.system.graph.loop_rows
     # J^T x is minus the effort that a row exerts in a freedom
     return Wrenches(tree, here.pair_wrenches(null), -x[loops:, 0], -null[loops:])
+
+
+def pretension_conditions(here: Configuration) -> tuple[list[BeltDrive], Array, Array]:
+    """Belts with a pretension T0, and what it says of the multipliers ``m (n, T)`` of the rows behind those of the loops, ``C m = c``:
+    ``sum l T = T0 sum l`` over the spans of each, ``T = -m``. ``C (b, n, T)``, ``c (b, 1)``.
+    """
+    m, loops = here.system.m, 6 * here.system.graph.n_loops
+    asked = m.once(pretensions)
+    scale = here.system.par.L**2 * np.broadcast_to(here.system.row_scale, (here.system.n_rows, here.T))[loops:]
+    C = np.zeros((len(asked), len(scale), here.T))
+    for i, (belt, rows) in enumerate(asked):
+        poses = user_poses(here)
+        lengths = belt.course_of(
+            m, [np.moveaxis(poses[m.place_of_link(p.link)], 0, 2) for p in belt.pulleys(m)]
+        ).spans.length
+        C[i, rows] = -scale[rows] * lengths / lengths.sum(axis=0)
+    belts = [belt for belt, _ in asked]
+    return belts, C, np.array([[belt.pretension] for belt in belts], dtype=float)
+
+
+def pretensioned(here: Configuration, wrenches: Wrenches, f: FactoredClosure) -> Wrenches:
+    """The same with the pretension of belts, and without the self-stresses that it decides.
+
+    With multipliers ``m + M y`` the conditions are ``C M y = c - C m``; of the self-stresses those with ``C M y = 0`` stay.
+
+    Raises
+    ------
+    DeclarationError
+        where the tensions of a belt with pretension are unique without it.
+    """
+    if not here.system.m.once(pretensions):
+        return wrenches
+    belts, C, c = pretension_conditions(here)
+    stress, change = wrenches.stress, wrenches.multiplier_stress
+    if not f.complete:
+        x = f.self_stresses(every=True)
+        stress, change = here.pair_wrenches(x), -x[6 * here.system.graph.n_loops :]
+    A = np.einsum("int,nst->tis", C, change)
+    known = np.abs(A).max(axis=(0, 2), initial=0.0) <= STRESSES.unique * np.abs(C).max(axis=(1, 2), initial=0.0)
+    if known.any():
+        belt = belts[int(np.argmax(known))]
+        fault = f"pretension = {belt.pretension:g}: the tensions follow from equilibrium, as of a belt with a tensioner; leave it out"
+        raise DeclarationError(f"coupling {belt.belt!r}", [fault])
+    y = np.linalg.pinv(A) @ (c - np.einsum("int,nt->it", C, wrenches.multipliers)).T[..., None]
+    # the rows of V^T behind the conditions span what these leave open
+    mix = np.concatenate([y, np.linalg.svd(A)[2][:, len(belts) :].swapaxes(1, 2)], axis=2)
+    states, multipliers = (np.einsum("...st,tsk->...kt", part, mix) for part in (stress, change))
+    return Wrenches(
+        wrenches.totals + states[:, :, 0],
+        states[:, :, 1:],
+        wrenches.multipliers + multipliers[:, 0],
+        multipliers[:, 1:],
+    )
 
 
 def row_efforts(here: Configuration, multipliers: Array) -> Array:
@@ -366,7 +422,7 @@ def internal_state(here: Configuration, loads: Array, flank: Array | None = None
             reactions[k] = W[:, :, i]
             efforts[k] = here.E[:, g.columns[:, i]]
     coefficients = []
-    for row, coupling in zip(s.coupling_matrix, s.m.couplings, strict=True):
+    for row, coupling in zip(here.coupling_coefficients, s.m.couplings, strict=True):
         places = [s.m.freedom(freedom) for freedom in coupling.freedoms]
         coefficients.append(np.array([row[s.first_column[k] + j] for k, j in places]))
     along, conditions = here.lee_screws
@@ -548,7 +604,19 @@ def user_state(rates: Rates, coordinates: Array, loads: Array, applied: Array, f
         inertias=_user_inertias(here),
         applied=user_wrench(par, applied),
         gyroscopic=user_wrench(par, _inertia_wrenches(here, rates.V, without)),
+        row_biases=here.closure_bias(rates.bias, rates.V)[6 * s.graph.n_loops :] / scale,
+        coefficients=_user_coefficients(here, scale, unit),
     )
+
+
+def _user_coefficients(here: Configuration, scale: Array, unit: Array) -> tuple[Array, ...]:
+    """The coefficients of the couplings in the user's units where some change with the poses; none where they are those declared."""
+    s = here.system
+    if not s.m.once(moving_lines):
+        return ()
+    rows = here.coupling_coefficients / (scale[:, None] * unit)
+    columns = [[s.first_column[k] + j for k, j in map(s.m.freedom, c.freedoms)] for c in s.m.couplings]
+    return tuple(row[own] for row, own in zip(rows, columns, strict=True))
 
 
 def _inertia_wrenches(here: Configuration, V: Array, A: Array) -> Array:

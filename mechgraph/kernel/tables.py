@@ -22,6 +22,7 @@ from mechgraph.kinematics.system import CouplingRows, System
 from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Array, Index, compose, identity, inverse, rotate
 from mechgraph.memo import carried
+from mechgraph.model.lines import moving_lines
 from mechgraph.model.loads import (
     Damper,
     Effort,
@@ -106,6 +107,8 @@ def why_not(system: System) -> str | None:
         if not all(map(_keeps_its_line, row.freedoms)):
             name = m.pairs[int(np.flatnonzero(system.type_of == number)[0])].name
             return f"pair {name!r} ({row.symbol}) has a freedom whose axis moves with the pitch"
+    if moving := m.once(moving_lines):
+        return f"the row of the coupling {moving[0]!r} is evaluated from poses"
     rows = system.graph.loop_rows + len(m.couplings)
     if rows > ROWS_OF_KERNEL:
         return f"it has {rows} closure rows; expected at most {ROWS_OF_KERNEL}"

@@ -167,8 +167,9 @@ class PassiveMotions:
         for i in range(out.shape[2]):
             z = self.rates[:, i]
             U = self.here.link_twists(z)
-            mixed = self.here.bias(dq + z, V + U) - bias - self.here.bias(z, U)
-            ddq = f.solve(-self.here.closure_bias(mixed)[:, None])[:, 0]
+            both, alone = self.here.bias(dq + z, V + U), self.here.bias(z, U)
+            mixed, of = both - bias - alone, self.here.closure_bias
+            ddq = f.solve(-(of(both, V + U) - of(bias, V) - of(alone, U))[:, None])[:, 0]
             out[:, :, i] = self.here.accelerations_with(ddq, mixed)[:, self.links]
         return 0.5 * (out + cross_twist(V[:, self.links][:, :, None], self.twists))
 
@@ -292,7 +293,7 @@ def rates(
     if rest is not None:
         moving = Velocities(here, dq + rest.at_rest(moving.V))
     turning = (moving.dq * moving.dq).max(axis=0, initial=0.0)
-    ddq, gap_a = _completed(here, solver, columns, acceleration, here.closure_bias(moving.bias), turning)
+    ddq, gap_a = _completed(here, solver, columns, acceleration, here.closure_bias(moving.bias, moving.V), turning)
     moved = Rates(moving, ddq, np.maximum(gap_v, gap_a))
     if rest is not None:
         more = rest.still_at_rest(solver, moved.dq, moved.V, moved.bias, moved.A)

@@ -38,11 +38,13 @@ import scipy
 
 from mechgraph.graph.linkgraph import LinkGraph
 from mechgraph.kinematics.layout import ScrewTable, entries_of, run_sums
+from mechgraph.kinematics.lines import LineRows
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import LeastNorm
 from mechgraph.maths.se3 import Array, Index, Mask, compose, cross, cross_twist, finite_twist, move_twist, multiplied
 from mechgraph.maths.tolerances import PATH, RANKS
-from mechgraph.model.couplings import Axes, Contact, Lines
+from mechgraph.model.couplings import Axes, BaseCoupling, Contact, Lines
+from mechgraph.model.lines import moving_lines
 from mechgraph.pairs import pair_type as evaluation
 
 ROUNDINGS = 20
@@ -322,6 +324,12 @@ class Configuration:
         out[s.entry_places] = rows
         return out.reshape(n, s.n_freedoms, self.T)
 
+    @property
+    def coupling_coefficients(self) -> Array:
+        """The rows of the couplings in ``J``, ``(n, F, T)``; of one position where none changes with the poses, ``(n, F, B)``."""
+        s = self.system
+        return self.J[6 * s.graph.n_loops :] if s.m.once(moving_lines) else s.coupling_matrix
+
     def closure_rates(self, dq: Array) -> Array:
         """``J q' (n_rows, T)`` for rates ``dq (F, T)``, without forming ``J``."""
         return _stacked([part.rates(self, dq) for part in self.system.position_rows])
@@ -331,9 +339,11 @@ class Configuration:
         left = [np.abs(self.closure_rates(Z[:, i])).max(initial=0.0) for i in range(Z.shape[1])]
         return max(left, default=0.0) <= PATH.independent * max(1.0, float(np.abs(Z).max(initial=0.0)))
 
-    def closure_bias(self, pairs: Array) -> Array:
-        """Velocity part ``(n_rows, T)`` of the closure accelerations ``J q'' + bias`` from that of the pairs (``bias``, ``(6, P, T)``)."""
-        return _stacked([part.bias(self, pairs) for part in self.system.rows])
+    def closure_bias(self, pairs: Array, V: Array) -> Array:
+        """Velocity part ``(n_rows, T)`` of the closure accelerations ``J q'' + bias`` from that of the pairs (``bias``, ``(6, P, T)``) and
+        the twists ``V (6, N, T)`` of all links.
+        """
+        return _stacked([part.bias(self, pairs, V) for part in self.system.rows])
 
     def row_efforts(self, x: Array) -> Array:
         """Efforts ``(F, k, T)`` that multipliers ``x (n_rows, k, T)`` of rows other than loops exert in the freedoms."""
@@ -499,12 +509,12 @@ class ContactLines:
 
     def __init__(self, here: Configuration) -> None:
         self.here = here
-        self.contacts = [(g, c) for g, c in enumerate(here.system.m.couplings) if isinstance(c, Contact)]
+        self.contacts = [(g, c) for g, c in enumerate(here.system.m.couplings) if c.steps]
 
     def __bool__(self) -> bool:
         return bool(self.contacts)
 
-    def _columns(self, contact: Contact) -> Index:
+    def _columns(self, contact: BaseCoupling) -> Index:
         return np.array([self.here.system.first_column[step.pair] for step in contact.steps], dtype=np.intp)
 
     @cached_property
@@ -514,7 +524,9 @@ class ContactLines:
         """
         return [self._of(g, contact) for g, contact in self.contacts]
 
-    def _of(self, g: int, contact: Contact) -> tuple[Array, Array]:
+    def _of(self, g: int, contact: BaseCoupling) -> tuple[Array, Array]:
+        if not isinstance(contact, Contact):
+            return self._of_line(g)
         here, columns = self.here, self._columns(contact)
         first, last = contact.steps[0].pair, contact.steps[-1].pair
         S = [here.S[:, columns[i]] for i in (0, -1)]
@@ -532,6 +544,14 @@ class ContactLines:
         places = np.arange(here.T)
         G = np.stack([(line * size)[:, pick[i], places] for i in range(2)], axis=1)
         return G, np.stack([P[:, pick[i], places] for i in range(2)], axis=1)
+
+    def _of_line(self, g: int) -> tuple[Array, Array]:
+        """The same of a coupling along a line that the poses tell."""
+        here, row = self.here, 6 * self.here.system.graph.n_loops + g
+        rows = LineRows(here.system, np.array([g]))
+        P = rows.lines(here.poses).point
+        G = rows.wrenches(here.poses) * here.system.row_scale[row] * here.system.par.L
+        return np.repeat(G, 2, axis=1), np.repeat(P, 2, axis=1)
 
     def _lines(self, g: int, axes: Axes) -> Lines:
         """Points and directions of the force; of variants with gears of their own those of each."""
@@ -568,9 +588,16 @@ class ContactLines:
     def relief(self, multipliers: Array, flank: Array) -> Array:
         """What is taken off the wrenches of all pairs ``(6, P, ..., T)`` for multipliers ``(n, ..., T)`` of all couplings."""
         here, out = self.here, self.through(multipliers, flank)
-        for g, contact in self.contacts:
-            for step, column in zip(contact.steps, self._columns(contact).tolist(), strict=True):
-                E = here.E[:, column] * here.system.coupling_matrix[g, column]
+        first, coefficients = here.system.first_column, here.coupling_coefficients
+        steps = [
+            (g, step, column)
+            for g, contact in self.contacts
+            for step in contact.steps
+            for column in range(first[step.pair], first[step.pair + 1])
+        ]
+        if steps:
+            for g, step, column in steps:
+                E = here.E[:, column] * coefficients[g, column]
                 out[:, step.pair] -= E.reshape(6, *(1,) * (multipliers.ndim - 2), here.T) * multipliers[g]
         return out
 
@@ -610,7 +637,7 @@ class ClosureRows:
     def at(cls, here: Configuration, t: int = 0) -> ClosureRows:
         """The rows at one position of a configuration; rows of couplings stand behind those of the loops."""
         s = here.system
-        others = [more for part in s.rows if (more := part.sparse_jacobian(t)) is not None]
+        others = [more for part in s.rows if (more := part.sparse_jacobian(here, t)) is not None]
         more = scipy.sparse.csr_array(scipy.sparse.vstack(others)) if others else None
         return cls(s.graph, s.first_column, here.S[:, :, t], here.pair_points[:, :, t], more)
 

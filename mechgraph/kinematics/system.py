@@ -24,9 +24,11 @@ from numpy.typing import NDArray
 
 from mechgraph.graph.linkgraph import LinkGraph, link_graph
 from mechgraph.kinematics.layout import FACTORS_AT_ONCE, Numbers, Places
+from mechgraph.kinematics.lines import LineRows, RowsInOrder
 from mechgraph.maths.linear import Place, compact
 from mechgraph.maths.se3 import Array, Index, turn_between, turn_tangent, turned
 from mechgraph.memo import graph_cached
+from mechgraph.model.lines import moving_lines
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Parameters, coupling_places, parameters
 from mechgraph.pairs import pair_type as evaluation
@@ -88,11 +90,13 @@ class PositionRows(Protocol):
 class Rows(PositionRows, Protocol):
     """Rows that serve accelerations, forces and the sparse engine as well."""
 
-    def sparse_jacobian(self, t: int) -> scipy.sparse.csr_array | None:
+    def sparse_jacobian(self, here: Evaluated, t: int) -> scipy.sparse.csr_array | None:
         """``J (n, F)`` at one position, entries at the same places at all of them; None for loops (see ``kinematics.state``)."""
 
-    def bias(self, here: Evaluated, pairs: Array) -> Array:
-        """Velocity part ``(n, T)`` of ``d^2 phi/dt^2 = J q'' + bias``, from that of the relative accelerations of ``pairs (6, P, T)``."""
+    def bias(self, here: Evaluated, pairs: Array, V: Array) -> Array:
+        """Velocity part ``(n, T)`` of ``d^2 phi/dt^2 = J q'' + bias``, from that of the relative accelerations of ``pairs (6, P, T)`` and
+        the twists ``V (6, N, T)`` of all links.
+        """
 
     def efforts(self, here: Evaluated, x: Array) -> Array | None:
         """``J^T x (F, k, T)`` for multipliers ``x (n, k, T)``; None where the rows act through pair wrenches, as loops do."""
@@ -128,14 +132,14 @@ class LoopRows:
         """``(C x I6) diag(S_k)``."""
         return here.loop_jacobian
 
-    def sparse_jacobian(self, t: int) -> None:
+    def sparse_jacobian(self, here: Evaluated, t: int) -> None:
         """None: ``kinematics.state`` makes it."""
 
     def rates(self, here: Evaluated, dq: Array) -> Array:
         """``sum_k C_lk S_k q'_k``."""
         return here.loop_sums(here.pair_sums(here.S * dq))
 
-    def bias(self, here: Evaluated, pairs: Array) -> Array:
+    def bias(self, here: Evaluated, pairs: Array, V: Array) -> Array:
         """The velocity parts of the relative accelerations, summed along the loops."""
         return here.loop_sums(pairs)
 
@@ -181,7 +185,7 @@ class CouplingRows:
         """The coefficients."""
         return np.broadcast_to(self.matrix, (*self.matrix.shape[:2], here.T))
 
-    def sparse_jacobian(self, t: int) -> scipy.sparse.csr_array:
+    def sparse_jacobian(self, here: Evaluated, t: int) -> scipy.sparse.csr_array:
         """The coefficients ``(n, F)`` at one position, entries at the same places at all of them."""
         values = self.coefficients[:, t if self.coefficients.shape[1] > 1 else 0]
         return scipy.sparse.csr_array((values, (self.term_rows, self.term_columns)), shape=self.matrix.shape[:2])
@@ -190,7 +194,7 @@ class CouplingRows:
         """``sum_j c_j q'_j``."""
         return self._sums(dq[self.term_columns])
 
-    def bias(self, here: Evaluated, pairs: Array) -> Array:
+    def bias(self, here: Evaluated, pairs: Array, V: Array) -> Array:
         """Zero: the relation is linear."""
         return np.zeros((len(self.constant), here.T), dtype=pairs.dtype)
 
@@ -316,9 +320,20 @@ class System(States):
         """The same where positions alone are asked for."""
         return self.rows
 
-    def _coupling_rows(self) -> CouplingRows:
-        """The rows of the couplings; one without a constant keeps the value that it has at the start."""
-        couplings, numbers, places = self.m.couplings, self.par.couplings, coupling_places(self.m)
+    def _coupling_rows(self) -> Rows:
+        """The rows of the couplings, in order."""
+        moving = self.m.once(moving_lines)
+        on_lines = np.array([c.name in moving for c in self.m.couplings])
+        linear, lines = np.flatnonzero(~on_lines), np.flatnonzero(on_lines)
+        if not lines.size:
+            return self._linear_rows(linear)
+        parts: list[tuple[Index, Rows]] = [(linear, self._linear_rows(linear))] if linear.size else []
+        return RowsInOrder([*parts, (lines, LineRows(self, lines))])
+
+    def _linear_rows(self, which: Index) -> CouplingRows:
+        """The rows of linear couplings, by their places; one without a constant keeps the value that it has at the start."""
+        numbers, every = self.par.couplings, coupling_places(self.m)
+        couplings, places = [self.m.couplings[g] for g in which], [every[g] for g in which]
         found = [self.m.freedom(name) for c in couplings for name in c.freedoms]
         columns = np.array([self.first_column[pair] + freedom for pair, freedom in found])
         rows = np.repeat(np.arange(len(couplings)), [len(c.terms) for c in couplings])
@@ -347,13 +362,17 @@ class System(States):
     @property
     def coupling_matrix(self) -> Array:
         """Coefficients ``(couplings, F, B)`` of the rows behind those of the loops, internal units."""
+        out = np.zeros((len(self.m.couplings), self.n_freedoms, self.par.couplings.shape[1]))
+        for at, part in self.rows[1].parts if self.m.couplings and isinstance(self.rows[1], RowsInOrder) else ():
+            out[at] = part.matrix if isinstance(part, CouplingRows) else 0.0
         parts = [part.matrix for part in self.rows[1:] if isinstance(part, CouplingRows)]
-        return parts[0] if parts else np.zeros((0, self.n_freedoms, 1))
+        return parts[0] if parts else out
 
     @property
     def coupled_freedoms(self) -> Index:
         """Freedoms into which rows other than those of loops bring efforts."""
-        return np.flatnonzero(self.coupling_matrix.any(axis=(0, 2)))
+        places = [self.m.freedom(name) for c in self.m.couplings for name in c.freedoms]
+        return np.unique(np.array([self.first_column[pair] + freedom for pair, freedom in places], dtype=np.intp))
 
     @cached_property
     def carrying(self) -> NDArray[np.bool_]:

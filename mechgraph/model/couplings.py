@@ -79,6 +79,16 @@ class BaseCoupling(Described, ABC):
     def placed(self, m: Any) -> Self:
         """The same with the terms that it has in a mechanism without faults, by the full names of freedoms."""
 
+    def written(self, m: Any) -> tuple[BaseCoupling, ...]:
+        """What a mechanism without faults holds of it: itself, ``placed``; of what is several relations, each of them."""
+        return (self.placed(m),)
+
+    def gears(self, m: Any) -> tuple[str, str]:
+        """The links of gear a and gear b of what acts along a line, placed."""
+        first, last = (m.pairs[self.steps[i].pair] for i in (0, -1))
+        before, behind = self.steps[0].sense > 0, self.steps[-1].sense > 0
+        return (first.a if before else first.b), (last.b if behind else last.a)
+
     @property
     def varies(self) -> bool:
         """Whether its coefficients are numbers of their own, which a study may vary."""
@@ -93,8 +103,8 @@ class BaseCoupling(Described, ABC):
         """The same with quantities of pint as plain numbers in these units; ``turns`` says which freedoms are angles."""
 
     @abstractmethod
-    def converted(self, length: float, turns: Sequence[bool]) -> Self:
-        """The same relation with lengths times ``length``; ``turns`` says which freedoms are angles."""
+    def converted(self, base: tuple[float, float, float], turns: Sequence[bool]) -> Self:
+        """The same relation in other units, lengths, masses and times times ``base``; ``turns`` says which freedoms are angles."""
 
 
 @dataclass(frozen=True, init=False)
@@ -192,8 +202,9 @@ class Coupling(BaseCoupling):
         ]
         return self.replace(terms=terms, constant=without_units(self.constant, LENGTH if slides else PURE, units))
 
-    def converted(self, length: float, turns: Sequence[bool]) -> Self:
-        """The same relation with lengths times ``length``; ``turns`` says which freedoms are angles (the rule stands above)."""
+    def converted(self, base: tuple[float, float, float], turns: Sequence[bool]) -> Self:
+        """The same relation in other units; ``turns`` says which freedoms are angles (the rule stands above)."""
+        length = base[0]
         if not any(turns):
             return self.replace(constant=None if self.constant is None else self.constant * length)
         pairs = zip(self.terms, turns, strict=True)
@@ -388,12 +399,6 @@ class Contact(BaseCoupling):
         object.__setattr__(out, "steps", steps)
         return out
 
-    def gears(self, m: Any) -> tuple[str, str]:
-        """The links of gear a and gear b of a placed contact."""
-        first, last = (m.pairs[self.steps[i].pair] for i in (0, -1))
-        before, behind = self.steps[0].sense > 0, self.steps[-1].sense > 0
-        return (first.a if before else first.b), (last.b if behind else last.a)
-
     def _velocities(self, axes: Axes, P: Array) -> tuple[Array, Array]:
         """Velocities ``(3, T)`` of both gears at a point for unit rates."""
         return cross(axes.za, P - axes.pa), axes.zb if self.slides else cross(axes.zb, P - axes.pb)
@@ -402,9 +407,9 @@ class Contact(BaseCoupling):
         """See ``BaseCoupling``."""
         return self.without_quantities(units)
 
-    def converted(self, length: float, turns: Any) -> Self:
+    def converted(self, base: tuple[float, float, float], turns: Any) -> Self:
         """See ``BaseCoupling``."""
-        return self.in_units((length, 1.0, 1.0))
+        return self.in_units(base)
 
 
 class _OnCarrier(NamedTuple):

@@ -37,6 +37,7 @@ from mechgraph.maths.inertia import physical
 from mechgraph.maths.se3 import IN_PLANE, IN_SPACE, Array
 from mechgraph.maths.tolerances import SHAPES
 from mechgraph.memo import Once, of_graph
+from mechgraph.model.belts import GEARS, Pulley
 from mechgraph.model.couplings import BaseCoupling, rim_faults
 from mechgraph.model.friction import LOADS
 from mechgraph.model.loads import Load
@@ -84,6 +85,9 @@ class Parts(Formatted, Once):
     couplings: Annotated[
         tuple[BaseCoupling, ...],
         TABLES("linear relations between freedoms", key="coupling", table="coupling", default="none"),
+    ]
+    gears: Annotated[
+        tuple[Pulley, ...], TABLES("pulleys, as places on links", key="gear", table="gear", default="none")
     ]
     drives: Annotated[tuple[Drive, ...], TABLES("driven freedoms", key="drive", table="drive", default="none")]
     loads: Annotated[tuple[Load, ...], TABLES("loads", key="load", table="load", default="none")]
@@ -161,6 +165,10 @@ class Parts(Formatted, Once):
     def pair(self, name: str) -> Pair:
         """The pair of that name."""
         return self.pairs[self.place_of_pair(name)]
+
+    def gear(self, name: str) -> Pulley:
+        """The pulley of that name."""
+        return self.gears[self._index(name, _places(c.name for c in self.gears), "pulley")]
 
     def coupling(self, name: str) -> BaseCoupling:
         """The coupling of that name."""
@@ -281,6 +289,7 @@ def _kind_faults(m: Parts) -> list[str]:
         ("link", m.links, (Link,)),
         ("pair", m.pairs, (Pair,)),
         ("coupling", m.couplings, (BaseCoupling,)),
+        ("gear", m.gears, tuple(GEARS.values())),
         ("drive", m.drives, (Drive,)),
         ("load", m.loads, tuple(LOADS.values())),
     ):
@@ -293,11 +302,9 @@ def _kind_faults(m: Parts) -> list[str]:
 
 def _maker(what: str) -> str:
     """How one makes an item of that kind."""
-    return (
-        " or ".join(f"mg.{kind.__name__}(...)" for kind in LOADS.values())
-        if what == "load"
-        else f"mg.{what.capitalize()}(...)"
-    )
+    kinds: Mapping[str, type[Any]] | None = LOADS if what == "load" else GEARS if what == "gear" else None
+    names = [what.capitalize()] if kinds is None else [kind.__name__ for kind in kinds.values()]
+    return " or ".join(f"mg.{name}(...)" for name in names)
 
 
 def declaration_faults(m: Parts) -> list[str]:
@@ -334,7 +341,7 @@ def declaration_faults(m: Parts) -> list[str]:
         for what, value in (("source", m.source), ("description", m.description))
         if not isinstance(value, str)
     ]
-    return faults + _symbol_faults(m) + _reference_faults(m) + _coupling_faults(m)
+    return faults + _symbol_faults(m) + _reference_faults(m) + _gear_faults(m) + _coupling_faults(m)
 
 
 def mapping_faults(**given: Any) -> list[str]:
@@ -488,7 +495,19 @@ def _reference_faults(m: Parts) -> list[str]:
     return faults
 
 
+def _gear_faults(m: Parts) -> list[str]:
+    faults = []
+    for gear in m.gears:
+        where = f"{gear.kind} {shown(gear.name)}: "
+        faults += gear.value_faults(where)
+        if isinstance(gear.link, str) and gear.link not in m.link_index:
+            faults.append(where + unknown("link", gear.link, m.link_names()))
+    return faults + _repeated(_texts([gear.name for gear in m.gears]), "pulley")
+
+
 def _coupling_faults(m: Parts) -> list[str]:
+    if _gear_faults(m):
+        return []
     own = [coupling.faults(m) for coupling in m.couplings]
     faults = [fault for found in own for fault in found]
     faults += rim_faults([c for c, found in zip(m.couplings, own, strict=True) if not found], m)

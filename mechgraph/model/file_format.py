@@ -14,6 +14,7 @@ from typing import Any
 from urllib.parse import quote
 
 from mechgraph.fields import FLAG, INTEGER, NUMBERS, OTHER, SIX, TABLE, TABLES, TEXT, FieldFormat, Formatted, Schema
+from mechgraph.model.belts import GEARS, BeltDrive
 from mechgraph.model.couplings import COUPLINGS
 from mechgraph.model.friction import LOADS
 from mechgraph.model.loads import ForceTable
@@ -34,9 +35,12 @@ WRITABLE = {kind: curve for kind, curve in CURVES.items() if curve is not Functi
 """Curves that a file can hold."""
 WRITABLE_SURFACES = {kind: surface for kind, surface in SURFACES.items() if surface is not ByFunction}
 """The same of surfaces."""
+EVERY_COUPLING = {**COUPLINGS, BeltDrive.kind: BeltDrive}
+"""Couplings by the names of their kinds."""
 KINDS: dict[str, Mapping[str, Any]] = {
     "load": LOADS,
-    "coupling": COUPLINGS,
+    "coupling": EVERY_COUPLING,
+    "gear": GEARS,
     "curve": WRITABLE,
     "surface": WRITABLE_SURFACES,
 }
@@ -140,7 +144,8 @@ TABLES_OF_FILE: dict[str, FileTable] = {
     "film": _table(Journal, words="The oil film of a journal bearing."),
     **{f"curve {kind}": _table(curve) for kind, curve in WRITABLE.items()},
     **{f"surface {kind}": _table(surface) for kind, surface in WRITABLE_SURFACES.items()},
-    **{f"coupling {kind}": _table(coupling) for kind, coupling in COUPLINGS.items()},
+    **{f"coupling {kind}": _table(coupling) for kind, coupling in EVERY_COUPLING.items()},
+    **{f"gear {kind}": _table(gear) for kind, gear in GEARS.items()},
     "chain": _table(
         None,
         words="A single closed loop: prod_k D_k(q_k) Tz(offset_k) Tx(length_k) Rx(twist_k) = 1.",

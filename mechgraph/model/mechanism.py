@@ -26,6 +26,7 @@ from mechgraph.fields import plain, same_fields
 from mechgraph.maths.se3 import Array, identity, inverse
 from mechgraph.maths.tolerances import Tolerances
 from mechgraph.memo import carried, under
+from mechgraph.model.belts import Pulley
 from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.declaration import Parts, declaration_faults, flat_start, item_faults, mapping_faults
 from mechgraph.model.loads import Gravity, Load
@@ -143,6 +144,10 @@ def _couplings(m: Parts) -> Iterator[Block]:
     yield from _listed(f"{c.name}: {c.text}" for c in m.couplings)
 
 
+def _gears(m: Parts) -> Iterator[Block]:
+    yield from _listed(map(repr, m.gears))
+
+
 def _loads(m: Parts) -> Iterator[Block]:
     yield from _listed(map(repr, m.loads))
 
@@ -163,7 +168,8 @@ def _listed(items: Iterable[str]) -> Iterator[Block]:
 
 
 PARTS: Mapping[str, Any] = {
-    "Links": _links, "Pairs": _pairs, "Drivers": _drives, "Couplings": _couplings, "Loads": _loads, "Response": _response, "Start": _start,
+    "Links": _links, "Pairs": _pairs, "Drivers": _drives, "Gears": _gears, "Couplings": _couplings, "Loads": _loads,
+    "Response": _response, "Start": _start,
 }  # fmt: skip
 """The parts of the document by title."""
 
@@ -194,6 +200,8 @@ class Mechanism(Parts, Shown):
         ``Gravity``, ``Wrench``, ``Effort``, ``Spring``, ``TorsionSpring``, ``Damper``, ``ForceLaw``.
     couplings : iterable of Coupling
         Linear relations between freedoms, gears and belts among them; kept with full freedom names, ``"A.Rz"``.
+    gears : iterable of Pulley
+        Pulleys, as places on links.
     parts : iterable of parts.Parts
         Catalogue parts, ``mg.parts.cylinder(...)``: their links, pairs, couplings and loads are written out behind the others.
     frame : str, optional
@@ -246,6 +254,7 @@ class Mechanism(Parts, Shown):
         loads: Iterable[Load] = (),
         *,
         couplings: Iterable[BaseCoupling] = (),
+        gears: Iterable[Pulley] = (),
         parts: Iterable[Catalogued] = (),
         frame: str | None = None,
         start: Mapping[str, Any] | None = None,
@@ -267,6 +276,7 @@ class Mechanism(Parts, Shown):
             links=link_tuple,
             pairs=pair_tuple,
             couplings=_named((*items_of(couplings, "couplings", faults), *more.couplings), pair_tuple),
+            gears=(*items_of(gears, "gears", faults), *more.gears),
             drives=_as_drives(items_of(drives, "drives", faults)),
             loads=(*items_of(loads, "loads", faults), *more.loads),
             frame=first if frame is None else frame,
@@ -286,7 +296,7 @@ class Mechanism(Parts, Shown):
                 self._set(_kept={}, _kept_of_graph={})  # what was found of pairs with quantities
                 faults = declaration_faults(self)
         self._finish(start, faults + mapping_faults(units=units, start=start, expected=expected))
-        self._set(couplings=tuple(c.placed(self) for c in self.couplings))
+        self._set(couplings=tuple(one for c in self.couplings for one in c.written(self)))
         self._doubt()
 
     def _set(self, **fields: Any) -> None:
@@ -306,6 +316,7 @@ class Mechanism(Parts, Shown):
                 if isinstance(item, Drive)
             ],
             "loads": [item.in_own_units(self.units, self.turns) for item in self.loads if isinstance(item, Load)],
+            "gears": [item.without_quantities(self.units) for item in self.gears if isinstance(item, Pulley)],
             "couplings": [
                 item.in_own_units(self.units, [self.turns(name) for name in item.freedoms])
                 for item in self.couplings
@@ -588,7 +599,8 @@ class Mechanism(Parts, Shown):
         return self.replace(
             links=[link.in_units(base) for link in self.links],
             pairs=[pair.in_units(base) for pair in self.pairs],
-            couplings=[c.converted(base[0], [turns(name) for name in c.freedoms]) for c in self.couplings],
+            gears=[g.in_units(base) for g in self.gears],
+            couplings=[c.converted(base, [turns(name) for name in c.freedoms]) for c in self.couplings],
             drives=[drive.in_units(base, turns(drive.freedom)) for drive in self.drives],
             loads=[load.converted(base, turns) for load in self.loads],
             start={name: value if turns(name) else value * base[0] for name, value in self.start.items()},
@@ -768,6 +780,7 @@ class Mechanism(Parts, Shown):
             links=[link.moved(G) for link in self.links],
             pairs=[pair.moved(G) for pair in self.pairs],
             loads=[load.moved(G) for load in self.loads],
+            gears=[g.moved(G) for g in self.gears],
         )
 
 

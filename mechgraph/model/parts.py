@@ -20,6 +20,7 @@ from mechgraph.fields import second_direction
 from mechgraph.maths import inertia
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import SHAPES
+from mechgraph.model.belts import Pulley
 from mechgraph.model.couplings import BaseCoupling, Rack, SpurGears
 from mechgraph.model.loads import Effort, Load, Spring
 from mechgraph.model.pair import Link, Pair
@@ -52,6 +53,8 @@ class Parts:
         Links that the part brings; it may name others.
     pairs : tuple of Pair
         Its pairs.
+    gears : tuple of Pulley
+        Its pulleys.
     couplings : tuple of Coupling
         Its couplings.
     loads : tuple of load
@@ -67,6 +70,7 @@ class Parts:
 
     links: tuple[Link, ...] = ()
     pairs: tuple[Pair, ...] = ()
+    gears: tuple[Pulley, ...] = ()
     couplings: tuple[BaseCoupling, ...] = ()
     loads: tuple[Load, ...] = ()
 
@@ -710,7 +714,7 @@ def rack_and_pinion(
         Pair(slide, "P", base, f"{name}.rack", point=center - r * np.cross(z, x), axis=x, second=z),
     )
     mesh = Rack(f"{name}.mesh", turn, slide, r, float(pressure_angle))
-    return Parts((), pairs, (mesh,))
+    return Parts(pairs=pairs, couplings=(mesh,))
 
 
 @_part
@@ -772,7 +776,7 @@ def gear_stage(
         for turn, link, at in zip(turns, ("pinion", "wheel"), (start, end), strict=True)
     )
     mesh = SpurGears(f"{name}.mesh", *turns, teeth, module, helix_angle=helix_angle, internal=internal)
-    return Parts((), pairs, (mesh,))
+    return Parts(pairs=pairs, couplings=(mesh,))
 
 
 @_part

@@ -27,6 +27,7 @@ from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import Index
 from mechgraph.maths.tolerances import MODES, Tolerances
+from mechgraph.model.lines import moving_lines
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.certificate import TINY, Certificate, certificate, told_apart
 from mechgraph.modes.family import (
@@ -386,6 +387,9 @@ class Question:
                 f"assemblies of {m.name!r}",
                 [f"values of shape {given.batch}: expected single values or a list of them"],
             )
+        if moving := m.once(moving_lines):
+            what = f"the relation of the coupling {moving[0]!r} is no polynomial; leave it out (couplings=) and give its freedoms"
+            raise DeclarationError(f"assemblies of {m.name!r}", [what])
         self.asked, self.m, self.batch, self.names = m, given.m, given.batch, given.names
         self.start = closed_start(self.m)
         if given.free:

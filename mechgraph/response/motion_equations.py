@@ -394,7 +394,7 @@ class Columns:
     def bound(self, dq: Array, ddq: Array | None = None) -> tuple[Velocities, Array, Array]:
         """At rates ``dq (F, T)``, the independent ones constant: velocities, accelerations ``ddq`` of all freedoms, and the inertia."""
         here, velocities = self.here, Velocities(self.here, dq)
-        free = self.f.solve(-here.closure_bias(velocities.bias)[:, None])[:, 0]
+        free = self.f.solve(-here.closure_bias(velocities.bias, velocities.V)[:, None])[:, 0]
         ddq = free if ddq is None else free + ddq
         if self.rest is not None:
             A = here.accelerations_with(ddq, velocities.bias)

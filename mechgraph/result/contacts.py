@@ -23,6 +23,7 @@ from mechgraph.document import Block, Document, Paragraph, Shown
 from mechgraph.errors import DeclarationError
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import SHAPES
+from mechgraph.model.belts import BeltDrive
 from mechgraph.model.pair import Pair
 from mechgraph.pairs.contact_types import (
     Pressed,
@@ -530,7 +531,26 @@ def contacts_of(values: Trajectory) -> dict[str, ContactResult]:
 def lift_offs(values: Trajectory) -> tuple[LiftOff, ...]:
     """Where contacts that are only pushed, or do not say that they are held, would have to pull."""
     found = contacts_of(values).values() if values.has_forces and bool((values.status() == OK).any()) else ()
-    return tuple(lift for contact in found for lift in contact.lift_off)
+    slack = slack_spans(values) if values.has_forces else ()
+    return (*(lift for contact in found for lift in contact.lift_off), *slack)
+
+
+def slack_spans(values: Trajectory) -> Iterator[LiftOff]:
+    """Where spans of belts would have to push."""
+    unit = unit_of(values.mechanism.units, FORCE)
+    belts = [(k, one) for k, one in enumerate(values.whole.couplings) if isinstance(one, BeltDrive)]
+    multipliers, loose = values.multipliers() if belts else (np.zeros((0, 0)), np.zeros((0, 0), dtype=bool))
+    for k, one in belts:
+        tension = np.where(loose[k], 0.0, np.nan_to_num(-multipliers[k])).reshape(values.batch)
+        # part of the greatest tension below which a push is rounding
+        slack = tension < -1e-10 * float(np.nanmax(np.abs(tension), initial=0.0))
+        for found in stretches(values, slack, tension):
+            push = f"{found.amount:.4g}{' ' * bool(unit)}{unit}"
+            text = (
+                f"belt {one.belt}: its span {one.span_names[one.span or 0]} is slack {found.where}: it would have to push with up to "
+                f"{push}. Forces there are not physical. Give the belt more pretension, or its tensioner more load"
+            )
+            yield LiftOff(one.name, *found[:4], text, found.amount)
 
 
 def overlaps(values: Trajectory) -> tuple[Overlap, ...]:

@@ -24,6 +24,7 @@ from mechgraph.model.pair import Link, Marker
 from mechgraph.quantities import BASE_UNITS, FORCE, LENGTH, MOMENT, Count, Positive, door, place_among, unit_of, wrong
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import OK, Mask, bracket, number
+from mechgraph.result.views import CouplingResult
 
 COMPONENTS = ("Mx", "My", "Mz", "Fx", "Fy", "Fz")
 """Names of the components of a wrench."""
@@ -696,6 +697,7 @@ def free_body(s: Solution, link: str) -> FreeBody:
         for link_of, marker, sign in _gears(m, c):
             if link_of == link:
                 mesh = s.coupling(c.name)
+                assert isinstance(mesh, CouplingResult)
                 wrench = sign * np.concatenate([np.cross(mesh.point, mesh.force), mesh.force], axis=-1)
                 add(c.name, "contact", marker.point, wrench, "force of the other gear, about the middle of this one")
     for place, load in enumerate(m.loads):

@@ -19,6 +19,7 @@ from mechgraph.files import Format, csv_of, format_of, json_text, optional, plai
 from mechgraph.maths.newton import Work
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import CHECKS, PATH
+from mechgraph.model.belts import BeltDrive
 from mechgraph.model.loads import Law
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.pairs.factors import WRENCHES
@@ -48,7 +49,7 @@ from mechgraph.result.values import (
     PassedCrossing,
     Unbalanced,
 )
-from mechgraph.result.views import CouplingResult, LinkResult, PairResult, PositionLabels
+from mechgraph.result.views import BeltResult, CouplingResult, LinkResult, PairResult, PositionLabels
 
 if TYPE_CHECKING:
     import pandas
@@ -400,7 +401,7 @@ class Solution(Shown):
         """Sizes ``(..., 2)`` of what is unique of moment and force in ``on_link``, whichever directions that has."""
         return self._values.on_link(self.whole.place_of_pair(pair), self.whole.place_of_link(link))[2]
 
-    def coupling(self, name: str) -> CouplingResult:
+    def coupling(self, name: str) -> CouplingResult | BeltResult:
         """Return the values of a coupling.
 
         Parameters
@@ -432,6 +433,8 @@ class Solution(Shown):
         0.075
         """
         m = self.mechanism
+        if any(isinstance(c, BeltDrive) and c.belt == name for c in m.couplings):
+            return BeltResult(self._values, name)
         return CouplingResult(self._values, m.couplings.index(m.coupling(name)))
 
     @property

@@ -30,6 +30,7 @@ from mechgraph.maths.newton import Work
 from mechgraph.maths.se3 import Array, Index, cross, rotate, rotate_back, shift_wrench
 from mechgraph.maths.tolerances import MOTIONS, PATH, STRESSES
 from mechgraph.model.friction import Friction
+from mechgraph.model.lines import moving_lines
 from mechgraph.model.loads import Law, Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.pairs.pair_type import PairType
@@ -524,6 +525,9 @@ class Trajectory:
     def _through_contacts(self, name: str, columns: slice) -> Array:
         """Efforts ``(f, ..., T)`` of multipliers that act where gears touch each other, not through the pairs of these freedoms."""
         touching = [g for g, c in enumerate(self._system.m.couplings) if c.steps]
+        if self._system.m.once(moving_lines):
+            rows = self._evaluated(lambda block: block.here.coupling_coefficients[touching, columns])
+            return np.asarray(np.einsum("gft,g...t->f...t", rows, self._of(name)[touching]))
         coefficients = self._system.coupling_matrix[touching, columns, 0]
         return np.asarray(np.einsum("gf,g...->f...", coefficients, self._of(name)[touching]))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +12,7 @@ from mechgraph.document import Block, Document, Paragraph, Shown
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import vector_fault
 from mechgraph.maths.se3 import Array
-from mechgraph.model.couplings import Contact
+from mechgraph.model.belts import BeltDrive, Course
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.pairs.pair_type import PairType
@@ -375,9 +375,79 @@ class CouplingResult(Shown):
         """
         m, point = self._values.whole, self.point
         coupling = m.couplings[self._index]
-        assert isinstance(coupling, Contact)
         Va, Vb = (self._values.link(m.place_of_link(name))[1] for name in coupling.gears(m))
         return np.asarray(Vb[..., 3:] - Va[..., 3:] + np.cross(Vb[..., :3] - Va[..., :3], point))
+
+
+class BeltResult(Shown):
+    """Tensions, spans and wraps of a belt."""
+
+    def __init__(self, values: Trajectory, name: str) -> None:
+        self._values, self._name = values, name
+        own = [(k, c) for k, c in enumerate(values.whole.couplings) if isinstance(c, BeltDrive) and c.belt == name]
+        self._spans = {c.span_names[c.span or 0]: k for k, c in own}
+        self._belt = own[0][1]
+
+    def document(self) -> Document:
+        """Ranges of the values over the positions, and where they are reached."""
+        m, places = self._values.mechanism, PositionLabels(self._values)
+        length, force = (bracket(unit_of(m.units, dimension)) for dimension in ((1, 0, 0), (1, 1, -2)))
+        rows = [(f"span {name}{length}", of) for name, of in self.span.items()]
+        rows += [(f"wrap {name} [deg]", np.rad2deg(of)) for name, of in self.wrap.items()]
+        if self._values.has_forces:
+            rows += [(f"tension {name}{force}", of) for name, of in self.tension.items()]
+        blocks = (Paragraph(f"Over {', '.join(self._belt.over)}; {_solved(places)}."), ranges(rows, places.name))
+        return Document(f"Belt {self._name} of {m.name}", blocks)
+
+    @cached_property
+    def _course(self) -> Course:
+        m = self._values.whole
+        links = [m.place_of_link(p.link) for p in self._belt.pulleys(m)]
+        return self._belt.course_of(m, [np.moveaxis(self._values.link(k)[0].reshape(-1, 4, 4), 0, 2) for k in links])
+
+    def _by_name(self, names: Iterable[str], values: Array) -> dict[str, Array]:
+        """Values ``(n, positions)`` by their names, ``(...)`` each."""
+        return {name: one.reshape(self._values.batch) for name, one in zip(names, values, strict=True)}
+
+    @property
+    def tension(self) -> dict[str, Array]:
+        """Tension of every span ``(...)``, ``"p1-p2"``: minus the multiplier of its row; NaN where it is not unique."""
+        return {name: -self._values.multiplier(k) for name, k in self._spans.items()}
+
+    @property
+    def span(self) -> dict[str, Array]:
+        """Length of every span ``(...)``."""
+        return self._by_name(self._spans, self._course.spans.length)
+
+    @property
+    def wrap(self) -> dict[str, Array]:
+        """Angle of wrap on every pulley ``(...)`` [rad]."""
+        return self._by_name(self._belt.over, self._course.wrap)
+
+    @property
+    def length(self) -> Array:
+        """Length of the whole belt ``(...)``."""
+        return self._course.length.reshape(self._values.batch)
+
+    @property
+    def ends(self) -> dict[str, Array]:
+        """Where every span leaves a pulley and where it runs onto the next, ``(..., 2, 3)``, global."""
+        both = np.stack([self._course.spans.start, self._course.spans.end])
+        parts = np.moveaxis(both, (2, 3), (0, 1))
+        return {name: one.reshape(*self._values.batch, 2, 3) for name, one in zip(self._spans, parts, strict=True)}
+
+    @property
+    def friction(self) -> dict[str, Array]:
+        """Friction coefficient that the belt needs on every pulley ``(...)`` to not slip, ``|ln(T1 / T2)| / wrap`` (Euler, Eytelwein).
+
+        Infinite where a strand is slack. Centrifugal force is left out; teeth do without it.
+        """
+        T = np.array(list(self.tension.values()))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            ratio = np.roll(T, 1, axis=0) / T
+            needed = np.abs(np.log(np.where(ratio > 0.0, ratio, np.nan)))
+            needed = np.where((ratio <= 0.0) | (np.minimum(T, np.roll(T, 1, axis=0)) < 0.0), np.inf, needed)
+            return {name: one / self.wrap[name] for name, one in zip(self._belt.over, needed, strict=True)}
 
 
 class LinkResult(Shown):

@@ -1,0 +1,220 @@
+"""Closure rows of couplings whose force acts along a line between two links, evaluated from the poses of both (see ``model.lines``).
+
+With the line at the point P along n, ``G = (P x n, n)``, a row is ``phi - constant``, its rate and acceleration
+
+    phi' = G . (V_b - V_a) = J q',   J_j = s_j G . S_j,   phi'' = J q'' + G . sum s_j bias_j + G' . (V_b - V_a)
+
+over the freedoms j on the way from link a to link b, ``bias_j`` the velocity parts of the relative accelerations of its pairs. G' is the
+derivative of the line along the motion of both poses, by a complex step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy
+
+from mechgraph.maths.se3 import Array, Index, cross, rotate
+from mechgraph.model.lines import LineCoupling, LinesAt, Places, Relation
+
+STEP = 1e-30
+"""Complex step of a derivative: its square is no number beside one."""
+
+
+class LineRows:
+    """Rows of the line couplings at some places among the couplings of a system; lengths over L, so that rows are forces over ``1 / L``."""
+
+    def __init__(self, system: Any, which: Index) -> None:
+        m, self.system = system.m, system
+        self.couplings: list[LineCoupling] = [m.couplings[g] for g in which]
+        self.links = np.array([[m.place_of_link(end.link) for end in c.ends] for c in self.couplings], dtype=np.intp).T
+        steps = [(i, step) for i, c in enumerate(self.couplings) for step in c.steps]
+        self._pairs = tuple(
+            np.array(part) for part in zip(*((i, step.pair, step.sense) for i, step in steps), strict=True)
+        )
+        first = system.first_column
+        terms = [(i, k, step.sense) for i, step in steps for k in range(first[step.pair], first[step.pair + 1])]
+        rows, columns, senses = (np.array(part) for part in zip(*terms, strict=True))
+        self._at_start: tuple[Array, Array] | None = None
+        self._terms = rows.astype(np.intp), columns.astype(np.intp), senses.astype(float)
+
+    @cached_property
+    def _groups(self) -> list[tuple[Relation, Index]]:
+        """The rows of every relation."""
+        found: dict[int, tuple[Relation, list[int]]] = {}
+        for i, c in enumerate(self.couplings):
+            found.setdefault(id(c.relation), (c.relation, []))[1].append(i)
+        return [(relation, np.array(rows)) for relation, rows in found.values()]
+
+    def _places(self, poses: Array, side: int, rows: Index) -> Places:
+        """The places on links a (side 0) or b of some rows, where all links have the poses ``(3, 4, N, T)``."""
+        par, links = self.system.par, self.links[side, rows]
+        X = poses[:, :, links]
+        ends = [self.couplings[i].ends[side] for i in rows]
+        point, axis, mark = (np.array([getattr(end, name) for end in ends]).T for name in ("point", "axis", "mark"))
+        axis, mark = (v / np.sqrt((v * v).sum(axis=0)) for v in (axis, mark))
+        local = (point - par.offset[:, links]) / par.L
+        R = X[:, :3]
+        return Places(rotate(R, local[..., None]) + X[:, 3], rotate(R, axis[..., None]), rotate(R, mark[..., None]))
+
+    def lines(self, poses: Array) -> LinesAt:
+        """Values and lines of all rows where all links have the poses ``(3, 4, N, T)``."""
+        n, T = len(self.couplings), poses.shape[-1]
+        value, point, along = (np.zeros((*shape, T), dtype=poses.dtype) for shape in ((n,), (3, n), (3, n)))
+        for relation, rows in self._groups:
+            numbers = np.array([self.couplings[i].numbers for i in rows]).T[..., None] / self.system.par.L
+            made = relation(self._places(poses, 0, rows), self._places(poses, 1, rows), numbers)
+            value[rows], point[:, rows], along[:, rows] = made
+        return LinesAt(value, point, along)
+
+    def wrenches(self, poses: Array) -> Array:
+        """Unit forces on b along the lines, ``(6, n, T)`` about the internal origin."""
+        at = self.lines(poses)
+        return np.concatenate([cross(at.point, at.along), at.along])
+
+    @property
+    def scale(self) -> Array:
+        """Relations are lengths: over L."""
+        return np.full((len(self.couplings), 1), 1.0 / self.system.par.L)
+
+    def _closed(self, like: type) -> tuple[Array, Array]:
+        """Values ``(n, B)`` of closed rows, and the start state ``(nx, B)``; ``like`` is the class of configurations."""
+        if self._at_start is None:
+            s = self.system
+            x = np.repeat(s.state_of(s.start_coordinates(s.m.start)[:, None]), s.par.batch, axis=1)
+            self._at_start = self._values_at(like(s, x)), x
+        return self._at_start
+
+    def _values_at(self, here: Any) -> Array:
+        longer = np.array([[c.longer] for c in self.couplings]) / self.system.par.L
+        return self.lines(here.poses).value + longer
+
+    def residual(self, here: Any) -> Array:
+        """``phi - constant``, turns counted by the freedoms that turn."""
+        (closed, x0), at = self._closed(type(here)), self.lines(here.poses)
+        rows, out = np.arange(len(self.couplings)), at.value - closed
+        ends = [self._places(here.poses, side, rows) for side in (0, 1)]
+        turned = lambda name: self._gained(here.x, x0, name)
+        for i, c in enumerate(self.couplings):
+            own = [Places(*(part[:, i : i + 1] for part in end)) for end in ends]
+            more = c.whole_turns(at.along[:, i : i + 1], own[0], own[1], turned)
+            period = c.period / self.system.par.L
+            if more is not None:
+                out[i] += more / self.system.par.L
+            elif np.isfinite(period):
+                out[i] -= period * np.round(out[i].real / period)
+        return out
+
+    def _gained(self, x: Array, x0: Array, name: str) -> Array:
+        """By how much a freedom has grown since the start, ``(T,)``."""
+        s = self.system
+        pair, number = s.m.freedom(name)
+        row = s.single_rows[s.first_column[pair] + number]
+        return np.asarray((x[row] - x0[row]).real)
+
+    def error(self, here: Any) -> Array:
+        """The largest of them."""
+        return np.asarray(np.abs(self.residual(here)).max(axis=0))
+
+    def _entries(self, here: Any) -> Array:
+        """``s_j G . S_j`` for every freedom on the ways ``(K, T)``."""
+        rows, columns, senses = self._terms
+        G = self.wrenches(here.poses)
+        return np.asarray(senses[:, None] * (G[:, rows] * here.S[:, columns]).sum(axis=0))
+
+    def jacobian(self, here: Any) -> Array:
+        """``J (n, F, T)``."""
+        rows, columns, _ = self._terms
+        values = self._entries(here)
+        out = np.zeros((len(self.couplings), self.system.n_freedoms, here.T), dtype=values.dtype)
+        out[rows, columns] = values
+        return out
+
+    def sparse_jacobian(self, here: Any, t: int) -> scipy.sparse.csr_array:
+        """``J (n, F)`` at one position."""
+        rows, columns, _ = self._terms
+        shape = len(self.couplings), self.system.n_freedoms
+        one = here if here.T == 1 else here.part(np.array([t]))
+        return scipy.sparse.csr_array((self._entries(one)[:, 0], (rows, columns)), shape=shape)
+
+    def rates(self, here: Any, dq: Array) -> Array:
+        """``J q'``."""
+        rows, columns, _ = self._terms
+        return _summed(rows, self._entries(here) * dq[columns], len(self.couplings))
+
+    def bias(self, here: Any, pairs: Array, V: Array) -> Array:
+        """``G . sum s_j bias_j + G' . (V_b - V_a)``."""
+        rows, pair, sense = self._pairs
+        X, G = here.poses, self.wrenches(here.poses)
+        change = np.stack([cross(V[:3], X[:, k]) for k in range(4)], axis=1)
+        change[:, 3] += V[3:]
+        dG = self.wrenches(X + 1j * STEP * change).imag / STEP
+        a, b = self.links
+        own = sense[:, None] * (G[:, rows] * pairs[:, pair]).sum(axis=0)
+        return _summed(rows, own, len(self.couplings)) + (dG * (V[:, b] - V[:, a])).sum(axis=0)
+
+    def efforts(self, here: Any, x: Array) -> Array:
+        """``J^T x`` in every freedom."""
+        return np.asarray(np.einsum("rft,rkt->fkt", self.jacobian(here), x))
+
+
+def _summed(rows: Index, values: Array, count: int) -> Array:
+    """Sums ``(count, T)`` of values ``(K, T)`` by rows."""
+    out = np.zeros((count, values.shape[1]), dtype=values.dtype)
+    np.add.at(out, rows, values)
+    return out
+
+
+class RowsInOrder:
+    """Rows of couplings of several contributors, in the order of the couplings: ``parts`` with the places of their rows."""
+
+    def __init__(self, parts: Iterable[tuple[Index, Any]]) -> None:
+        self.parts = list(parts)
+        self.count = sum(len(at) for at, _ in self.parts)
+
+    def _merged(self, found: Iterable[Array]) -> Array:
+        values = list(found)
+        out = np.zeros(
+            (self.count, *np.broadcast_shapes(*(v.shape[1:] for v in values))), dtype=np.result_type(*values)
+        )
+        for (at, _), own in zip(self.parts, values, strict=True):
+            out[at] = own
+        return out
+
+    @property
+    def scale(self) -> Array:
+        """See ``Rows``."""
+        return self._merged(part.scale for _, part in self.parts)
+
+    def residual(self, here: Any) -> Array:
+        """See ``Rows``."""
+        return self._merged(part.residual(here) for _, part in self.parts)
+
+    def error(self, here: Any) -> Array:
+        """See ``Rows``."""
+        return np.asarray(np.max([part.error(here) for _, part in self.parts], axis=0))
+
+    def jacobian(self, here: Any) -> Array:
+        """See ``Rows``."""
+        return self._merged(part.jacobian(here) for _, part in self.parts)
+
+    def sparse_jacobian(self, here: Any, t: int) -> scipy.sparse.csr_array:
+        """See ``Rows``."""
+        stacked = scipy.sparse.csr_array(scipy.sparse.vstack([part.sparse_jacobian(here, t) for _, part in self.parts]))
+        order = np.argsort(np.concatenate([at for at, _ in self.parts]))
+        return scipy.sparse.csr_array(stacked[order])
+
+    def rates(self, here: Any, dq: Array) -> Array:
+        """See ``Rows``."""
+        return self._merged(part.rates(here, dq) for _, part in self.parts)
+
+    def bias(self, here: Any, pairs: Array, V: Array) -> Array:
+        """See ``Rows``."""
+        return self._merged(part.bias(here, pairs, V) for _, part in self.parts)
+
+    def efforts(self, here: Any, x: Array) -> Array:
+        """See ``Rows``."""
+        return np.asarray(sum(part.efforts(here, x[at]) for at, part in self.parts))

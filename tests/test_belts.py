@@ -1,0 +1,349 @@
+"""Belts over pulleys: lengths, wraps, tensions, tensioners, against closed forms."""
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mechgraph as mg
+from mechgraph.model.belts import angle, course, span
+
+Z = (0, 0, 1)
+UP = np.array(Z, dtype=float)[:, None, None]
+RADII = np.array([20, 40]) * 5 / (2 * np.pi)
+
+
+def at(*places):
+    return np.array([(*p, 0.0) for p in places]).T[:, :, None]
+
+
+# --- geometry ------------------------------------------------------------------------------------------------------------
+
+
+def test_open_and_crossed_belt_have_the_lengths_of_the_books():
+    """20 and 40 teeth of pitch 5 at 200: 551.2672, wrap 170.8714 deg; crossed 561.4537."""
+    open_, crossed = (course(at((0, 0), (200, 0)), UP, RADII * [1, s]) for s in (1, -1))
+    r, R, C = *RADII, 200.0
+    lean = np.arcsin((R - r) / C)
+    assert open_.length[0] == pytest.approx(2 * C * np.cos(lean) + np.pi * (r + R) + 2 * lean * (R - r), rel=1e-13)
+    np.testing.assert_allclose(open_.length, 551.2672, atol=5e-5)
+    np.testing.assert_allclose(np.rad2deg(open_.wrap[0]), 170.8714, atol=5e-5)
+    np.testing.assert_allclose(crossed.length, 561.4537, atol=5e-5)
+    np.testing.assert_allclose([open_.turns[0], crossed.turns[0]], [1, 0], atol=1e-12)
+
+
+def test_an_idler_on_the_back_takes_wrap_and_gives_it():
+    """Two pulleys of radius 1 at 4; an idler of radius 0.5 presses the upper strand down: turns of the belt are one all the same."""
+    plain = course(at((4, 0), (0, 0)), UP, np.ones(2))
+    pressed = course(at((4, 0), (2, 1.2), (0, 0)), UP, np.array([1, -0.5, 1]))
+    # the span from (4, 0) to the idler: inner tangent
+    d, off = np.hypot(2, 1.2), 1.5
+    np.testing.assert_allclose(pressed.spans.length[0], np.sqrt(d * d - off * off), rtol=1e-13)
+    lean = np.arctan2(1.2, 2) - np.arcsin(off / d)
+    np.testing.assert_allclose(pressed.wrap[1], -2 * lean, rtol=1e-12)
+    np.testing.assert_allclose(pressed.wrap[[0, 2]], np.pi - lean, rtol=1e-12)
+    np.testing.assert_allclose([plain.turns[0], pressed.turns[0]], 1, rtol=1e-13)
+
+
+def test_the_rate_of_a_row_is_the_velocity_along_the_span():
+    """Gradient of l + w_b (theta_b - phi) - w_a (theta_a - phi) by differences: u . (v_b - v_a) at the points on the span."""
+    rng = np.random.default_rng(3)
+    for wa, wb in ((0.3, 0.5), (0.3, -0.5), (-0.4, 0.2)):
+        ca, cb, va, vb = (np.array([*rng.uniform(-1, 1, 2), 0.0])[:, None] for _ in range(4))
+        cb = cb + np.array([[3.0], [1.0], [0.0]])
+        theta, omega = rng.uniform(-1, 1, 2), rng.uniform(-1, 1, 2)
+
+        def value(h, ca=ca, cb=cb, va=va, vb=vb, wa=wa, wb=wb, theta=theta, omega=omega):
+            marks = [np.array([[np.cos(t)], [np.sin(t)], [0 * t]]) for t in theta + h * omega]
+            made = span(ca + h * va, cb + h * vb, UP[:, 0], wa, wb)
+            return made.length + wb * angle(made.along, marks[1], UP[:, 0]) - wa * angle(made.along, marks[0], UP[:, 0])
+
+        here = span(ca, cb, UP[:, 0], wa, wb)
+        points = [here.start - ca, here.end - cb]
+        speed = [v + w * np.cross([0, 0, 1], p[:, 0])[:, None] for v, w, p in zip((va, vb), omega, points, strict=True)]
+        rate = (here.along * (speed[1] - speed[0])).sum(axis=0)
+        h = 1e-6
+        np.testing.assert_allclose((value(h) - value(-h)) / (2 * h), rate, atol=1e-8)
+        np.testing.assert_allclose(value(1e-30j).imag / 1e-30, rate, rtol=1e-12)
+
+
+# --- fixed centers -------------------------------------------------------------------------------------------------------
+
+
+def pulleys(places, radii, axis=Z, **more):
+    return [mg.Pulley(k, k, (*p, 0), axis, radius=r, **more) for (k, p), r in zip(places.items(), radii, strict=True)]
+
+
+def hinges(places):
+    return [mg.Pair(k, "R", "frame", k, point=(*p, 0), axis=Z) for k, p in places.items()]
+
+
+TWO = {"p": (0.0, 0.0), "w": (0.2, 0.0)}
+
+
+def drive(places=TWO, radii=(0.05, 0.05), drives=("p",), loads=(), pairs=(), links=None, **belt):
+    belt.setdefault("over", list(places))
+    return mg.Mechanism(
+        "belt",
+        links,
+        [*hinges(places), *pairs],
+        drives,
+        loads,
+        gears=pulleys(places, radii),
+        couplings=[mg.BeltDrive("B", **belt)],
+    )
+
+
+@pytest.mark.parametrize("backs", [(), ("w",)])
+def test_pulleys_turn_by_their_radii(backs):
+    s = mg.solve(drive(radii=(0.05, 0.1), backs=backs), {"p": np.linspace(0, 20, 5)})
+    np.testing.assert_allclose(s["w"].position[:, 0], np.linspace(0, 20, 5) * (-0.5 if backs else 0.5), atol=1e-10)
+    assert abs(mg.check(s.mechanism).ratios["w.Rz"]["p.Rz"]) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("method", ["loop_wrench", "newton_euler"])
+@pytest.mark.parametrize("load", [7.0, -7.0])
+def test_tensions_are_the_pretension_and_half_the_load(load, method):
+    """T0 +- M / 2r, and the shafts feel both strands."""
+    m = drive(pretension=300.0, loads=[mg.Effort("w", load)])
+    s = mg.solve(m, {"p": [0.0, 1.0]}, method=method)
+    tension = s.coupling("B").tension
+    np.testing.assert_allclose(tension["p-w"], 300 + load / 0.1, rtol=1e-9)
+    np.testing.assert_allclose(tension["w-p"], 300 - load / 0.1, rtol=1e-9)
+    np.testing.assert_allclose(s["p"].effort[:, 0], -load, rtol=1e-9)
+    np.testing.assert_allclose(s["w"].force[:, 0], 600.0, rtol=1e-9)
+    np.testing.assert_allclose(s["p"].force[:, 0], -600.0, rtol=1e-9)
+    assert mg.check(m).redundancy >= 1
+
+
+def test_without_pretension_the_tensions_are_not_known_and_their_difference_is():
+    m = drive(loads=[mg.Effort("w", 7.0)])
+    bare = drive(pretension=0.0).replace(couplings=[])
+    assert mg.check(m).redundancy == mg.check(bare).redundancy + 1
+    s = mg.solve(m, {"p": 0.0})
+    assert all(np.isnan(T) for T in s.coupling("B").tension.values())
+    np.testing.assert_allclose(s["p"].effort[0], -7.0, rtol=1e-12)
+    least = mg.solve(m, {"p": 0.0}, redundant="minimum_norm").coupling("B").tension
+    np.testing.assert_allclose(least["p-w"] - least["w-p"], 7.0 / 0.05, rtol=1e-9)
+
+
+def test_facts_of_a_solution():
+    m = drive({"p": (0, 0), "w": (200, 0)}, RADII, toothed=False, pretension=100.0, loads=[mg.Effort("w", 1000.0)])
+    b = mg.solve(m, {"p": [0.0, 1.0]}).coupling("B")
+    np.testing.assert_allclose(b.length, 551.2672, atol=5e-5)
+    np.testing.assert_allclose(np.rad2deg(b.wrap["p"]), 170.8714, atol=5e-5)
+    np.testing.assert_allclose(b.span["p-w"], np.sqrt(200**2 - np.diff(RADII) ** 2).item(), rtol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(np.diff(b.ends["w-p"], axis=1), axis=-1)[:, 0], b.span["w-p"], rtol=1e-12)
+    T = 100 + np.array([1, -1]) * 1000 / (2 * RADII[1])
+    np.testing.assert_allclose(b.friction["p"], np.log(T[0] / T[1]) / b.wrap["p"], rtol=1e-9)
+    assert "wrap p" in str(b)
+
+
+def test_a_slack_span_is_a_warning():
+    m = drive(pretension=30.0, loads=[mg.Effort("w", 7.0)])
+    with pytest.warns(mg.MechgraphWarning, match="w-p is slack"):
+        s = mg.solve(m, {"p": [0.0, 1.0]})
+    (found,) = s.warnings
+    assert found.force == pytest.approx(40.0)
+    assert "w-p" in found.text
+    assert "slack" in found.text
+    assert np.isinf(s.coupling("B").friction["p"]).all()
+    assert not mg.solve(m, {"p": [0.0]}, loads=[]).warnings
+
+
+# --- centers that move ---------------------------------------------------------------------------------------------------
+
+ARM = mg.Pair("arm", "R", "frame", "arm", point=(0.35, 0.1, 0), axis=Z)
+ON_ARM = mg.Pair("i", "R", "arm", "i", point=(0.2, 0.05, 0), axis=Z)
+THREE = {"w": (0.4, 0.0), "i": (0.2, 0.05), "p": (0.0, 0.0)}
+
+
+def tensioner(loads=(), drives=("p",), radii=(0.1, 0.04, 0.05), **belt):
+    """An idler on an arm presses on the back of the upper strand."""
+    places = {k: THREE[k] for k in ("w", "p")}
+    return mg.Mechanism(
+        "tensioner",
+        None,
+        [*hinges(places), ARM, ON_ARM],
+        drives,
+        loads,
+        gears=pulleys(THREE, radii),
+        couplings=[mg.BeltDrive("B", over=["w", "i", "p"], backs=["i"], **belt)],
+    )
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize("method", ["loop_wrench", "newton_euler", "printed"])
+@pytest.mark.parametrize("load", [6.0, -6.0])
+def test_a_tensioner_determines_the_tensions(load, method, engine):
+    """Tension beside the idler: couple of the arm over the arms of both strands about its pivot, whatever the load."""
+    couple = 12.0
+    m = tensioner([mg.Effort("arm", couple), mg.Effort("w", load)])
+    plain = mg.check(m.replace(couplings=[], drives=["p", "w", "i", "arm"]))
+    assert mg.check(m).redundancy == plain.redundancy
+    s = mg.solve(m, {"p": [0.0, 2.0, 30.0]}, method=method, engine=engine)
+    b = s.coupling("B")
+    pivot = np.array([0.35, 0.1, 0])
+    moment = 0.0
+    for name, sense in (("w-i", -1.0), ("i-p", 1.0)):
+        start, end = b.ends[name][:, 0], b.ends[name][:, 1]
+        u = (end - start) / b.span[name][:, None]
+        moment = moment + sense * np.cross(start - pivot, u)[:, 2]
+    expected = -couple / moment
+    np.testing.assert_allclose(b.tension["w-i"], expected, rtol=1e-9)
+    np.testing.assert_allclose(b.tension["i-p"], expected, rtol=1e-9)
+    np.testing.assert_allclose(b.tension["p-w"], expected + load / 0.1, rtol=1e-9)
+    np.testing.assert_allclose(b.length, b.length[0], rtol=1e-12)
+    np.testing.assert_allclose(s["w"].position[:, 0], np.array([0, 1, 15.0]), atol=1e-9)
+    strands = sum(
+        sense * (b.ends[k][:, 1] - b.ends[k][:, 0]) / b.span[k][:, None] * b.tension[k][:, None]
+        for k, sense in (("p-w", -1), ("w-i", 1))
+    )
+    np.testing.assert_allclose(s["w"].force, -strands, atol=1e-7)
+
+
+def on_a_slide(links=None, drives=("x", "p"), loads=()):
+    """The driven pulley on a slide, the idler on an arm: as one goes, the other must follow."""
+    slide = mg.Pair("x", "P", "frame", "block", point=(0.4, 0, 0), axis=(1, 0, 0))
+    on_block = mg.Pair("w", "R", "block", "w", point=(0.4, 0, 0), axis=Z)
+    return mg.Mechanism(
+        "slide",
+        links,
+        [slide, on_block, *hinges({"p": (0, 0)}), ARM, ON_ARM],
+        drives,
+        loads,
+        gears=pulleys(THREE, (0.1, 0.04, 0.05)),
+        couplings=[mg.BeltDrive("B", over=["w", "i", "p"], backs=["i"])],
+    )
+
+
+def test_the_arm_follows_the_length_of_the_belt():
+    """A pulley on a slide moves by x: d psi / dx = -(dL/dx) / (dL/dpsi), L the length about pulleys anywhere."""
+    m = on_a_slide()
+    x = np.array([0.0, 0.004, 0.008])
+    s = mg.solve(m, {"x": mg.Motion(x, 0.1, 0.3), "p": mg.Motion(0.5 * x, 0.0, 0.0)})
+
+    def length(x, psi):
+        turn = np.array([[np.cos(psi), -np.sin(psi)], [np.sin(psi), np.cos(psi)]])
+        idler = np.array([0.35, 0.1]) + turn @ [-0.15, -0.05]
+        return course(at((0.4 + x, 0), idler, (0, 0)), UP, np.array([0.1, -0.04, 0.05])).length[0]
+
+    for k in range(3):
+        psi, h = s["arm"].position[k, 0], 1e-6
+        assert length(x[k], psi) == pytest.approx(length(0, 0), rel=1e-12)
+        dx = (length(x[k] + h, psi) - length(x[k] - h, psi)) / (2 * h)
+        dpsi = (length(x[k], psi + h) - length(x[k], psi - h)) / (2 * h)
+        assert s["arm"].velocity[k, 0] == pytest.approx(-0.1 * dx / dpsi, rel=1e-7)
+    # acceleration of the arm by differences of its rate along the same motion
+    h = 1e-5
+    near = [mg.solve(m, {"x": mg.Motion(0.004 + d * 0.1, 0.1 + d * 0.3), "p": mg.Motion(0.002, 0.0)}) for d in (-h, h)]
+    change = (near[1]["arm"].velocity - near[0]["arm"].velocity) / (2 * h)
+    np.testing.assert_allclose(s["arm"].acceleration[1], change[0] if change.ndim > 1 else change, rtol=1e-5)
+
+
+def test_turns_count_on_flat_belts_whose_centers_move():
+    """Many turns of the driver with a tensioner that moves: the driven pulley keeps the ratio of the radii (irrational)."""
+    turns = np.linspace(0, 200.0, 41)
+    s = mg.solve(tensioner([mg.Effort("arm", 12.0)]), {"p": turns})
+    np.testing.assert_allclose(s["w"].position[:, 0], 0.5 * turns, atol=1e-8)
+    np.testing.assert_allclose(s["i"].position[:, 0] + s["arm"].position[:, 0], -1.25 * turns, atol=1e-8)
+
+
+def test_a_longer_belt_lets_the_arm_swing():
+    plain = mg.solve(tensioner(), {"p": 0.0}).coupling("B").length
+    m = tensioner(length=float(plain) - 1e-3)
+    s = mg.solve(m, {"p": [0.0, 0.3]})
+    np.testing.assert_allclose(s.coupling("B").length, float(plain) - 1e-3, rtol=1e-12)
+    assert (np.abs(s["arm"].position) > 1e-3).all()
+
+
+def test_energy_of_a_tensioner_that_swings():
+    """Free motion with springs, centers moving: the balance of energy closes, and the length stays."""
+    heavy = [
+        mg.Link("frame"),
+        mg.Link("block", 3.0, (0.4, 0, 0)),
+        *(mg.Link(k, 2.0, (*THREE[k], 0), mg.inertia.cylinder(2.0, 0.05, 0.02)) for k in ("w", "p")),
+        mg.Link("arm", 1.0, (0.3, 0.08, 0), mg.inertia.rod(1.0, (0.35, 0.1, 0), (0.2, 0.05, 0))),
+        mg.Link("i", 0.5, (*THREE["i"], 0), mg.inertia.cylinder(0.5, 0.04, 0.02)),
+    ]
+    loads = [
+        mg.TorsionSpring("arm", stiffness=40.0, free=0.2),
+        mg.Spring(freedom="x", stiffness=9e3),
+        mg.Effort("w", 1.0),
+    ]
+    r = mg.respond(on_a_slide(heavy, (), loads), np.linspace(0, 0.1, 6), rtol=1e-9, atol=1e-11)
+    assert np.abs(r.energy.balance).max() < 1e-6 * np.abs(r.energy.kinetic).max()
+    assert np.abs(r["arm"].position).max() > 1e-3
+    np.testing.assert_allclose(r.coupling("B").length, r.coupling("B").length[0], rtol=1e-10)
+
+
+# --- declaration ---------------------------------------------------------------------------------------------------------
+
+
+def test_it_is_written_out_and_comes_back_equal(tmp_path: Path):
+    m = drive(pretension=300.0, radii=(0.05, 0.1)).replace(units={"length": "m", "mass": "kg", "time": "s"})
+    assert [c.name for c in m.couplings] == ["B.p-w", "B.w-p"]
+    mg.save(m, tmp_path / "m.toml")
+    assert mg.load(tmp_path / "m.toml") == m
+    assert pickle.loads(pickle.dumps(m)) == m
+    mm = m.to_units(length="mm")
+    assert mm.couplings[0].pretension == pytest.approx(300e3)
+    assert mm.gears[1].radius == pytest.approx(100.0)
+    turned = np.array([[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1.0]])
+    s, t = (mg.solve(one, {"p": 0.5}, loads=[mg.Effort("w", 2.0)]).coupling("B") for one in (m, m.moved(turned)))
+    np.testing.assert_allclose(s.tension["p-w"], t.tension["p-w"], rtol=1e-12)
+
+
+def test_teeth_and_pitch_make_the_radius():
+    p = mg.Pulley("p", "p", (0, 0, 0), Z, teeth=20, pitch=5.0)
+    assert p.pitch_radius == pytest.approx(RADII[0])
+
+
+WRONG = {
+    "unknown pulley": (lambda: drive(over=["p", "x"]), "unknown pulley 'x'"),
+    "one pulley": (lambda: drive(over=["p"]), "two pulleys or more"),
+    "twice": (lambda: drive(over=["p", "w", "p"]), "names 'p' twice"),
+    "a back that is none": (lambda: drive(backs=["q"]), "backs"),
+    "overlap": (lambda: drive(radii=(0.15, 0.15), backs=["w"]), "overlap"),
+    "inside": (lambda: drive(radii=(0.5, 0.1)), "inside the other"),
+    "length": (lambda: drive(length=0.8), "ask for 0.714159"),
+    "clockwise": (
+        lambda: drive({"a": (0, 0), "b": (0.2, 0.3), "c": (0.4, 0)}, (0.05, 0.05, 0.05)),
+        "list them counter-clockwise",
+    ),
+    "no touch": (
+        lambda: drive({"a": (0.4, 0), "b": (0.2, 0.2), "c": (0, 0)}, (0.05, 0.05, 0.05), backs=["b"]),
+        "does not touch 'b'",
+    ),
+    "a pulley without size": (
+        lambda: mg.Mechanism("m", pairs=hinges(TWO), gears=[mg.Pulley("p", "p", (0, 0, 0), Z)]), "expected the radius"),
+    "pretension with tensioner": (
+        lambda: mg.solve(tensioner([mg.Effort("arm", 12.0)], pretension=3.0), {"p": 0.0}),
+        "leave it out",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("make", "told"), WRONG.values(), ids=WRONG)
+def test_faults(make, told):
+    with pytest.raises(mg.DeclarationError) as error:
+        make()
+    assert told in str(error.value)
+
+
+@pytest.mark.parametrize("unknowns", ["kinetostatics", "response"])
+def test_the_printed_equations_are_the_solved_ones(unknowns):
+    """Closure and force equations of a tensioner at a position with rates: what is solved meets what is printed."""
+    m = on_a_slide(loads=[mg.Effort("arm", 12.0), mg.Effort("w", 5.0)])
+    s = mg.solve(m, {"x": mg.Motion([0.002], 0.3, 0.7), "p": mg.Motion([0.4], 2.0, -1.0)})
+    f, state = mg.formulate(m, unknowns=unknowns), s.state(0)
+    names = m.freedom_names()
+    rates = {
+        1: [s[n.split(".")[0]].velocity[0, 0] for n in names],
+        2: [s[n.split(".")[0]].acceleration[0, 0] for n in names],
+    }
+    for system, values in zip((f.closure.velocity, f.closure.acceleration), rates.values(), strict=True):
+        A, b = system.assemble(state)
+        np.testing.assert_allclose(A @ np.array(values), b, atol=1e-9)
+    assert "N_C(B.w-i)" in f.text()
