@@ -503,5 +503,12 @@ def test_directions_in_files_studies_and_errors(tmp_path) -> None:
         mg.compile(m)
     with pytest.raises(mg.DeclarationError, match=r"along = .*: beside the freedom 'P'"):
         block(mg.Spring("P", stiffness=1.0, along=X))
+    flat = {"links": [mg.Link("frame"), mg.Link("block", 2.0, (0, 0))], "drives": ["P"], "planar": True}
+    slide = mg.Pair("P", "P", "frame", "block", point=(0, 0), axis=(1, 0))
+    loads = [spring.replace(along=(1, 0))]
+    plane = mg.Mechanism("block", pairs=[slide], loads=loads, **flat)  # type: ignore[arg-type]
+    assert mg.solve(plane, {"P": 0.2})["P"].effort == pytest.approx([20.0])
+    with pytest.raises(mg.DeclarationError, match=r"along = \(1.0, 0.0, 1.0\): leaves the plane"):
+        plane.replace(loads=[spring.replace(along=(1, 0, 1))])
     with pytest.raises(mg.DeclarationError, match=r"along = .*length 0"):
         block(spring.replace(along=(0, 0, 0)))

@@ -19,7 +19,6 @@ import scipy
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import (
     BREAKS,
-    DIRECTION,
     FREEDOM_NAME,
     LINK_NAME,
     NAMED_POINT,
@@ -34,6 +33,7 @@ from mechgraph.fields import (
     VECTOR_SERIES,
     Described,
     same_fields,
+    vector_fault,
 )
 from mechgraph.maths.se3 import Array, rotate
 from mechgraph.model.pair import Nameable
@@ -458,11 +458,14 @@ class _ByPlace(Law):
             return [
                 f"{self.where}along = {shown(self.along)}: beside the freedom {shown(self.freedom)}, which has its own; leave it out"
             ]
-        return super().faults(names)
+        found = super().faults(names)
+        if self.along is not None and not found and (fault := vector_fault(self.along, "along", direction=True)):
+            found.append(self.where + fault)
+        return found
 
 
 _Along = Annotated[
-    Any, DIRECTION("fixed direction in the frame of link a: `x` is the part of `q - p` along it", default="from p to q")
+    Any, VECTOR("fixed direction in the frame of link a: `x` is the part of `q - p` along it", default="from p to q")
 ]
 
 

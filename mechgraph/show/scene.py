@@ -305,13 +305,23 @@ class DrawnPose:
             )
         )
         laws = (load for load in self.m.loads if isinstance(load, Law) and load.between_links)
-        held = ((end, p) for load in laws for end, p in ((load.a, load.p), (load.b, load.q)) if end == link)
+        sides = ((load, side) for load in laws for side in (0, 1) if (load.a, load.b)[side] == link)
+        X = self.place.poses[link][0]
+        held = ((self.held(load)[side][0] - X[:3, 3]) @ X[:3, :3] for load, side in sides)
         shafts = (w.at for w in self.wheels if w.link == link and link != self.m.frame and not w.is_rack)
         return [
             *(np.asarray(marker.point, dtype=float) for name, marker in ends if name == link),
             *shafts,
-            *(self.local(link, p) for _, p in held),
+            *held,
         ]
+
+    def held(self, load: Law) -> tuple[Array, Array]:
+        """Both ends of a law between links, ``(T, 3)``; along a direction from where the line through the second point passes the first."""
+        begin, end = self.on(load.a, load.p), self.on(load.b, load.q)
+        if load.along is not None:
+            u = self.place.poses[load.a][:, :3, :3] @ (np.asarray(load.along) / np.linalg.norm(load.along))
+            begin = end - ((end - begin) * u).sum(axis=1, keepdims=True) * u
+        return begin, end
 
     def grounded(self, pair: Pair) -> bool:
         """Whether a pair is drawn as a guide on hatched ground: in a plane, where it slides on the frame."""
@@ -726,10 +736,7 @@ def _law(stage: DrawnPose, i: int, load: Law) -> DrawnPart:
     name, frame = f"loads[{i}]", f"load:{i}"
     straight, turning = LAW_SHAPES[load.kind]
     if load.in_freedom is None:
-        begin, end = stage.on(load.a, load.p), stage.on(load.b, load.q)
-        if load.along is not None:  # from the foot of point p on the line through q
-            u = stage.place.poses[load.a][:, :3, :3] @ (np.asarray(load.along) / np.linalg.norm(load.along))
-            begin = end - ((end - begin) * u).sum(axis=1, keepdims=True) * u
+        begin, end = stage.held(load)
     else:
         pair, j, line, own = stage.freedom(load.in_freedom)
         size, X = stage.symbol_size(pair), stage.frames[own]
