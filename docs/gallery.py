@@ -1,4 +1,4 @@
-"""The gallery of the manual: thirty mechanisms, each with a picture, a film, its numbers and its source.
+"""The gallery of the manual: more than thirty mechanisms, each with a picture, a film, its numbers and its source.
 
 A mechanism is drawn from what a solution gives of it: a link joins the points of its pairs, and the path of a pair's marker on its first
 link is the guide or slot there. Gears, pulleys, belts and cams of a planar one are those of ``mechgraph.show``.
@@ -26,6 +26,7 @@ ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "docs" / "_built" / "gallery"
 SIZE, MARGIN, FRAMES, SECONDS = 220.0, 26.0, 36, 4
 COLORS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#6b3a00")
+SI = {"length": "m", "mass": "kg", "time": "s"}
 BODIES = ("wheel", "face", "strand", "roller")
 VIEW = np.array([[0.82, -0.57, 0.0], [0.2, 0.29, 0.94]])
 """Right and up of a view from above and the side."""
@@ -89,6 +90,65 @@ def ride() -> mg.Solution:
     return mg.kinematics(m, {m.drives[0].freedom: np.linspace(-0.06, 0.06, 25)} if m.drives else None)
 
 
+def stages() -> mg.Solution:
+    """Two stages of spur gears and a rack, in the plane."""
+    at = {"A": (0.0, 0.0), "B": (0.048, 0.036), "C": (0.108, 0.036)}
+    pairs = [
+        mg.Pair(k, "R", "frame", link, point=at[k]) for k, link in zip(at, ("pinion", "shaft", "wheel"), strict=True)
+    ]
+    meshes = [
+        mg.SpurGears("first stage", "A", "B", teeth=(20, 40), module=0.002),
+        mg.SpurGears("second stage", "B", "C", teeth=(18, 42), module=0.002),
+    ]
+    m = mg.Mechanism(
+        "two stages", pairs=pairs, couplings=meshes, drives=["A"], loads=[mg.Effort("C", 20.0)], planar=True, units=SI
+    )
+    return mg.solve(m, {"A": mg.Motion(np.linspace(0.0, np.deg2rad(420.0), 73), velocity=10.0)})
+
+
+def engine() -> mg.Solution:
+    """An engine in the plane, its gas force known over two turns of the crank."""
+    angle = np.deg2rad([0, 10, 25, 60, 120, 180, 360, 540, 600, 660, 700, 720])
+    gas = mg.ForceTable(x=angle, force=-np.array([3.2, 4.0, 2.4, 0.8, 0.3, 0.1, 0.1, 0.1, 0.2, 0.6, 1.8, 3.2]) * 1e3)
+    links = [
+        mg.Link("frame"), mg.Link("crank", 1.2, (0.0, 0.01), 0.002), mg.Link("rod", 0.5, (0.0, 0.08), 0.0015),
+        mg.Link("piston", 0.4, (0.0, 0.19), 0.0002),
+    ]  # fmt: skip
+    pairs = [
+        mg.Pair("A", "R", "frame", "crank", point=(0, 0)), mg.Pair("B", "R", "crank", "rod", point=(0, 0.045)),
+        mg.Pair("C", "R", "rod", "piston", point=(0, 0.19)), mg.Pair("D", "P", "frame", "piston", point=(0, 0.19), axis=(0, 1)),
+    ]  # fmt: skip
+    loads = [mg.ForceLaw("D", reads="A", law=gas)]
+    about = "Engine: gas force on the piston, read from the angle of the crank"
+    m = mg.Mechanism("engine", links, pairs, ["A"], loads, planar=True, units=SI, description=about)
+    return mg.solve(m, {"A": mg.Motion(np.linspace(0.0, 4 * np.pi, 145), velocity=200.0)})
+
+
+def cam() -> mg.Solution:
+    """A cam that lifts a rod through a roller against a spring, in the plane."""
+    u = np.linspace(0.0, 2 * np.pi, 73)
+    lift, slope, bend = 0.008 * (1 - np.cos(u)), 0.008 * np.sin(u), 0.008 * np.cos(u)
+    profile = mg.Curve.cam(
+        angle=u,
+        lift=lift,
+        slope=slope,
+        bend=bend,
+        base_radius=0.03,
+        roller_radius=0.009,
+        offset=0.006,
+        second=(0, 1, 0),
+    )
+    top = np.sqrt(0.039**2 - 0.006**2)
+    pairs = [
+        mg.Pair("A", "R", "frame", "cam", point=(0, 0)), mg.Pair("B", "Ps", "cam", "rod", curve=profile, closed="force"),
+        mg.Pair("C", "P", "frame", "rod", point=(-0.006, top + 0.04), axis=(0, 1)),
+    ]  # fmt: skip
+    spring = mg.Spring("frame", "rod", (-0.006, top + 0.11), (-0.006, top + 0.05), stiffness=2e3, free_length=0.07)
+    links = [mg.Link("frame"), mg.Link("cam"), mg.Link("rod", 0.3, (-0.006, top + 0.02), 1e-4)]
+    m = mg.Mechanism("cam with roller", links, pairs, ["A"], [spring], planar=True, units=SI)
+    return mg.solve(m, {"A": mg.Motion(u, velocity=30.0)})
+
+
 ENTRIES = [
     Entry("Four-bar", library("four-bar"), "../tutorials/crank-rocker.md"),
     Entry("Slider-crank", library("slider-crank"), "../tutorials/slider-crank.md"),
@@ -102,6 +162,9 @@ ENTRIES = [
     Entry("Andrews' squeezer", library("andrews"), "../explanation/forward-dynamics.md"),
     Entry("Geneva wheel", library("geneva"), "../how-to/slots-and-curves.md"),
     Entry("Cam with roller arm", example("16", "mechanism", turn("A", 20.0)), "../how-to/cam.md"),
+    Entry("Cam with roller", cam, "../how-to/cam.md"),
+    Entry("Two stages of gears", stages, "../how-to/gears.md"),
+    Entry("Engine in the plane", engine, "../how-to/planar.md"),
     Entry("Planetary train", example("14", "planetary", turn("S", 10.0, 1260.0), 1), "../how-to/gears.md"),
     Entry("Excavator", dig, "../tutorials/excavator.md"),
     Entry("Five-rod suspension", ride),
@@ -142,7 +205,13 @@ class Film:
         self.found = scene(s)
         self.t = np.searchsorted(self.found.positions, chosen)
         # gears, pulleys, belts and cams of a planar mechanism
-        self.bodies = [one for one in self.found.parts if self.found.normal is not None and one.role in BODIES]
+        ground = {one.frame for one in self.found.parts if one.role == "foot" and one.frame.startswith("pair:")}
+        self.slides = {frame.partition(":")[2].partition("@")[0] for frame in ground}
+        self.bodies = [
+            one
+            for one in self.found.parts
+            if self.found.normal is not None and (one.role in BODIES or one.frame in ground or one.owner in self.slides)
+        ]
         profiles = {(part.owner, part.link) for part in self.found.parts if part.role == "wheel" and part.shape.faces}
         self.lines: list[tuple[str, str, Any]] = []
         self.dots: list[tuple[str, Any]] = []
@@ -156,14 +225,17 @@ class Film:
         for p in m.pairs:
             inverse = np.linalg.inv(self.poses[p.a])
             path = np.einsum("tij,tj->ti", inverse[:, :3, :3], ends[p.name, p.b]) + inverse[:, :3, 3]
-            if (p.name, p.a) not in profiles and np.linalg.norm(np.ptp(path, axis=0)) > 1e-6 * np.linalg.norm(
-                np.ptp(every, axis=0)
+            if (
+                p.name not in self.slides
+                and (p.name, p.a) not in profiles
+                and np.linalg.norm(np.ptp(path, axis=0)) > 1e-6 * np.linalg.norm(np.ptp(every, axis=0))
             ):
                 self.lines.append(("guide", p.a, self.seen(np.stack([self.at(p.a, q) for q in path], axis=1))))
             apart = ends[p.name, p.a], ends[p.name, p.b]
             if p.curve is None and p.a != m.frame and np.abs(apart[0] - apart[1]).max() > 1e-6 * np.ptp(every):
                 self.lines.append(("link", p.a, self.seen(np.stack(apart, axis=1))))  # it reaches to what slides on it
-            self.dots.append(("foot" if m.frame in (p.a, p.b) else "pin", self.seen(ends[p.name, p.b][:, None])[:, 0]))
+            fixed = m.frame in (p.a, p.b) and p.name not in self.slides
+            self.dots.append(("foot" if fixed else "pin", self.seen(ends[p.name, p.b][:, None])[:, 0]))
         for gear in m.couplings if self.found.normal is None else ():
             if hasattr(gear, "teeth"):
                 contact = s.coupling(gear.name).point.reshape(-1, 3)[chosen]
@@ -197,7 +269,7 @@ class Film:
 
     def body(self, part: Any, animated: Callable[..., str]) -> str:
         """One of them: an outline that moves as its frame does."""
-        X, width = self.found.frames[part.frame][self.t], 1.0 if part.role == "wheel" else 2.5
+        X, width = self.found.frames[part.frame][self.t], {"face": 2.5, "roller": 2.0}.get(part.role, 1.0)
         at = self.placed(self.seen(X[:, :, 3]))
         A = np.einsum("ij,tjk->tik", self.view, X[:, :, :3]) * self.scale * np.array([[1.0], [-1.0]])
         if part.role == "strand":
@@ -205,11 +277,14 @@ class Film:
             points = [" ".join(f"{a:.1f},{b:.1f}" for a, b in row) for row in ends]
             return f'<polyline points="{points[0]}" fill="none" stroke="#3e4c59" stroke-width="2">{animated("points", points)}</polyline>'
         local = part.shape.vertices @ A[0].T
-        path = "".join("M" + "L".join(f"{a:.1f},{b:.1f}" for a, b in local[list(line)]) for line in part.shape.lines)
+        path = "".join(
+            "M" + "L".join(f"{a:.1f},{b:.1f}" for a, b in local[list(line)])
+            for line in (*part.shape.lines, *part.shape.faces[: part.shape.rims])
+        )
         turn = np.unwrap(np.arctan2(*(A @ np.linalg.pinv(A[0]))[:, ::-1, 0].T))
         moves = [f"{a:.2f} {b:.2f}" for a, b in at], [f"{angle:.2f}" for angle in np.rad2deg(turn)]
         color = self.color(part.link or self.frame)
-        fill = "none" if part.role == "face" or not part.shape.faces else color
+        fill = color if part.role in ("wheel", "roller") and part.shape.faces else "none"
         inner = f'<path d="{path}" fill="{fill}" fill-opacity="0.28" stroke="{color}" stroke-width="{width}"/>'
         inner = f'<g transform="rotate({moves[1][0]})">{inner}{animated("transform", moves[1], "rotate")}</g>'
         return f'<g transform="translate({moves[0][0]})">{inner}{animated("transform", moves[0], "translate")}</g>'
