@@ -165,3 +165,30 @@ def test_reactions_of_a_plane_mechanism_are_drawn_in_its_plane_and_others_only_w
     spherical = scene(mg.solve(mg.load("spherical-four-bar")), forces=True)
     assert spherical.not_unique == ("A", "B", "C", "D")
     assert np.isnan(spherical.frames["reaction:A"]).any(axis=(1, 2)).all()
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_a_cylinder_between_two_eyes_has_a_barrel_and_a_rod_that_fit(planar: bool) -> None:
+    """Its piston stays in the barrel, which ends before the eye of the rod, at both ends of the stroke; the rod begins at the piston."""
+    z = {} if planar else {"axis": Z}
+    a, b, pivot = ((0.3, -1), (1, 0.2), (0, 0)) if planar else ((0.3, -1, 0), (1, 0.2, 0), (0, 0, 0))
+    boom = mg.Pair("A", "R", "frame", "boom", point=pivot, **z)  # type: ignore[arg-type]
+    jack = mg.parts.cylinder("jack", "frame", a, "boom", b)
+    m = mg.Mechanism("crane", pairs=[boom], parts=[jack], drives=["jack.lift.Tz"], planar=planar)
+    stroke = np.linspace(0.0, 0.4, 5)
+    found = scene(mg.kinematics(m, {"jack.lift.Tz": stroke}))
+    (barrel,), (piston,), (rod,) = (
+        parts(found, "guide"),
+        parts(found, "body", "jack.lift"),
+        parts(found, "link", "jack.rod"),
+    )
+    for t in range(5):
+        eye, head = found.points["jack.a", "jack.tube"][t], found.points["jack.b", "boom"][t]
+        u = (head - eye) / np.linalg.norm(head - eye)
+        low, high = np.sort((found.vertices(barrel, t) - eye) @ u)[[0, -1]]
+        inner = np.sort((found.vertices(piston, t) - eye) @ u)[[0, -1]]
+        assert low < inner[0] < inner[1] <= high + 1e-9
+        assert high < np.linalg.norm(head - eye)
+        ends = np.sort((found.vertices(rod, t) - eye) @ u)[[0, -1]]
+        assert inner[0] < ends[0] < inner[1]
+        assert ends[1] == pytest.approx(np.linalg.norm(head - eye))

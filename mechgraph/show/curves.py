@@ -22,7 +22,8 @@ from mechgraph.response.respond import Response
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import MaterialPoint
 from mechgraph.show.canvas import HATCH, INK, MUTED, PALETTE, REACTION, Axes, axis_label, new_axes, plain, said
-from mechgraph.show.scene import DrawnPose, known_force, place_of
+from mechgraph.show.scene import known_force, place_of
+from mechgraph.show.stage import DrawnPose
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import pairwise
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -18,17 +17,27 @@ from mechgraph.kinematics.assembly import assembled
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Array
-from mechgraph.model.loads import Effort, Gravity, Law, Wrench
+from mechgraph.model.loads import Effort, Law, Wrench
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
-from mechgraph.pairs import pair_type as evaluation
 from mechgraph.pairs.contact_types import is_open, takes_curves
 from mechgraph.pairs.curves import Travel, outside
-from mechgraph.pairs.travelling import AlongCurve, Beside
+from mechgraph.pairs.travelling import Beside
 from mechgraph.result.solution import Solution
 from mechgraph.show import shapes
 from mechgraph.show.shapes import FreedomLine, Shape, frame_along, lines_of, symbol
-from mechgraph.show.wheels import READABLE, belt_path, gears_of
+from mechgraph.show.stage import (
+    FLAT_THICKNESS,
+    DrawnPart,
+    DrawnPlace,
+    DrawnPose,
+    Label,
+    distinct,
+    is_profile,
+    slide_of,
+    stretched,
+)
+from mechgraph.show.wheels import READABLE, belt_path
 
 __all__ = ["Label", "DrawnPart", "DrawnPlace", "Scene", "place_of_states", "scene", "scene_at"]
 
@@ -155,207 +164,6 @@ def scene_at(
     )  # fmt: skip
 
 
-FLAT_THICKNESS = 1e-6
-"""Thickness over extent below which a mechanism is drawn as a plane one, and a link as a plate; points closer than that are one."""
-
-Role = Literal[
-    "link",
-    "plate",
-    "wheel",
-    "face",
-    "roller",
-    "strand",
-    "tie",
-    "guide",
-    "body",
-    "dark",
-    "axis",
-    "foot",
-    "center",
-    "point",
-    "spring",
-    "load",
-    "drive",
-    "reaction",
-]
-
-
-@dataclass(frozen=True)
-class DrawnPart:
-    """One body of a drawing.
-
-    ``role`` says how it is painted: ``link`` (rods) and ``plate`` in the color of ``link``, ``guide`` likewise but translucent, ``body``
-    (white) and ``dark`` of a pair symbol, ``axis`` (a line), ``tie`` (from a link to a point off it), ``foot`` (of the frame), ``center``
-    and ``point`` (one vertex), ``spring``, ``load``, ``drive``, ``reaction``; ``wheel`` (a tint of the color of its link) and ``strand`` of
-    a belt. ``owner`` is the name of the pair, link, point, load, gear or belt. It is drawn where a unit of length has so many pixels as
-    ``scales`` says.
-    """
-
-    role: Role
-    owner: str
-    link: str
-    frame: str
-    shape: Shape
-    dashed: bool = False
-    scales: tuple[float, float] = (0.0, np.inf)
-
-
-@dataclass(frozen=True)
-class Label:
-    """A text that belongs to the point ``at (3,)`` of a frame; ``link`` gives its color, empty for ink."""
-
-    kind: Literal["pair", "link", "point"]
-    text: str
-    owner: str
-    link: str
-    frame: str
-    at: Array
-
-
-@dataclass(frozen=True)
-class DrawnPlace:
-    """Where a mechanism stands at ``T`` positions: link poses ``(T, 4, 4)`` and coordinates of every pair ``(f, T)``."""
-
-    poses: Mapping[str, Array]
-    coordinates: Mapping[str, Array]
-
-
-class DrawnPose:
-    """A mechanism at ``T`` places: what its parts are made from.
-
-    Attributes
-    ----------
-    frames : name -> affine maps ``(T, 3, 4)``; those of links and pairs, to which parts add their own.
-    points : pair points ``points[pair, link]``, ``(T, 3)``.
-    everything : these, mass centers and points of interest, ``(n, 3)``.
-    normal : of the plane in which all of these lie, else None.
-    size, symbol : extent over all positions, and half width of the largest symbols.
-    gravity : the vector g, None where there is none.
-    """
-
-    def __init__(self, m: Mechanism, place: DrawnPlace, count: int) -> None:
-        self.m, self.place, self.count = m, place, count
-        self.frames: dict[str, Array] = {"": np.broadcast_to(np.eye(3, 4), (count, 3, 4))}
-        self.frames |= {f"link:{name}": pose[:, :3] for name, pose in place.poses.items()}
-        for pair in m.pairs:
-            for k, frame in enumerate(self._pair_frames(pair)):
-                self.frames[f"pair:{pair.name}@{k}"] = frame
-        ends = ((p, link, k) for p in m.pairs for link, k in ((p.a, 0), (p.b, p.type.f)))
-        self.points = {(p.name, link): self.frames[f"pair:{p.name}@{k}"][:, :, 3] for p, link, k in ends}
-        self.wheels, _, self.belts = gears_of(m, {name: pose[0, :3] for name, pose in place.poses.items()})
-        of_links = [
-            self.on(k.name, c) for k in m.links for c in (*k.points.values(), *([k.center] if k.mass > 0 else []))
-        ]
-        rims = [self.on(w.link, p) for w in self.wheels for p in w.extent()]
-        self.everything = np.concatenate([*self.points.values(), *of_links, *rims])
-        self.normal = self._plane()
-        self.size = float(np.linalg.norm(np.ptp(self.everything, axis=0))) or 1.0
-        # half width of a symbol over the extent of the mechanism, where pairs leave room for it
-        self.symbol = 0.026 * self.size
-        weights = (np.asarray(load.acceleration, dtype=float) for load in m.loads if isinstance(load, Gravity))
-        self.gravity = next((g for g in weights if g.any()), None)
-
-    def _plane(self) -> Array | None:
-        """The normal of the plane of the mechanism: all points lie in it, and what can only turn does so about the normal."""
-        if self.m.planar:
-            return np.array([0.0, 0.0, 1.0])
-        normal = plane_normal(self.everything)
-        for pair in self.m.pairs:
-            if (
-                normal is not None
-                and pair.type.f == 1
-                and (line := lines_of(pair.type, pair.pitch_per_radian)[0]).turns
-            ):
-                axis = self.frames[f"pair:{pair.name}@0"][0, :, :3] @ line.direction
-                normal = normal if np.linalg.norm(np.cross(axis, normal)) < FLAT_THICKNESS else None
-        return normal
-
-    def _pair_frames(self, pair: Pair) -> list[Array]:
-        """Frames 0, 1, ... of a pair ``(T, 3, 4)``."""
-        base, marker = self.place.poses[pair.a][:, :3], pair.markers[0].pose()
-        origin = base[:, :, :3] @ marker[:, 3] + base[:, :, 3]
-        start = np.concatenate([base[:, :, :3] @ marker[:, :3], origin[:, :, None]], axis=2)
-        x = evaluation.coordinates_to_state(pair.type, self.place.coordinates[pair.name][:, None])
-        pitch = np.array([[pair.pitch_per_radian]])
-        found = evaluation.frames_of(pair.type, pitch, x, np.moveaxis(start, 0, -1)[:, :, None])
-        return [np.moveaxis(frame[:, :, 0], -1, 0) for frame in found]
-
-    def on(self, link: str, point: Any) -> Array:
-        """A point of a link, given in its frame or by its name, in the global frame, ``(T, 3)``."""
-        X = self.place.poses[link][:, :3]
-        return np.asarray(X[:, :, :3] @ self.local(link, point) + X[:, :, 3])
-
-    def local(self, link: str, point: Any) -> Array:
-        """A point of a link, given by its coordinates or its name, in the link's frame."""
-        return np.asarray(self.m.link(link).point(point) if isinstance(point, str) else point, dtype=float)
-
-    def corners(self, link: str) -> list[Array]:
-        """What a link joins, in its own frame: points of the pairs that bear it, middles of its gears, and where springs hold it.
-
-        Not where something runs on its profile, which is drawn as such, nor where a guide of its own stands on the ground.
-        """
-        ends = (
-            (name, marker)
-            for p in self.m.pairs
-            if p.type.bears
-            for k, (name, marker) in enumerate(zip((p.a, p.b), p.markers, strict=True))
-            if not (
-                any(step.back == bool(k) and is_profile(p, step) for step in takes_curves(p.type))
-                or (not k and self.grounded(p))
-            )
-        )
-        laws = (load for load in self.m.loads if isinstance(load, Law) and load.between_links)
-        sides = ((load, side) for load in laws for side in (0, 1) if (load.a, load.b)[side] == link)
-        X = self.place.poses[link][0]
-        held = ((self.held(load)[side][0] - X[:3, 3]) @ X[:3, :3] for load, side in sides)
-        shafts = (w.at for w in self.wheels if w.link == link and link != self.m.frame and not w.is_rack)
-        return [
-            *(np.asarray(marker.point, dtype=float) for name, marker in ends if name == link),
-            *shafts,
-            *held,
-        ]
-
-    def held(self, load: Law) -> tuple[Array, Array]:
-        """Both ends of a law between links, ``(T, 3)``; along a direction from where the line through the second point passes the first."""
-        begin, end = self.on(load.a, load.p), self.on(load.b, load.q)
-        if load.along is not None:
-            u = self.place.poses[load.a][:, :3, :3] @ (np.asarray(load.along) / np.linalg.norm(load.along))
-            begin = end - ((end - begin) * u).sum(axis=1, keepdims=True) * u
-        return begin, end
-
-    def grounded(self, pair: Pair) -> bool:
-        """Whether a pair is drawn as a guide on hatched ground: in a plane, where it slides on the frame."""
-        lines = lines_of(pair.type, pair.pitch_per_radian)
-        slides = sum(not line.turns for line in lines)
-        return self.normal is not None and pair.a == self.m.frame and slides == 1 and not takes_curves(pair.type)
-
-    def symbol_size(self, pair: Pair) -> float:
-        """Half width of a symbol: less where another pair is near."""
-        here = self.points[pair.name, pair.b][0]
-        gaps = (float(np.linalg.norm(here - self.points[p.name, p.b][0])) for p in self.m.pairs if p is not pair)
-        nearest = min((gap for gap in gaps if gap > FLAT_THICKNESS * self.size), default=self.size)
-        return float(np.clip(0.4 * nearest, 0.45 * self.symbol, self.symbol))
-
-    def freedom(self, name: str) -> tuple[Pair, int, FreedomLine, str]:
-        """The pair of a freedom, its number there, its line, and the frame of that."""
-        k, j = self.m.freedom(name)
-        pair = self.m.pairs[k]
-        line = lines_of(pair.type, pair.pitch_per_radian)[j]
-        return pair, j, line, f"pair:{pair.name}@{line.frame}"
-
-    @cached_property
-    def upright(self) -> Array:
-        """Axes of what stands upright, as columns: two level ones, and up: z, or y of a mechanism in a plane that has no z."""
-        if self.normal is None:
-            return np.eye(3)
-        n = self.normal
-        inside = (v - (v @ n) * n for v in (np.eye(3)[2], np.eye(3)[1]))
-        up = next(v / np.linalg.norm(v) for v in inside if np.linalg.norm(v) > 0.1)
-        right = np.cross(up, n)
-        right *= np.sign(right[np.argmax(np.abs(right))])  # seen from where x points to the right
-        return np.column_stack([right, np.cross(up, right), up])
-
-
 def gearing(stage: DrawnPose, solution: Solution | None, positions: Any) -> Iterator[DrawnPart]:
     """Gears with teeth where these can be seen, plain else, with pitch circles; pulleys, and belts as thick as their tension asks."""
     flat = stage.normal is not None
@@ -434,15 +242,6 @@ def cams(stage: DrawnPose) -> Iterator[DrawnPart]:
             yield DrawnPart("roller", pair.name, "", f"pair:{pair.name}@{pair.type.f}", shape)
 
 
-def is_profile(pair: Pair, step: AlongCurve) -> bool:
-    """Whether a curve is the outline of a body that something runs on from outside."""
-    curve = step.curve
-    if curve is None or not (is_open(pair) and curve.is_closed):
-        return False
-    hollow = isinstance(curve, Beside) and curve.distance * outside(curve.base) < 0
-    return not hollow and curve.once(Travel).is_plane
-
-
 def _covered(stage: DrawnPose, pair: Pair, link: str, travel: Travel) -> Array:
     """Arc lengths over a curve; of an endless line over what is touched, and some more."""
     if np.isfinite(travel.begin):
@@ -461,22 +260,6 @@ def _slot(x: Array, y: Array, wide: float) -> Shape:
         for i, s, out in ((-1, 1.0, x[-1] - x[-2]), (0, -1.0, x[0] - x[1]))
     ]
     return shapes.polyline(np.concatenate([x + wide * y, ends[0], (x - wide * y)[::-1], ends[1], (x + wide * y)[:1]]))
-
-
-def distinct(points: Iterable[Array], tolerance: float) -> Array:
-    """The points, each once, ``(n, 3)``."""
-    out: list[Array] = []
-    for p in points:
-        if all(np.linalg.norm(p - other) > tolerance for other in out):
-            out.append(p)
-    return np.array(out).reshape(-1, 3)
-
-
-def plane_normal(points: Array) -> Array | None:
-    """The normal of the plane in which all points lie, its largest component positive; None where there is no such plane."""
-    _, spread, Vt = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
-    flat = len(spread) > 2 and spread[2] <= FLAT_THICKNESS * spread[0] < spread[1]
-    return np.asarray(Vt[2] * np.sign(Vt[2][np.argmax(np.abs(Vt[2]))])) if flat else None
 
 
 def links(stage: DrawnPose) -> Iterator[DrawnPart]:
@@ -567,19 +350,21 @@ def pairs(stage: DrawnPose) -> Iterator[DrawnPart]:
         size, lines = stage.symbol_size(pair), lines_of(pair.type, pair.pitch_per_radian)
         if stage.grounded(pair):
             yield _ground(stage, pair, lines, size)
+        moved = stage.piston(pair) * slide_of(pair)
         touches = len(takes_curves(pair.type)) > 1  # two bodies, which are drawn themselves
         for e in symbol(pair.type, pair.pitch_per_radian, size, _strokes(stage, pair, lines, size)):
             if touches and e.role != "body":
                 continue
             link = pair.a if e.role == "guide" else ""
-            yield DrawnPart(e.role, pair.name, link, f"pair:{pair.name}@{e.frame}", e.shape, e.dashed)
+            shape = e.shape.moved(np.eye(3), moved) if e.frame == pair.type.f else e.shape
+            yield DrawnPart(e.role, pair.name, link, f"pair:{pair.name}@{e.frame}", shape, e.dashed)
         for name, line, single in zip(pair.freedom_names, lines, pair.type.drivable, strict=True):
             frame = f"pair:{pair.name}@{line.frame}"
             if line.turns and single:
                 reach = 2.6 * size * line.direction
                 yield DrawnPart("axis", pair.name, "", frame, shapes.polyline([line.point - reach, line.point + reach]))
             if name in driven:
-                yield DrawnPart("drive", name, "", frame, freedom_arrow(line, 1.75 * size))
+                yield DrawnPart("drive", name, "", frame, freedom_arrow(line, 1.75 * size).moved(np.eye(3), moved / 2))
 
 
 def _ground(stage: DrawnPose, pair: Pair, lines: list[FreedomLine], size: float) -> DrawnPart:
@@ -604,8 +389,10 @@ def _strokes(stage: DrawnPose, pair: Pair, lines: list[FreedomLine], size: float
 
     A guide on the line of which link a is held by another pair reaches to there: the barrel of a cylinder, from its eye to the piston.
     """
-    q = stage.place.coordinates[pair.name]
+    q, moved = stage.place.coordinates[pair.name], stage.piston(pair)
     out = [(float(row.min(initial=0.0)), float(row.max(initial=0.0))) for row in q]
+    if moved:
+        out = [(float(row.min()) + moved, float(row.max()) + moved) for row in q]
     slides = [j for j, line in enumerate(lines) if not line.turns]
     if len(slides) != 1 or pair.a == stage.m.frame:
         return out
@@ -631,7 +418,8 @@ def labels(stage: DrawnPose) -> Iterator[Label]:
     """Names of pairs with their types, of points, and of moving links."""
     for pair in stage.m.pairs:
         text = plain(f"{pair.name} ({pair.type.symbol})")
-        yield Label("pair", text, pair.name, "", f"pair:{pair.name}@{pair.type.f}", np.zeros(3))
+        at = stage.piston(pair) * slide_of(pair)
+        yield Label("pair", text, pair.name, "", f"pair:{pair.name}@{pair.type.f}", at)
     for link in stage.m.links:
         frame, corners = f"link:{link.name}", stage.corners(link.name)
         for name, p in link.points.items():
@@ -688,12 +476,6 @@ def loads(stage: DrawnPose, solution: Solution | None, positions: Any) -> Iterat
             at = one.at - frame_along(one.vector)[..., 2] * length[:, None]
         stage.frames[frame] = stretched(one.vector, at, length, width)
         yield DrawnPart("load", f"loads[{one.load}]", "", frame, shapes.turn_arrow() if one.turns else shapes.arrow())
-
-
-def stretched(along: Array, at: Array, length: Array, width: Array) -> Array:
-    """Frames ``(T, 3, 4)`` at points, z along a vector and of some length, x and y of some width."""
-    scale = np.stack([width, width, length], axis=1)
-    return np.concatenate([frame_along(along) * scale[:, None], at[:, :, None]], axis=2)
 
 
 def _wrench(stage: DrawnPose, i: int, load: Wrench, solution: Solution | None, positions: Any) -> Iterator[DrawnLoad]:
