@@ -50,6 +50,7 @@ from mechgraph.model import parts
 from mechgraph.model.belts import BeltDrive, Pulley
 from mechgraph.model.couplings import Belt, BevelGears, Coupling, Rack, SpurGears, WormGear
 from mechgraph.model.friction import Friction
+from mechgraph.model.gears import BevelGear, Gear, GearRack, Mesh, Worm, WormWheel
 from mechgraph.model.loads import Damper, Effort, ForceLaw, ForceTable, Gravity, Spring, TorsionSpring, Wrench
 from mechgraph.model.mechanism import Mechanism, chain
 from mechgraph.model.motion import Drive, Motion
@@ -78,19 +79,19 @@ if TYPE_CHECKING:
     from mechgraph.show.page.write import write_report
 
 __all__ = [
-    "Assemblies", "AssembliesOver", "AssemblyError", "Belt", "BeltDrive", "BevelGears", "Bookkeeping", "Branches",
-    "Chain", "Compiled", "Component", "ContentError", "Coupling", "Curve", "Damper", "DeadPointError",
+    "Assemblies", "AssembliesOver", "AssemblyError", "Belt", "BeltDrive", "BevelGear", "BevelGears", "Bookkeeping",
+    "Branches", "Chain", "Compiled", "Component", "ContentError", "Coupling", "Curve", "Damper", "DeadPointError",
     "DeclarationError", "Decomposition", "DeterminacyReport", "Drive", "Effort", "Event", "Families", "FileError",
-    "ForceLaw", "ForceTable", "Formulation", "FreeBody", "Freedom", "Friction", "FrictionError", "Gravity", "Group",
-    "Hertz", "Identity", "IndeterminateError", "Journal", "Link", "Marker", "Mechanism", "MechgraphError",
-    "MechgraphWarning", "Misfit", "MissingExtraError", "Motion", "MultipleJoint", "OverTime", "Pair", "PairType",
-    "Pulley", "Rack", "ReachError", "Response", "ResponseError", "ResponseSetup", "ShapeError", "Solution", "Spring",
-    "SpurGears", "Stiffness", "Stop", "Structure", "Study", "StudyError", "Surface", "SystemGroup", "Tolerances",
-    "TorsionSpring", "Transmission", "WormGear", "Wrench", "assemble", "assemblies", "atlas", "branches", "chain",
-    "check", "compile", "equilibrium", "formulate", "free_body", "groups", "identify", "inertia", "kinematics",
-    "library", "linearize", "load", "load_chains", "multiple_joints", "over_time", "pair_types", "parts", "respond",
-    "save", "save_chains", "solve", "split_joint", "structure", "study", "system_groups", "transmission",
-    "write_report",
+    "ForceLaw", "ForceTable", "Formulation", "FreeBody", "Freedom", "Friction", "FrictionError", "Gear", "GearRack",
+    "Gravity", "Group", "Hertz", "Identity", "IndeterminateError", "Journal", "Link", "Marker", "Mechanism",
+    "MechgraphError", "MechgraphWarning", "Mesh", "Misfit", "MissingExtraError", "Motion", "MultipleJoint",
+    "OverTime", "Pair", "PairType", "Pulley", "Rack", "ReachError", "Response", "ResponseError", "ResponseSetup",
+    "ShapeError", "Solution", "Spring", "SpurGears", "Stiffness", "Stop", "Structure", "Study", "StudyError",
+    "Surface", "SystemGroup", "Tolerances", "TorsionSpring", "Transmission", "Worm", "WormGear", "WormWheel",
+    "Wrench", "assemble", "assemblies", "atlas", "branches", "chain", "check", "compile", "equilibrium", "formulate",
+    "free_body", "groups", "identify", "inertia", "kinematics", "library", "linearize", "load", "load_chains",
+    "multiple_joints", "over_time", "pair_types", "parts", "respond", "save", "save_chains", "solve", "split_joint",
+    "structure", "study", "system_groups", "transmission", "write_report",
 ]  # fmt: skip
 
 

@@ -46,7 +46,7 @@ class LineRows:
         """The rows of every relation."""
         found: dict[int, tuple[Relation, list[int]]] = {}
         for i, c in enumerate(self.couplings):
-            found.setdefault(id(c.relation), (c.relation, []))[1].append(i)
+            found.setdefault(hash((id(c.relation), id(c.other))), (c.relation, []))[1].append(i)
         return [(relation, np.array(rows)) for relation, rows in found.values()]
 
     def _places(self, poses: Array, side: int, rows: Index) -> Places:
@@ -60,19 +60,19 @@ class LineRows:
         R = X[:, :3]
         return Places(rotate(R, local[..., None]) + X[:, 3], rotate(R, axis[..., None]), rotate(R, mark[..., None]))
 
-    def lines(self, poses: Array) -> LinesAt:
-        """Values and lines of all rows where all links have the poses ``(3, 4, N, T)``."""
+    def lines(self, poses: Array, other: bool = False) -> LinesAt:
+        """Values and lines of all rows, or of their other flanks, where all links have the poses ``(3, 4, N, T)``."""
         n, T = len(self.couplings), poses.shape[-1]
         value, point, along = (np.zeros((*shape, T), dtype=poses.dtype) for shape in ((n,), (3, n), (3, n)))
         for relation, rows in self._groups:
             numbers = np.array([self.couplings[i].numbers for i in rows]).T[..., None] / self.system.par.L
-            made = relation(self._places(poses, 0, rows), self._places(poses, 1, rows), numbers)
+            made = ((self.couplings[rows[0]].other or relation) if other else relation)(self._places(poses, 0, rows), self._places(poses, 1, rows), numbers)
             value[rows], point[:, rows], along[:, rows] = made
         return LinesAt(value, point, along)
 
-    def wrenches(self, poses: Array) -> Array:
+    def wrenches(self, poses: Array, other: bool = False) -> Array:
         """Unit forces on b along the lines, ``(6, n, T)`` about the internal origin."""
-        at = self.lines(poses)
+        at = self.lines(poses, other)
         return np.concatenate([cross(at.point, at.along), at.along])
 
     @property
@@ -119,16 +119,16 @@ class LineRows:
         """The largest of them."""
         return np.asarray(np.abs(self.residual(here)).max(axis=0))
 
-    def _entries(self, here: Any) -> Array:
+    def _entries(self, here: Any, other: bool = False) -> Array:
         """``s_j G . S_j`` for every freedom on the ways ``(K, T)``."""
         rows, columns, senses = self._terms
-        G = self.wrenches(here.poses)
+        G = self.wrenches(here.poses, other)
         return np.asarray(senses[:, None] * (G[:, rows] * here.S[:, columns]).sum(axis=0))
 
-    def jacobian(self, here: Any) -> Array:
+    def jacobian(self, here: Any, other: bool = False) -> Array:
         """``J (n, F, T)``."""
         rows, columns, _ = self._terms
-        values = self._entries(here)
+        values = self._entries(here, other)
         out = np.zeros((len(self.couplings), self.system.n_freedoms, here.T), dtype=values.dtype)
         out[rows, columns] = values
         return out

@@ -44,7 +44,7 @@ from mechgraph.maths.linear import LeastNorm
 from mechgraph.maths.se3 import Array, Index, Mask, compose, cross, cross_twist, finite_twist, move_twist, multiplied
 from mechgraph.maths.tolerances import PATH, RANKS
 from mechgraph.model.couplings import Axes, BaseCoupling, Contact, Lines
-from mechgraph.model.lines import moving_lines
+from mechgraph.model.lines import LineCoupling, moving_lines
 from mechgraph.pairs import pair_type as evaluation
 
 ROUNDINGS = 20
@@ -547,11 +547,39 @@ class ContactLines:
 
     def _of_line(self, g: int) -> tuple[Array, Array]:
         """The same of a coupling along a line that the poses tell."""
-        here, row = self.here, 6 * self.here.system.graph.n_loops + g
-        rows = LineRows(here.system, np.array([g]))
-        P = rows.lines(here.poses).point
-        G = rows.wrenches(here.poses) * here.system.row_scale[row] * here.system.par.L
-        return np.repeat(G, 2, axis=1), np.repeat(P, 2, axis=1)
+        here, row = self.here, self.here.system.graph.loop_rows + g
+        rows, coupling = LineRows(here.system, np.array([g])), here.system.m.couplings[g]
+        at = rows.lines(here.poses)
+        P, n = (np.repeat(part, 2, axis=1) for part in (at.point, at.along))
+        if isinstance(coupling, LineCoupling) and coupling.other is not None:
+            other = rows.lines(here.poses, other=True).along[:, 0]
+            n[:, 1] = np.where(self.turned[g][1], other, n[:, 1]) if g in self.turned else other
+        G = np.concatenate([cross(P, n), n]) * here.system.row_scale[row] * here.system.par.L
+        return G, P
+
+    @cached_property
+    def turned(self) -> dict[int, tuple[Array, Mask]]:
+        """For every row evaluated from poses with another flank: loop wrenches (as rows of loops ``(rows, T)``) that a unit multiplier on
+        that flank changes, and where there are such ones ``(T,)``: where the centers stand still.
+
+        The rows ``J`` and ``J'`` of both flanks differ by one of the loops, ``J' - J = J_loops^T x``, where closed loops keep the distance
+        of the centers.
+        """
+        here, m = self.here, self.here.system.m
+        found = {}
+        for g in [i for i, c in enumerate(m.couplings) if isinstance(c, LineCoupling) and not c.linear]:
+            c = m.couplings[g]
+            if c.other is None or c.other is c.relation:
+                continue
+            rows, loops = LineRows(here.system, np.array([g])), here.system.graph.loop_rows
+            change = (rows.jacobian(here, other=True) - rows.jacobian(here))[0]
+            A, x = here.J[:loops], np.zeros((loops, here.T))
+            for t in range(here.T):
+                x[:, t] = np.linalg.lstsq(A[..., t].T, change[:, t], rcond=1e-11)[0]
+            left = np.abs(np.einsum("rft,rt->ft", A, x) - change).max(axis=0, initial=0.0)
+            # of rows of size one: rounding where the centers stand still
+            found[g] = x, np.asarray(left <= 1e-9)
+        return found
 
     def _lines(self, g: int, axes: Axes) -> Lines:
         """Points and directions of the force; of variants with gears of their own those of each."""
@@ -599,6 +627,10 @@ class ContactLines:
             for g, step, column in steps:
                 E = here.E[:, column] * coefficients[g, column]
                 out[:, step.pair] -= E.reshape(6, *(1,) * (multipliers.ndim - 2), here.T) * multipliers[g]
+        for g, (x, there) in self.turned.items():
+            acting = np.broadcast_to(np.where((flank[g] < 0.0) & there, multipliers[g], 0.0), multipliers.shape[1:])
+            changed = here.pair_wrenches(x[:, None] * acting.reshape(1, -1, here.T))
+            out -= changed.reshape(out.shape)
         return out
 
     def unit(self, flank: Array) -> list[Array]:

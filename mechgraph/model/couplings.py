@@ -318,7 +318,7 @@ class Contact(BaseCoupling):
             return found
         for side, q in ends.items():
             pair, wanted = m.pairs[m.freedom(q)[0]], "slide" if side == "b" and self.slides else "turn"
-            if _motion(pair) != wanted:
+            if motion_of(pair) != wanted:
                 found.append(
                     f"{where}{side} = {q!r}: is a pair {pair.type.symbol}; expected one whose only freedom is a {wanted} at its axis"
                 )
@@ -460,14 +460,14 @@ def _turns(m: Any) -> dict[str, list[tuple[int, str]]]:
             isinstance(pair.type, PairType)
             and isinstance(pair.a, str)
             and isinstance(pair.b, str)
-            and _motion(pair) == "turn"
+            and motion_of(pair) == "turn"
         ):
             for link, other in ((pair.a, pair.b), (pair.b, pair.a)):
                 found.setdefault(link, []).append((k, other))
     return found
 
 
-def _motion(pair: Pair) -> str:
+def motion_of(pair: Pair) -> str:
     """``"turn"`` or ``"slide"`` of a pair whose only freedom is one about or along its axis; nothing for other pairs."""
     freedoms = pair.type.freedoms
     plain: dict[tuple[float, ...], str] = {

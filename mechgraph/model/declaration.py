@@ -37,10 +37,10 @@ from mechgraph.maths.inertia import physical
 from mechgraph.maths.se3 import IN_PLANE, IN_SPACE, Array
 from mechgraph.maths.tolerances import SHAPES
 from mechgraph.memo import Once, of_graph
-from mechgraph.model.belts import GEARS, Pulley
 from mechgraph.model.couplings import BaseCoupling, rim_faults
 from mechgraph.model.friction import LOADS
-from mechgraph.model.loads import Load
+from mechgraph.model.gears import GEARS
+from mechgraph.model.loads import LOADS, Load
 from mechgraph.model.motion import Drive
 from mechgraph.model.pair import NO_POINTS, Link, Marker, Pair, largest_cosine
 from mechgraph.model.plane import plane_faults
@@ -87,7 +87,7 @@ class Parts(Formatted, Once):
         TABLES("linear relations between freedoms", key="coupling", table="coupling", default="none"),
     ]
     gears: Annotated[
-        tuple[Pulley, ...], TABLES("pulleys, as places on links", key="gear", table="gear", default="none")
+        tuple[Any, ...], TABLES("gears and pulleys, as places on links", key="gear", table="gear", default="none")
     ]
     drives: Annotated[tuple[Drive, ...], TABLES("driven freedoms", key="drive", table="drive", default="none")]
     loads: Annotated[tuple[Load, ...], TABLES("loads", key="load", table="load", default="none")]
@@ -166,9 +166,9 @@ class Parts(Formatted, Once):
         """The pair of that name."""
         return self.pairs[self.place_of_pair(name)]
 
-    def gear(self, name: str) -> Pulley:
-        """The pulley of that name."""
-        return self.gears[self._index(name, _places(c.name for c in self.gears), "pulley")]
+    def gear(self, name: str) -> Any:
+        """The gear or pulley of that name."""
+        return self.gears[self._index(name, _places(c.name for c in self.gears), "gear")]
 
     def coupling(self, name: str) -> BaseCoupling:
         """The coupling of that name."""
@@ -502,7 +502,7 @@ def _gear_faults(m: Parts) -> list[str]:
         faults += gear.value_faults(where)
         if isinstance(gear.link, str) and gear.link not in m.link_index:
             faults.append(where + unknown("link", gear.link, m.link_names()))
-    return faults + _repeated(_texts([gear.name for gear in m.gears]), "pulley")
+    return faults + _repeated(_texts([gear.name for gear in m.gears]), "gear")
 
 
 def _coupling_faults(m: Parts) -> list[str]:

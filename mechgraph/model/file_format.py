@@ -14,10 +14,11 @@ from typing import Any
 from urllib.parse import quote
 
 from mechgraph.fields import FLAG, INTEGER, NUMBERS, OTHER, SIX, TABLE, TABLES, TEXT, FieldFormat, Formatted, Schema
-from mechgraph.model.belts import GEARS, BeltDrive
+from mechgraph.model.belts import BeltDrive
 from mechgraph.model.couplings import COUPLINGS
 from mechgraph.model.friction import LOADS
-from mechgraph.model.loads import ForceTable
+from mechgraph.model.gears import GEARS, Mesh
+from mechgraph.model.loads import LOADS, ForceTable
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Pair
@@ -35,7 +36,7 @@ WRITABLE = {kind: curve for kind, curve in CURVES.items() if curve is not Functi
 """Curves that a file can hold."""
 WRITABLE_SURFACES = {kind: surface for kind, surface in SURFACES.items() if surface is not ByFunction}
 """The same of surfaces."""
-EVERY_COUPLING = {**COUPLINGS, BeltDrive.kind: BeltDrive}
+EVERY_COUPLING = {**COUPLINGS, Mesh.kind: Mesh, BeltDrive.kind: BeltDrive}
 """Couplings by the names of their kinds."""
 KINDS: dict[str, Mapping[str, Any]] = {
     "load": LOADS,

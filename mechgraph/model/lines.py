@@ -1,5 +1,4 @@
-"""Couplings whose force acts along a line between two links, found from the poses of both: spans of belts, and whatever else pulls or
-pushes so.
+"""Couplings whose force acts along a line between two links, found from the poses of both: gears, spans of belts.
 
 The relation ``phi`` of the poses of links a and b is dual to its force: with the point P and the unit direction n of the force on b,
 
@@ -61,11 +60,13 @@ class LineCoupling(BaseCoupling):
 
     ``linear``: whether the relation is one of freedoms with constant coefficients, so that it is solved as that; else it is evaluated
     from the poses. ``numbers``: its lengths. ``period``: by what its value grows from tooth to tooth, where the residue tells as much.
-    ``longer``: by how much the closed row is above its value at the start.
+    ``other``: the relation of the other flank of teeth, which negative multipliers press on, its line reversed so that the sense of the
+    relation stays. ``longer``: by how much the closed row is above its value at the start.
     """
 
     ends: tuple[LinkPlace, LinkPlace]
     relation: Relation
+    other: Relation | None = None
     numbers: tuple[float, ...] = ()
     period: float = float("inf")
     longer: float = 0.0

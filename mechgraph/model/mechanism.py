@@ -22,11 +22,10 @@ from numpy.typing import ArrayLike
 from mechgraph import methods
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, MechgraphWarning, counted
-from mechgraph.fields import plain, same_fields
+from mechgraph.fields import Described, plain, same_fields
 from mechgraph.maths.se3 import Array, identity, inverse
 from mechgraph.maths.tolerances import Tolerances
 from mechgraph.memo import carried, under
-from mechgraph.model.belts import Pulley
 from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.declaration import Parts, declaration_faults, flat_start, item_faults, mapping_faults
 from mechgraph.model.loads import Gravity, Load
@@ -200,8 +199,8 @@ class Mechanism(Parts, Shown):
         ``Gravity``, ``Wrench``, ``Effort``, ``Spring``, ``TorsionSpring``, ``Damper``, ``ForceLaw``.
     couplings : iterable of Coupling
         Linear relations between freedoms, gears and belts among them; kept with full freedom names, ``"A.Rz"``.
-    gears : iterable of Pulley
-        Pulleys, as places on links.
+    gears : iterable of gear
+        ``Gear``, ``GearRack``, ``BevelGear``, ``Worm``, ``WormWheel``, ``Pulley``, as places on links.
     parts : iterable of parts.Parts
         Catalogue parts, ``mg.parts.cylinder(...)``: their links, pairs, couplings and loads are written out behind the others.
     frame : str, optional
@@ -254,7 +253,7 @@ class Mechanism(Parts, Shown):
         loads: Iterable[Load] = (),
         *,
         couplings: Iterable[BaseCoupling] = (),
-        gears: Iterable[Pulley] = (),
+        gears: Iterable[Any] = (),
         parts: Iterable[Catalogued] = (),
         frame: str | None = None,
         start: Mapping[str, Any] | None = None,
@@ -316,7 +315,7 @@ class Mechanism(Parts, Shown):
                 if isinstance(item, Drive)
             ],
             "loads": [item.in_own_units(self.units, self.turns) for item in self.loads if isinstance(item, Load)],
-            "gears": [item.without_quantities(self.units) for item in self.gears if isinstance(item, Pulley)],
+            "gears": [item.without_quantities(self.units) for item in self.gears if isinstance(item, Described)],
             "couplings": [
                 item.in_own_units(self.units, [self.turns(name) for name in item.freedoms])
                 for item in self.couplings
