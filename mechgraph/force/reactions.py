@@ -205,7 +205,7 @@ def pretension_conditions(here: Configuration) -> tuple[list[BeltDrive], Array, 
     """Belts with a pretension T0, and what it says of the multipliers ``m (n, T)`` of the rows behind those of the loops, ``C m = c``:
     ``sum l T = T0 sum l`` over the spans of each, ``T = -m``. ``C (b, n, T)``, ``c (b, 1)``.
     """
-    m, loops = here.system.m, 6 * here.system.graph.n_loops
+    m, loops = here.system.m, here.system.graph.loop_rows
     asked = m.once(pretensions)
     scale = here.system.par.L**2 * np.broadcast_to(here.system.row_scale, (here.system.n_rows, here.T))[loops:]
     C = np.zeros((len(asked), len(scale), here.T))
@@ -235,7 +235,7 @@ def pretensioned(here: Configuration, wrenches: Wrenches, f: FactoredClosure) ->
     stress, change = wrenches.stress, wrenches.multiplier_stress
     if not f.complete:
         x = f.self_stresses(every=True)
-        stress, change = here.pair_wrenches(x), -x[6 * here.system.graph.n_loops :]
+        stress, change = here.pair_wrenches(x), -x[here.system.graph.loop_rows :]
     A = np.einsum("int,nst->tis", C, change)
     known = np.abs(A).max(axis=(0, 2), initial=0.0) <= STRESSES.unique * np.abs(C).max(axis=(1, 2), initial=0.0)
     if known.any():
@@ -604,7 +604,7 @@ def user_state(rates: Rates, coordinates: Array, loads: Array, applied: Array, f
         inertias=_user_inertias(here),
         applied=user_wrench(par, applied),
         gyroscopic=user_wrench(par, _inertia_wrenches(here, rates.V, without)),
-        row_biases=here.closure_bias(rates.bias, rates.V)[6 * s.graph.n_loops :] / scale,
+        row_biases=here.closure_bias(rates.bias, rates.V)[s.graph.loop_rows :] / scale,
         coefficients=_user_coefficients(here, scale, unit),
     )
 

@@ -66,7 +66,9 @@ class LineRows:
         value, point, along = (np.zeros((*shape, T), dtype=poses.dtype) for shape in ((n,), (3, n), (3, n)))
         for relation, rows in self._groups:
             numbers = np.array([self.couplings[i].numbers for i in rows]).T[..., None] / self.system.par.L
-            made = ((self.couplings[rows[0]].other or relation) if other else relation)(self._places(poses, 0, rows), self._places(poses, 1, rows), numbers)
+            made = ((self.couplings[rows[0]].other or relation) if other else relation)(
+                self._places(poses, 0, rows), self._places(poses, 1, rows), numbers
+            )
             value[rows], point[:, rows], along[:, rows] = made
         return LinesAt(value, point, along)
 

@@ -328,7 +328,7 @@ class Configuration:
     def coupling_coefficients(self) -> Array:
         """The rows of the couplings in ``J``, ``(n, F, T)``; of one position where none changes with the poses, ``(n, F, B)``."""
         s = self.system
-        return self.J[6 * s.graph.n_loops :] if s.m.once(moving_lines) else s.coupling_matrix
+        return self.J[s.graph.loop_rows :] if s.m.once(moving_lines) else s.coupling_matrix
 
     def closure_rates(self, dq: Array) -> Array:
         """``J q' (n_rows, T)`` for rates ``dq (F, T)``, without forming ``J``."""

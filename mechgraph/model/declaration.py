@@ -40,7 +40,7 @@ from mechgraph.memo import Once, of_graph
 from mechgraph.model.couplings import BaseCoupling, rim_faults
 from mechgraph.model.friction import LOADS
 from mechgraph.model.gears import GEARS
-from mechgraph.model.loads import LOADS, Load
+from mechgraph.model.loads import Load
 from mechgraph.model.motion import Drive
 from mechgraph.model.pair import NO_POINTS, Link, Marker, Pair, largest_cosine
 from mechgraph.model.plane import plane_faults

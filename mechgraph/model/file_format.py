@@ -18,7 +18,7 @@ from mechgraph.model.belts import BeltDrive
 from mechgraph.model.couplings import COUPLINGS
 from mechgraph.model.friction import LOADS
 from mechgraph.model.gears import GEARS, Mesh
-from mechgraph.model.loads import LOADS, ForceTable
+from mechgraph.model.loads import ForceTable
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Pair

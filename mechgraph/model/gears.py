@@ -48,11 +48,10 @@ from mechgraph.model.couplings import (
     fitting_of,
     motion_of,
     teeth_lines,
-    unit,
 )
+from mechgraph.model.lines import LineCoupling, LinesAt, LinkPlace, Places, Relation, meeting, pose_along, way
 from mechgraph.model.pair import Pair
 from mechgraph.pairs.pair_type import PairType
-from mechgraph.model.lines import LineCoupling, LinesAt, LinkPlace, Places, Relation, meeting, pose_along, way
 from mechgraph.quantities import LENGTH, PURE, shown, unknown, wrong
 
 _FULL = float(np.deg2rad(20.0))
@@ -389,7 +388,9 @@ class Mesh(LineCoupling):
     name: Annotated[str, TEXT("name", default="g1, g2, ...")]
     a: Annotated[str, TEXT("the first gear")]
     b: Annotated[str, TEXT("the second gear")]
-    backlash: Annotated[float, NUMBER("along the pitch circles, beside what the distance leaves", LENGTH, minimum=0.0)] = 0.0
+    backlash: Annotated[
+        float, NUMBER("along the pitch circles, beside what the distance leaves", LENGTH, minimum=0.0)
+    ] = 0.0
     flank: Annotated[
         str,
         TEXT(
@@ -420,7 +421,9 @@ class Mesh(LineCoupling):
         if not found:
             one, two = self.pair_of(m)
             if one.link == two.link:
-                found.append(f"{self.a!r} and {self.b!r} are on the same link {one.link!r}; gears that mesh are on two links")
+                found.append(
+                    f"{self.a!r} and {self.b!r} are on the same link {one.link!r}; gears that mesh are on two links"
+                )
             elif (one.kind, two.kind) not in _KINDS:
                 found.append(f"a {one.kind} and a {two.kind} do not mesh; expected {_words_of_kinds(one.kind)}")
             elif m.has_geometry and m.once(_placed_soundly):
@@ -656,7 +659,9 @@ class Parallel(Meeting):
         inner = one.internal or two.internal
         ring, other = (one, two) if one.internal else (two, one)
         if inner and ring.teeth <= other.teeth:
-            found.append(f"{ring.name!r} has {ring.teeth} teeth inside; expected more than the {other.teeth} of {other.name!r}")
+            found.append(
+                f"{ring.name!r} has {ring.teeth} teeth inside; expected more than the {other.teeth} of {other.name!r}"
+            )
         wanted = one.helix_angle if inner else -one.helix_angle
         if abs(two.helix_angle - wanted) > fitting:
             found.append(f"{two.name!r} has the helix angle {two.helix_angle:.7g}; at {one.name!r} {wanted:.7g} meshes")
@@ -715,10 +720,14 @@ class WithRack(Meeting):
         if pinion.internal:
             found.append(f"{pinion.name!r} has its teeth inside; a rack meshes with a gear")
         if abs(pinion.helix_angle + rack.helix_angle) > fitting:
-            found.append(f"{rack.name!r} has the helix angle {rack.helix_angle:.7g}; at {pinion.name!r} {-pinion.helix_angle:.7g} meshes")
+            found.append(
+                f"{rack.name!r} has the helix angle {rack.helix_angle:.7g}; at {pinion.name!r} {-pinion.helix_angle:.7g} meshes"
+            )
         z, d = self.at.axis, self.there.point - self.at.point
         if max(abs(float(_dot(z, v)[0, 0])) for v in (self.there.axis, self.there.mark)) > fitting:
-            found.append(f"direction and normal of {rack.name!r} are not at right angles to the axis of {pinion.name!r}")
+            found.append(
+                f"direction and normal of {rack.name!r} are not at right angles to the axis of {pinion.name!r}"
+            )
         if abs(float(np.dot(rack.place.axis, np.asarray(rack.normal) / np.linalg.norm(rack.normal)))) > fitting:
             found.append(f"direction and normal of {rack.name!r} are not at right angles to each other")
         if found:
@@ -792,7 +801,9 @@ class Crossed(Still):
             )
         wanted = one.radius + two.radius + one.module * one.shift + two.module * two.shift
         if not found and abs(distance - wanted) > 2.0 * fitting * wanted:
-            found.append(f"the axes of {one.name!r} and {two.name!r} pass each other at {distance:.7g}; expected {wanted:.7g}")
+            found.append(
+                f"the axes of {one.name!r} and {two.name!r} pass each other at {distance:.7g}; expected {wanted:.7g}"
+            )
         return found
 
     def lines(self) -> tuple[Array, Array]:
@@ -835,7 +846,11 @@ class Bevels(Still):
 
     def _unlike(self) -> Iterator[str]:
         one, two = self.one, self.two
-        for name, wanted in (("module", one.module), ("pressure_angle", one.pressure_angle), ("spiral_angle", -one.spiral_angle)):
+        for name, wanted in (
+            ("module", one.module),
+            ("pressure_angle", one.pressure_angle),
+            ("spiral_angle", -one.spiral_angle),
+        ):
             if abs(getattr(two, name) - wanted) > 1e-9 * (1.0 + abs(wanted)):
                 yield f"{two.name!r} has {name} = {getattr(two, name):.7g}; at {one.name!r} {wanted:.7g} meshes"
 
@@ -845,7 +860,9 @@ class Bevels(Still):
         if found:
             return found
         apex = self._pair._apex(self.axes)[0]
-        ea, eb = (z * np.sign(_dot(p - apex, z)) for p, z in ((self.axes.pa, self.axes.za), (self.axes.pb, self.axes.zb)))
+        ea, eb = (
+            z * np.sign(_dot(p - apex, z)) for p, z in ((self.axes.pa, self.axes.za), (self.axes.pb, self.axes.zb))
+        )
         shaft = float(np.arccos(np.clip(_dot(ea, eb)[0], -1.0, 1.0)))
         out = []
         for gear, mate in ((self.one, self.two), (self.two, self.one)):
