@@ -59,7 +59,7 @@ GROUPS: Mapping[str, tuple[str, str, tuple[str, ...]]] = {
         "Loads and events",
         "What acts on links and in freedoms, and what is watched in time.",
         (
-            *("Gravity", "Wrench", "Effort", "Spring", "TorsionSpring", "Damper", "ForceLaw", "ForceTable"),
+            *("Gravity", "Wrench", "Effort", "Spring", "TorsionSpring", "Damper", "ForceLaw", "ForceTable", "Friction"),
             *("Event", "Stop", "ResponseSetup"),
         ),
     ),
@@ -117,7 +117,15 @@ GROUPS: Mapping[str, tuple[str, str, tuple[str, ...]]] = {
         "All derive from `MechgraphError`.",
         (
             *("MechgraphError", "DeclarationError", "FileError", "ContentError", "AssemblyError", "ReachError"),
-            *("DeadPointError", "IndeterminateError", "ResponseError", "ShapeError", "StudyError", "MissingExtraError"),
+            *(
+                "DeadPointError",
+                "FrictionError",
+                "IndeterminateError",
+                "ResponseError",
+                "ShapeError",
+                "StudyError",
+                "MissingExtraError",
+            ),
             "MechgraphWarning",
         ),
     ),

@@ -271,7 +271,18 @@ class ReachError(PathError):
 class FrictionError(PathError):
     """A position has no finite forces with friction.
 
-    Attributes: ``kind``, ``"jams"`` or ``"no finite force"``; ``factor``, by how much friction would have to fall; ``solution``.
+    Parameters
+    ----------
+    message : str
+        What happened.
+    value : dict
+        Driver values there.
+    solution : Solution, optional
+        All positions; NaN where there are no forces.
+    kind : {"jams", "no finite force"}
+        How the solution ends while friction grows from zero.
+    factor : float
+        By how much friction would have to fall.
 
     Examples
     --------

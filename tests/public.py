@@ -230,6 +230,23 @@ def declared_doors() -> list[tuple[str, Callable, tuple, dict]]:
         ("Spring", built(mg.Spring, "loads"), ("frame", "crank", (0, 0, 0), (1, 0, 0), 1.0, 0.0, 0.0), {}),
         ("TorsionSpring", built(mg.TorsionSpring, "loads"), ("A", 1.0, 0.0, 0.0), {}),
         ("Damper", built(mg.Damper, "loads"), ("A",), {"coefficient": 1.0}),
+        (
+            "Friction",
+            built(mg.Friction, "loads"),
+            ("A",),
+            {
+                **{
+                    "mu": 0.1,
+                    "static": 0.2,
+                    "radius": 0.01,
+                    "thrust_radius": 0.02,
+                    "length": 0.1,
+                    "width": None,
+                    "on": "b",
+                },
+                **{"flank": 0.0, "model": "circle", "viscous": 0.1, "preload": 1.0},
+            },
+        ),
         ("ForceLaw", built(mg.ForceLaw, "loads"), (None, "frame", "crank", (0, 0, 0), (1, 0, 0)), law),
         ("ForceLaw by one argument", built(mg.ForceLaw, "loads"), (("frame", "crank", (0, 0, 0), (1, 0, 0)),), law),
         (

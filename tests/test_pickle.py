@@ -62,6 +62,7 @@ def things() -> dict[str, Any]:
         "spur": mg.SpurGears("g", "A", "B", teeth=(20, 40)), "bevel": mg.BevelGears("g", "A", "B", teeth=(20, 40), module=0.1),
         "worm": mg.WormGear("g", "A", "B", teeth=(1, 40), radius=0.1), "rack": mg.Rack("g", "A", "B", radius=0.1),
         "film": mg.Journal(0.02, 0.02, 2e-5, 0.01), "stiffness": mg.Stiffness(Fx=1e7), "misfit": mg.Misfit(Fz=1e-5),
+        "friction": mg.Friction("D", mu=0.1, radius=0.01), "FrictionError": mg.FrictionError("jams", {"A": 1.0}, s, factor=0.5),
         "hertz": mg.Hertz((2.1e11, 2.1e11)), "tolerances": mg.Tolerances(rank={"loop": 1e-6}), "transmission": mg.transmission(s, "D"),
         "belt": mg.Belt("g", "A", "B", radii=(1, 2)), "stop": mg.Stop("A0", lower=0.1), "equilibrium": hanging,
         "linearized": mg.linearize(hanging),

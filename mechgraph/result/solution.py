@@ -626,8 +626,8 @@ class Solution(Shown):
         >>> screw = mg.Pair("A", "H", "frame", "nut", point=(0, 0, 0), axis=(0, 0, 1), pitch=0.002)
         >>> lift = [mg.Wrench("nut", force=(0, 0, -1000), point=(0, 0, 0)), mg.Friction("A", mu=0.1, radius=0.01)]
         >>> m = mg.Mechanism("jack", pairs=[screw], drives=["A"], loads=lift)
-        >>> mg.solve(m, {"A": mg.Motion(0.0, velocity=1.0)}).efficiency("loads[0]").round(4)
-        array(0.6533)
+        >>> float(mg.solve(m, {"A": mg.Motion(0.0, velocity=1.0)}).efficiency("loads[0]").round(4))
+        0.6533
         """
         taken = -self._power_of(out)
         brought = self._power_of(self.actuated if into is None else into)
