@@ -201,6 +201,29 @@ def test_slider_crank_rough_everywhere() -> None:
     )
 
 
+@pytest.mark.parametrize("name", ["geneva", "phchc", "r-cp-c", "r-sc-c-r", "r-sg-c", "rcsr"])
+def test_friction_given_as_efforts_brings_the_same_forces(name: str) -> None:
+    m = mg.load(name)
+    dry = [
+        mg.Friction(p.name, mu=0.05, **({"radius": 0.01} if p.type.symbol in "RCUSH" else {}))
+        for p in m.pairs
+        if not p.roller
+    ]
+    s = mg.solve(m, loads=[*m.loads, *dry], on_reach="flag")
+    good = s.status == "ok"
+    assert good.sum() > 20
+    given = [
+        mg.Effort(q, np.nan_to_num(s[p.name].friction[:, j])) for p in m.pairs for j, q in enumerate(p.freedom_names)
+    ]
+    t = mg.solve(m, loads=[*m.loads, *given], on_reach="flag")
+    name = m.drives[0].freedom.partition(".")[0]
+    assert np.allclose(
+        t[name].effort[good], s[name].effort[good], rtol=1e-11, atol=1e-12 * np.nanmax(np.abs(s[name].effort))
+    )
+    assert all((power[good] >= 0).all() for power in s.losses.values())
+    assert np.nanmax(np.abs(s.checks.power)) < 1e-13
+
+
 def test_links_swapped_moved_and_in_other_units() -> None:
     m = collar(0.2)
     swapped = m.replace(pairs=[m.pairs[0].replace(a="collar", b="frame"), *m.pairs[1:]])

@@ -20,7 +20,6 @@ from itertools import product
 
 import numpy as np
 
-from mechgraph.force.reactions import pair_power, reaction_part
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Array, Index, cross, skew
 from mechgraph.maths.tolerances import STRESSES
@@ -219,38 +218,37 @@ def rubbed(here: Configuration, places: Sequence[Place], base: Array, unit: dict
 def _parted(here: Configuration, k: int, W: Array) -> tuple[Array, Array]:
     """Wrenches ``(6, n, T)`` in a pair as efforts in its freedoms ``(f, n, T)``, and what is left, which it takes up itself."""
     s = here.system
-    first, f = int(s.first_column[k]), s.m.pairs[k].type.f
-    efforts, left = np.zeros((f, *W.shape[1:])), np.zeros_like(W)
-    for i in range(W.shape[1]):
-        totals = np.zeros((6, len(s.m.pairs), here.T))
-        totals[:, k] = W[:, i]
-        tau = pair_power(here, totals)
-        efforts[:, i], left[:, i] = tau[first : first + f], reaction_part(here, totals, tau)[:, k]
-    return efforts, left
+    mine = slice(first := int(s.first_column[k]), first + s.m.pairs[k].type.f)
+    efforts = np.einsum("cft,cnt->fnt", here.S[:, mine], W)
+    return efforts, W - np.einsum("cft,fnt->cnt", here.E[:, mine], efforts)
 
 
 def _normals(a: Array, B: Array, C: Array, starts: Index) -> tuple[Array, Array, Array, Array]:
     """Sizes ``n (m, T)`` and normal vectors of all places, outcomes and factors ``(T,)``."""
-    T, m = a.shape[1], B.shape[1]
     a, B, C = (np.moveaxis(part, -1, 0) for part in (a, B, C))
-    n, outcome, factor = np.zeros((T, m)), np.zeros(T, dtype=int), np.full(T, np.nan)
-    for t in range(T):
-        n[t], outcome[t], factor[t] = _normals_at(a[t], B[t], C[t], starts)
-    V = np.linalg.solve(np.eye(a.shape[1]) - C, (a + np.einsum("tdn,tn->td", B, n))[..., None])[..., 0]
-    bad = outcome > 0
-    n[bad], V[bad] = np.nan, np.nan
+    m = B.shape[2]
+    linear = np.linalg.solve(np.eye(a.shape[1]) - C, np.concatenate([a[..., None], B], axis=2))
+    free, per = linear[..., 0], linear[..., 1:]
+    sized = np.sqrt(np.add.reduceat(linear**2, starts[:-1], axis=1))
+    alone = np.abs(np.linalg.eigvals(sized[..., 1:])).max(axis=1, initial=0.0) < 1.0
+    n, done = sized[..., 0], np.zeros(len(a), dtype=bool)
+    scale = np.abs(free).max(axis=1, initial=1e-300)
+    for _ in range(NEWTON):
+        V = free + np.einsum("tdn,tn->td", per, n)
+        size = np.sqrt(np.add.reduceat(V * V, starts[:-1], axis=1))
+        off = n - size
+        done = np.abs(off).max(axis=1, initial=0.0) <= 1e-14 * np.maximum(scale, size.max(axis=1, initial=0.0))
+        if (done | ~alone).all():
+            break
+        unit = V / np.repeat(np.where(size > 0, size, np.inf), np.diff(starts), axis=1)
+        slope = np.add.reduceat(unit[..., None] * per, starts[:-1], axis=1)
+        slope[~alone] = 0.0  # looked at one by one, below
+        n = n - np.linalg.solve(np.eye(m) - slope, off[..., None])[..., 0]
+    outcome, factor = np.zeros(len(a), dtype=int), np.full(len(a), np.nan)
+    for t in np.flatnonzero(~(done & alone)):
+        n[t], outcome[t], factor[t] = _grown(a[t], B[t], C[t], starts)
+    V = free + np.einsum("tdn,tn->td", per, n)
     return n.T, V.T, outcome, factor
-
-
-def _normals_at(a: Array, B: Array, C: Array, starts: Index) -> tuple[Array, int, float]:
-    """One position: sizes, outcome, factor."""
-    linear = np.linalg.solve(np.eye(len(a)) - C, np.column_stack([a, B]))
-    sized = np.add.reduceat(linear**2, starts[:-1], axis=0) ** 0.5
-    radius = float(np.abs(np.linalg.eigvals(sized[:, 1:])).max(initial=0.0))
-    n, met = _newton(a, B, C, starts, 1.0, sized[:, 0])
-    if met and radius < 1.0:
-        return n, 0, np.nan
-    return _grown(a, B, C, starts)
 
 
 def _newton(a: Array, B: Array, C: Array, starts: Index, k: float, n: Array) -> tuple[Array, bool]:
