@@ -11,7 +11,7 @@ from mechgraph.quantities import FORCE_PER_LENGTH, LENGTH, MOMENT, wrong
 
 
 @dataclass(frozen=True)
-class Seat(Described):
+class SeatNumbers(Described):
     """Numbers of a pair by its reaction components; those left out are None."""
 
     what: ClassVar[str]
@@ -35,7 +35,7 @@ _K, _KM = ({"minimum": 0.0, "default": "rigid"},) * 2
 
 
 @dataclass(frozen=True)
-class Stiffness(Seat):
+class Stiffness(SeatNumbers):
     """Declare how stiff a pair is in its reaction components: force per length, moment per radian.
 
     What is left out is rigid, 0 carries nothing. ``solve(..., redundant="elastic")`` splits redundant reactions by it.
@@ -58,7 +58,7 @@ class Stiffness(Seat):
 
 
 @dataclass(frozen=True)
-class Misfit(Seat):
+class Misfit(SeatNumbers):
     """Declare by how much the seat of a pair on link a is off its place: a length along a force, an angle about a moment.
 
     With the small motion u of link b there the reaction is ``-k (u - misfit)``.
@@ -80,7 +80,7 @@ class Misfit(Seat):
     Mz: Annotated[float | None, NUMBER("about z", degrees=True, default="0")] = None
 
 
-SEATS: dict[str, type[Seat]] = {kind.what: kind for kind in (Stiffness, Misfit)}
+SEATS: dict[str, type[SeatNumbers]] = {kind.what: kind for kind in (Stiffness, Misfit)}
 """The records by the fields of a pair that hold them."""
 
 
