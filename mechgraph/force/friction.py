@@ -27,8 +27,6 @@ from mechgraph.model.friction import Friction, rubs_as_ball, rubs_as_journal, ru
 
 STILL = 1e-12
 """Part of the largest rate of a mechanism below which a freedom is at rest, where friction has no direction."""
-NEWTON, STEPS = 60, 64
-"""Steps of Newton's method at most; steps by which friction grows where many solutions may be."""
 OUTCOMES = ("ok", "jams", "no finite force", "friction not determined")
 """What becomes of a position, by number."""
 
@@ -233,7 +231,7 @@ def _normals(a: Array, B: Array, C: Array, starts: Index) -> tuple[Array, Array,
     alone = np.abs(np.linalg.eigvals(sized[..., 1:])).max(axis=1, initial=0.0) < 1.0
     n, done = sized[..., 0], np.zeros(len(a), dtype=bool)
     scale = np.abs(free).max(axis=1, initial=1e-300)
-    for _ in range(NEWTON):
+    for _ in range(60):
         V = free + np.einsum("tdn,tn->td", per, n)
         size = np.sqrt(np.add.reduceat(V * V, starts[:-1], axis=1))
         off = n - size
@@ -255,7 +253,7 @@ def _newton(a: Array, B: Array, C: Array, starts: Index, k: float, n: Array) -> 
     """Newton's method on ``n - |V(n)|`` with friction times k, and whether it ends."""
     inverse = np.linalg.inv(np.eye(len(a)) - k * C)
     scale = max(float(np.abs(a).max(initial=0.0)), 1e-300)
-    for _ in range(NEWTON):
+    for _ in range(60):
         V = inverse @ (a + k * B @ n)
         size = np.add.reduceat(V * V, starts[:-1]) ** 0.5
         off = n - size
@@ -276,7 +274,7 @@ def _slope(V: Array, size: Array, B: Array, starts: Index) -> Array:
 def _grown(a: Array, B: Array, C: Array, starts: Index) -> tuple[Array, int, float]:
     """The solution that is connected with the frictionless one while friction grows; why there is none, and at which part of it."""
     n, _ = _newton(a, B, C, starts, 0.0, np.zeros(B.shape[1]))
-    k, step, last = 0.0, 1.0 / STEPS, n
+    k, step, last = 0.0, 1 / 64, n
     while k < 1.0:
         ahead = min(1.0, k + step)
         new, met = _newton(a, B, C, starts, ahead, n)
@@ -290,7 +288,7 @@ def _grown(a: Array, B: Array, C: Array, starts: Index) -> tuple[Array, int, flo
             and (new >= 0).all()
             and np.abs(new - n).max() <= 0.5 * max(np.abs(new).max(), 1e-300) + 1e-300
         ):
-            k, last, n, step = ahead, n, new, min(2 * step, 1.0 / STEPS)
+            k, last, n, step = ahead, n, new, min(2 * step, 1 / 64)
             continue
         step /= 2
         if step < 1e-9:

@@ -22,14 +22,10 @@ from mechgraph.result.trajectory import Trajectory
 from mechgraph.result.values import bracket, ranges
 from mechgraph.result.views import PositionLabels
 
-RELATIVE, ABSOLUTE = 1e-9, 1e-11
-"""Tolerances of the integration of an orbit."""
 WALL = 1.0 - 1e-9
 """The largest eccentricity ratio at which a film is evaluated."""
 ORBIT_GAP = 1e-8
 """Eccentricity ratio by which the end of an orbit that closes may miss its beginning."""
-ROUNDS = 40
-"""Cycles by which an orbit is led until it closes."""
 
 
 class Loaded(NamedTuple):
@@ -157,8 +153,8 @@ def _orbit_of(journal: Journal, loaded: Loaded) -> tuple[Array, bool]:
             e.ravel(),
             method="LSODA",
             t_eval=[t[-1]] if places is None else places,
-            rtol=RELATIVE,
-            atol=ABSOLUTE,
+            rtol=1e-9,
+            atol=1e-11,
         )
         out = found.y.reshape(2, e.shape[1], -1)
         return out[..., -1] if places is None else out
@@ -166,7 +162,8 @@ def _orbit_of(journal: Journal, loaded: Loaded) -> tuple[Array, bool]:
     e, closed = np.zeros(2), False
     step = 1e-4
     aside = step * np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])  # differences of the map of a cycle
-    for _ in range(ROUNDS) if loaded.is_cycle else ():
+    # an orbit that attracts closes in some six cycles; 40 tell that it does not
+    for _ in range(40) if loaded.is_cycle else ():
         ends_at = led(e[:, None] + aside)
         missed = ends_at[:, 0] - e
         closed = bool(np.abs(missed).max() < ORBIT_GAP)
