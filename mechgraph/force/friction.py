@@ -274,28 +274,26 @@ def _slope(V: Array, size: Array, B: Array, starts: Index) -> Array:
 def _grown(a: Array, B: Array, C: Array, starts: Index) -> tuple[Array, int, float]:
     """The solution that is connected with the frictionless one while friction grows; why there is none, and at which part of it."""
     n, _ = _newton(a, B, C, starts, 0.0, np.zeros(B.shape[1]))
-    k, step, last = 0.0, 1 / 64, n
+    k, step = 0.0, 1 / 64
     while k < 1.0:
         ahead = min(1.0, k + step)
         new, met = _newton(a, B, C, starts, ahead, n)
-        inverse = np.linalg.inv(np.eye(len(a)) - ahead * C)
-        V = inverse @ (a + ahead * B @ new)
-        size = np.add.reduceat(V * V, starts[:-1]) ** 0.5
-        rising = np.eye(len(n)) - _slope(V, size, ahead * inverse @ B, starts) if met else np.eye(len(n))
-        if (
-            met
-            and np.linalg.det(rising) > 0
-            and (new >= 0).all()
-            and np.abs(new - n).max() <= 0.5 * max(np.abs(new).max(), 1e-300) + 1e-300
-        ):
-            k, last, n, step = ahead, n, new, min(2 * step, 1 / 64)
+        near = np.abs(new - n).max() <= 0.5 * np.abs(new).max() or not new.any()
+        if met and near and (new >= 0).all() and _rises(a, B, C, starts, ahead, new):
+            k, n, step = ahead, new, min(2 * step, 1 / 64)
             continue
         step /= 2
-        if step < 1e-9:
+        if step < 1e-9:  # far below what tells friction from friction
             return _ended(a, B, C, starts, k, n)
-    del last
-    others = _others(a, B, C, starts, n)
-    return (n, 3, np.nan) if others else (n, 0, np.nan)
+    return (n, 3, np.nan) if _others(a, B, C, starts, n) else (n, 0, np.nan)
+
+
+def _rises(a: Array, B: Array, C: Array, starts: Index, k: float, n: Array) -> bool:
+    """Whether normal forces still grow with what presses: no fold, nor its other side."""
+    inverse = np.linalg.inv(np.eye(len(a)) - k * C)
+    V = inverse @ (a + k * B @ n)
+    size = np.add.reduceat(V * V, starts[:-1]) ** 0.5
+    return bool(np.linalg.det(np.eye(len(n)) - _slope(V, size, k * inverse @ B, starts)) > 0)
 
 
 def _ended(a: Array, B: Array, C: Array, starts: Index, k: float, n: Array) -> tuple[Array, int, float]:
