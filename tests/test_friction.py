@@ -201,6 +201,33 @@ def test_slider_crank_rough_everywhere() -> None:
     )
 
 
+def test_a_block_on_a_belt_is_pulled_across() -> None:
+    """Force mu N v / hypot(v, belt) against the pull."""
+    v, belt = 0.03, 0.4
+    pairs = [
+        mg.Pair("B", "P", "frame", "belt", point=(0, 0, 0), axis=X), mg.Pair("E", "E", "belt", "block", point=(0, 0, 0), axis=Z),
+        mg.Pair("H", "Fr", "frame", "block", point=(0, 0, 0), axis=Z),
+    ]  # fmt: skip
+    loads = [mg.Wrench("block", force=(0, 0, -W), point=(0, 0, 0)), mg.Friction("E", mu=MU)]
+    m = mg.Mechanism("belt", pairs=pairs, drives=["B", "H.Tx", "H.Ty", "H.Rz"], loads=loads)
+    s = mg.solve(m, {"B": mg.Motion(0.0, velocity=belt), "H.Tx": 0.0, "H.Ty": mg.Motion(0.0, velocity=v), "H.Rz": 0.0})
+    pull = dict(zip(m.pair("H").freedom_names, s["H"].effort, strict=True))
+    assert pull["H.Ty"] == pytest.approx(MU * W * v / np.hypot(v, belt), rel=1e-12)
+    assert pull["H.Tx"] == pytest.approx(-MU * W * belt / np.hypot(v, belt), rel=1e-12)
+
+
+def test_a_plate_pressed_beside_its_middle() -> None:
+    """It turns about the origin, pressed at distance c from it: friction acts at the center of pressure, c away."""
+    c, w = 0.12, 3.0
+    pairs = [mg.Pair("E", "E", "frame", "plate", point=(0, 0, 0), axis=Z)]
+    loads = [mg.Wrench("plate", force=(0, 0, -W), point=(c, 0, 0.3)), mg.Friction("E", mu=MU, radius=0.05)]
+    m = mg.Mechanism("plate", pairs=pairs, drives=["E.Tx", "E.Ty", "E.Rz"], loads=loads)
+    s = mg.solve(m, {"E.Tx": 0.0, "E.Ty": 0.0, "E.Rz": mg.Motion(0.0, velocity=w)})
+    speed = np.hypot(c, 0.05)
+    assert s["E"].effort == pytest.approx([0.0, MU * W * c / speed, MU * W * (c * c + 0.05**2) / speed], abs=1e-11)
+    assert abs(s.checks.power) < 1e-12
+
+
 @pytest.mark.parametrize("name", ["geneva", "phchc", "r-cp-c", "r-sc-c-r", "r-sg-c", "rcsr"])
 def test_friction_given_as_efforts_brings_the_same_forces(name: str) -> None:
     m = mg.load(name)

@@ -11,7 +11,7 @@ import scipy
 
 from mechgraph.errors import DeclarationError
 from mechgraph.force.elastic import elastic_split
-from mechgraph.force.friction import Rubbed, places_of, rubbed
+from mechgraph.force.friction import OUTCOMES, Rubbed, places_of, rubbed
 from mechgraph.force.loads import Site, inertia_wrenches, kinetic_power
 from mechgraph.force.reactions import (
     METHODS,
@@ -367,15 +367,24 @@ class _FrictionProblem:
     def moving(self, dq: Array, at_rest: bool = False) -> tuple[_FreeForces, Rubbed]:
         """Forces with the friction of a motion with rates ``dq (F, T)``, and what that is; NaN where it has no solution, or none alone."""
         found, of = self.found, {column: one["reactions"] for column, one in self.unit.items()}
-        places = places_of(self.here, dq, found.reactions, self.dry, at_rest)
         stress = found.stress.wrenches
         unknown = stress[:, :, :0] if self.task.redundant == "minimum_norm" else stress
-        rubs = rubbed(self.here, places, found.reactions, of, unknown)
-        sums = {
-            name: getattr(found, name) + sum(one[name] * rubs.efforts[c] for c, one in self.unit.items())
-            for name in ("reactions", "efforts", "multipliers", "coupled")
-        }
-        sums["reactions"] = sums["reactions"] - rubs.taken
+        reactions = found.reactions
+        # sides of balls and centers of pressure settle in a few rounds; what does not is not determined
+        for _ in range(50):
+            places = places_of(self.here, dq, reactions, self.dry, at_rest)
+            rubs = rubbed(self.here, places, found.reactions, of, unknown)
+            sums = {
+                name: getattr(found, name) + sum(one[name] * rubs.efforts[c] for c, one in self.unit.items())
+                for name in ("reactions", "efforts", "multipliers", "coupled")
+            }
+            sums["reactions"] = sums["reactions"] - rubs.taken
+            before, reactions = reactions, np.where(np.isnan(sums["reactions"]), reactions, sums["reactions"])
+            moved = np.abs(reactions - before).max(axis=(0, 1)) > 1e-13 * np.abs(reactions).max(axis=(0, 1))
+            if not (moved.any() and any(place.follows for place in places)):
+                return replace(found, **sums), rubs
+        rubs.outcome[moved & (rubs.outcome == 0)] = OUTCOMES.index("friction not determined")
+        sums = {name: np.where(rubs.outcome > 0, np.nan, values) for name, values in sums.items()}
         return replace(found, **sums), rubs
 
     def at_rest(self, dq: Array, given: Array) -> Array:

@@ -23,7 +23,7 @@ import numpy as np
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Array, Index, cross, skew
 from mechgraph.maths.tolerances import STRESSES
-from mechgraph.model.friction import Friction, rubs_as_ball, rubs_as_journal, rubs_as_slide
+from mechgraph.model.friction import Friction, rubs_as_ball, rubs_as_journal, rubs_as_plane, rubs_as_slide
 
 STILL = 1e-12
 """Part of the largest rate of a mechanism below which a freedom is at rest, where friction has no direction."""
@@ -34,7 +34,8 @@ OUTCOMES = ("ok", "jams", "no finite force", "friction not determined")
 @dataclass(frozen=True)
 class Place:
     """A place that rubs: of which ``pair``, normal vector ``A (d, 6, T)`` of its reaction about the internal origin, friction wrench on
-    link b ``D (6, T)`` for a unit of its size and ``K (6, d, T)`` linear in it; ``preload`` (internal units).
+    link b ``D (6, T)`` for a unit of its size and ``K (6, d, T)`` linear in it; ``preload`` (internal units). ``follows``: whether its
+    directions depend on the reactions themselves.
     """
 
     pair: int
@@ -42,6 +43,7 @@ class Place:
     D: Array
     K: Array
     preload: float
+    follows: bool = False
 
 
 def _rows(moment: Array, force: Array) -> Array:
@@ -89,10 +91,25 @@ def _places(here: Configuration, dq: Array, normal: Array, load: Friction, mu: f
         slip = twist[3:] + cross(twist[:3], c - r * n)
         speed = np.sqrt((slip * slip).sum(axis=0))
         u = slip / np.where(speed > STILL * np.abs(twist).max(initial=1e-300), speed, np.inf)
-        yield Place(k, force, -mu * _force_at(c, u), np.concatenate([-mu * r * skew(u), np.zeros((3, 3, T))]), preload)
+        yield Place(
+            k, force, -mu * _force_at(c, u), np.concatenate([-mu * r * skew(u), np.zeros((3, 3, T))]), preload, True
+        )
         return
     origin = here.pair_points[:, k] if load.on == "b" else here.frames[number][0][:, 3, i]
     r = (load.radius or 0.0) / L
+    if rubs_as_plane(row):
+        z = here.frames[number][0][:, 2, i]
+        w, turn = normal[:, k], (twist[:3] * z).sum(axis=0)
+        press = (w[3:] * z).sum(axis=0)
+        # the center of pressure, where the force has no moment in the plane: p + z x M / F_z
+        at = origin + cross(z, w[:3] - cross(origin, w[3:])) / np.where(press != 0, press, np.inf)
+        v = twist[3:] + cross(twist[:3], at)
+        v = v - z * (v * z).sum(axis=0)
+        speed = np.sqrt((v * v).sum(axis=0) + (r * turn) ** 2)
+        share = np.where(speed > STILL * np.abs(twist).max(initial=1e-300), speed, np.inf)
+        D = -mu * (_force_at(at, v / share) + r * _couple(r * turn / share * z))
+        yield Place(k, _rows(np.zeros((1, 3, T)), z[None]), D, np.zeros((6, 1, T)), preload, True)
+        return
     if rubs_as_ball(row):
         spin = np.sqrt((twist[:3] ** 2).sum(axis=0))
         share = mu / np.hypot(1.0, mu) if load.model == "circle" else mu

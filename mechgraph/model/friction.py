@@ -22,12 +22,14 @@ SINGLE = frozenset(UNIT_TWISTS.values())
 class Friction(Load):
     """Declare dry friction in a pair: it acts against the motion, in proportion to the normal forces of the pair.
 
-    A turn about an axis rubs as a journal: couple ``rho |F|`` of the radial force F, ``rho = radius sin(atan mu)`` (the friction circle),
-    and ``mu thrust_radius |F_axial|`` where ``thrust_radius`` is given. A slide: ``mu |F|`` at the shoes, ``width`` puts them off the axis
-    and bears the moment about it. Turn and slide along one axis share one force. A screw: ``radius |Q| (tan(lead +- phi) - +-tan lead)``,
-    ``tan phi = mu / cos flank``. A ball: ``rho |F|`` against the relative angular velocity. A contact: ``mu N`` against its sliding.
-    With ``length`` two places ``+-length / 2`` along the axis carry ``F / 2 +- M x z / length``. Solved in ``solve`` and ``study``, not in
-    ``respond``. Source: J. E. Shigley and J. J. Uicker, Theory of Machines and Mechanisms, 1995, chapter 13 (friction circle).
+    A turn about an axis rubs as a journal: couple ``rho |F|`` of the radial force F, ``rho = radius sin(atan mu)`` (the friction
+    circle), and ``mu thrust_radius |F_axial|`` where ``thrust_radius`` is given. A slide: ``mu |F|`` at the shoes, ``width`` puts
+    them off the axis and bears the moment about it. Turn and slide along one axis share one force. A screw: ``radius |Q| (tan(lead
+    +- phi) - +-tan lead)``, ``tan phi = mu / cos flank``. A ball: ``rho |F|`` against the relative angular velocity. A contact:
+    ``mu N`` against its sliding. A plane: ``mu |F|`` at the center of pressure against the velocity there, its turn through
+    ``radius``. With ``length`` two places ``+-length / 2`` along the axis carry ``F / 2 +- M x z / length``. Solved in ``solve``
+    and ``study``, not in ``respond``. Source: J. E. Shigley and J. J. Uicker, Theory of Machines and Mechanisms, 1995, chapter 13
+    (friction circle).
 
     Examples
     --------
@@ -128,6 +130,7 @@ class Friction(Load):
             "slide": rubs_as_slide(row),
             "screw": row.takes_pitch,
             "ball": rubs_as_ball(row),
+            "plane": rubs_as_plane(row),
         }
         rolls = pair.roller is not None
         if rolls or not (any(rows.values()) or row.touching):
@@ -136,7 +139,7 @@ class Friction(Load):
                 f"of: pair {pair.name} of type {row.symbol}: {why}; expected one that turns about, slides along or touches at a place"
             ]
         takes = {
-            "radius": rows["journal"] or rows["screw"] or rows["ball"], "thrust_radius": rows["journal"], "width": rows["slide"],
+            "radius": rows["journal"] or rows["screw"] or rows["ball"] or rows["plane"], "thrust_radius": rows["journal"], "width": rows["slide"],
             "length": rows["journal"] or rows["slide"], "flank": rows["screw"],
         }  # fmt: skip
         out = [
@@ -144,7 +147,7 @@ class Friction(Load):
             for name, taken in takes.items()
             if not taken and getattr(self, name)
         ]
-        if self.radius is None and takes["radius"] and not row.touching:
+        if self.radius is None and takes["radius"] and not rows["plane"]:
             out.append(f"radius: type {row.symbol} turns; give the radius at which it rubs")
         if row.takes_pitch and self.radius is not None:
             lead = np.arctan2(abs(pair.pitch_per_radian), self.radius)
@@ -175,6 +178,16 @@ def rubs_as_slide(row: PairType) -> bool:
 def rubs_as_ball(row: PairType) -> bool:
     """Whether it turns as a ball and bears forces in all directions."""
     return not row.touching and len(row.freedoms) == 3 and not any(row.drivable) and len(row.component_names) == 3
+
+
+def rubs_as_plane(row: PairType) -> bool:
+    """Whether it slides in a plane under a force across it."""
+    return (
+        not row.touching
+        and all(row.drivable)
+        and sum(_is(f, turn=False) for f in row.freedoms) == 2
+        and row.component_names[:1] == ("Fz",)
+    )
 
 
 def _is(freedom: Any, *, turn: bool) -> bool:
