@@ -85,6 +85,8 @@ def test_a_topology_counts_in_the_plane() -> None:
     ]
     r = mg.check(mg.Mechanism("sketch", pairs=pairs, drives=["A"], planar=True))
     assert r.verdict == "1 driver, 9 unknowns, 9 equations: determinate in the plane for general geometry (mobility 1)."
+    spatial = mg.Mechanism("sketch", pairs=pairs, drives=["A"])
+    assert mg.check(spatial.to_planar()).verdict == r.verdict
 
 
 def test_a_third_parallel_crank_is_redundant_in_the_plane_too() -> None:

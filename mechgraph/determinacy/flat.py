@@ -149,7 +149,7 @@ class _Flat:
         axes = ends[0].turn @ axes_of(sides[0].axis, sides[0].second) if pair.has_geometry else np.eye(3)
         flat = in_plane(row)
         held = held_in_plane(row, axes)
-        if flat is not None and flat.held == held.shape[1]:
+        if flat is not None and (flat.held == held.shape[1] or not pair.has_geometry):
             new, symbol = flat, row
         else:
             symbol = row_of(instead_of(row, axes), None)
