@@ -115,6 +115,10 @@ class _Flat:
         ]
         pairs = [self._pair(pair, (ends[place[pair.a]], ends[place[pair.b]])) for pair in turned.pairs]
         loads = [self._dropped(load) for load in turned.loads]
+        gears = [
+            self._dropped(gear.moved(np.column_stack([ends[place[gear.link]].turn, np.zeros(3)])))
+            for gear in turned.gears
+        ]
         names = {name for pair in pairs for name in pair.freedom_names}
         old = {name for name in turned.freedom_names() if name not in names}
         drives = [d for d in turned.drives if turned.full_name(d.freedom) not in old]
@@ -125,7 +129,14 @@ class _Flat:
         told = f"Planar; left out: {listed(self.lost, 12)}." if self.lost else ""
         description = " ".join(filter(None, (turned.description, told)))
         return turned.replace(
-            planar=True, links=links, pairs=pairs, loads=loads, drives=drives, start=start, description=description
+            planar=True,
+            links=links,
+            pairs=pairs,
+            gears=gears,
+            loads=loads,
+            drives=drives,
+            start=start,
+            description=description,
         )
 
     def _poses(self, m: Mechanism) -> Array:
@@ -246,4 +257,5 @@ def to_spatial(m: Mechanism, z: Mapping[str, float] | None = None) -> Mechanism:
         links=[lifted(link, height(link.name)) for link in out.links],
         pairs=[lifted(pair, 0.5 * (height(pair.a) + height(pair.b)), only="point") for pair in out.pairs],
         loads=[of_load(load) for load in out.loads],
+        gears=[lifted(gear, height(gear.link)) for gear in out.gears],
     )

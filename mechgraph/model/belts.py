@@ -126,7 +126,12 @@ class Pulley(Described):
     name: Annotated[str, TEXT("differs from all pulleys")]
     link: Annotated[str, LINK_NAME("the link on which it is")]
     point: Annotated[Any, POINT("its center, in the plane of the belt", LENGTH)]
-    axis: Annotated[Any, DIRECTION("its axis; all pulleys of a belt have the same direction")]
+    axis: Annotated[
+        Any,
+        DIRECTION(
+            "its axis; all pulleys of a belt have the same direction", normal=True, default="in a plane its normal"
+        ),
+    ] = None
     radius: Annotated[float | None, POSITIVE("to the middle of the belt", LENGTH, default="by teeth")] = None
     teeth: Annotated[int | None, INTEGER("number of teeth", default="none")] = None
     pitch: Annotated[float | None, POSITIVE("of the teeth, along the belt", LENGTH, default="none")] = None
@@ -144,6 +149,8 @@ class Pulley(Described):
     def value_faults(self, where: str) -> list[str]:
         """See ``Described``."""
         found = super().value_faults(where)
+        if self.axis is None:
+            found.append(f"{where}axis: is missing; give a direction, e.g. (0, 0, 1) (planar=True needs none)")
         given = self.radius is not None, self.teeth is not None and self.pitch is not None
         if not found and (sum(given) != 1 or (self.teeth is None) != (self.pitch is None) or self.teeth == 0):
             found.append(

@@ -321,7 +321,7 @@ def declaration_faults(m: Parts) -> list[str]:
     if m.planar is not True and m.planar is not False:
         faults.append(wrong(m.planar, "planar", "true or false"))
     if m.planar is True:
-        faults += plane_faults(m.links, m.pairs, m.loads)
+        faults += plane_faults(m.links, m.pairs, m.loads, m.gears)
     names, pair_names = _texts(m.link_names()), _texts([pair.name for pair in m.pairs])
     faults += _repeated(names, "link") + _repeated(pair_names, "pair")
     tol = sound_tol(m.tol)

@@ -139,7 +139,7 @@ class Friction(Load):
                 f"of: pair {pair.name} of type {row.symbol}: {why}; expected one that turns about, slides along or touches at a place"
             ]
         takes = {
-            "radius": rows["journal"] or rows["screw"] or rows["ball"] or rows["plane"], "thrust_radius": rows["journal"], "width": rows["slide"],
+            "radius": any(rows[one] for one in ("journal", "screw", "ball", "plane")), "thrust_radius": rows["journal"], "width": rows["slide"],
             "length": rows["journal"] or rows["slide"], "flank": rows["screw"],
         }  # fmt: skip
         out = [
@@ -172,7 +172,7 @@ def rubs_as_journal(row: PairType) -> bool:
 
 def rubs_as_slide(row: PairType) -> bool:
     """Whether it slides along one axis under forces across it."""
-    return not row.touching and _bears(row, 1) and sum(_is(f, turn=False) for f in row.freedoms) == 1
+    return not row.touching and _bears(row) and sum(_is(f, turn=False) for f in row.freedoms) == 1
 
 
 def rubs_as_ball(row: PairType) -> bool:
@@ -194,9 +194,9 @@ def _is(freedom: Any, *, turn: bool) -> bool:
     return freedom.turns is turn and freedom.twist in SINGLE and not any(freedom.per_pitch)
 
 
-def _bears(row: PairType, least: int = 2) -> bool:
-    """Whether it bears forces across its axes: so many components that are forces (of a slide one in the plane of a planar mechanism)."""
-    return sum(not c.is_couple for c in row.reactions or ()) >= least
+def _bears(row: PairType) -> bool:
+    """Whether it bears forces across its axes: at least two components that are forces, in a plane one."""
+    return sum(not c.is_couple for c in row.reactions or ()) >= (2 if row.normal is None else 1)
 
 
 LOADS: dict[str, type[Load]] = {**BASIC_LOADS, Friction.kind: Friction}

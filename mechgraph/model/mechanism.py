@@ -338,6 +338,7 @@ class Mechanism(Parts, Shown):
                 in_space(link) if isinstance(link, Link) and not is_flat(link) else link for link in self.links
             ),
             pairs=tuple(map(pair_in_plane, self.pairs)),
+            gears=tuple(in_space(gear) if isinstance(gear, Described) else gear for gear in self.gears),
             loads=tuple(in_space(load) if isinstance(load, Load) else load for load in self.loads),
         )
 

@@ -224,7 +224,9 @@ def lifted(item: Item, height: float, only: str = "") -> Item:
 DROPPED = "m.to_planar() of the spatial mechanism drops it"
 
 
-def plane_faults(links: Iterable[Any], pairs: Iterable[Any], loads: Iterable[Any]) -> list[str]:
+def plane_faults(
+    links: Iterable[Any], pairs: Iterable[Any], loads: Iterable[Any], gears: Iterable[Any] = ()
+) -> list[str]:
     """What leaves the plane, one line each."""
     found: list[str] = []
     for link in links:
@@ -233,6 +235,9 @@ def plane_faults(links: Iterable[Any], pairs: Iterable[Any], loads: Iterable[Any
     for pair in pairs:
         if isinstance(pair, Pair) and isinstance(pair.type, PairType) and not is_flat(pair):
             found += _pair_faults(pair)
+    for gear in gears:
+        if isinstance(gear, Described):
+            found += _leaving(gear, f"{getattr(gear, 'kind', 'gear')} {shown(getattr(gear, 'name', ''))}: ")
     for load in loads:
         if isinstance(load, Described):
             found += _leaving(load, getattr(load, "where", ""))
