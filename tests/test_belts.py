@@ -258,6 +258,105 @@ def test_a_longer_belt_lets_the_arm_swing():
     assert (np.abs(s["arm"].position) > 1e-3).all()
 
 
+def on_bearings(turns=True, teeth=False, **belt):
+    """Two pulleys on shafts in a locating and a floating bearing each."""
+    held = [mg.parts.bearings(f"b{k}", "frame", k, [(*p, -0.1), (*p, 0.1)], Z) for k, p in TWO.items()]
+    held = held if turns else [mg.parts.Parts(pairs=part.pairs[:2]) for part in held]
+    sizes = [{"teeth": n, "pitch": 0.005} if teeth else {"radius": 0.0025 * n} for n in (20, 40)]
+    gears = [mg.Pulley(k, k, (*p, 0), Z, **size) for (k, p), size in zip(TWO.items(), sizes, strict=True)]
+    drives, loads = (["bp.turn.Rz"], [mg.Effort("bw.turn.Rz", 7.0)]) if turns else ([], [])
+    drive = mg.BeltDrive("B", over=["p", "w"], **belt)
+    return mg.Mechanism("shafts", None, (), drives, loads, parts=held, gears=gears, couplings=[drive])
+
+
+@pytest.mark.parametrize("method", ["loop_wrench", "newton_euler", "printed"])
+def test_shafts_in_real_bearings_turn_and_share_the_tensions(method):
+    """The row needs no hinge: turns are counted by the pair Fr beside the bearings; every bearing takes half of both strands."""
+    m = on_bearings(pretension=300.0)
+    assert mg.check(m).redundancy == 1
+    s = mg.solve(m, {"bp.turn.Rz": [0.0, 5.0, 50.0]}, method=method)
+    np.testing.assert_allclose(s["bw.turn"].position[:, 5], [0, 2.5, 25], atol=1e-9)
+    np.testing.assert_allclose(s["bp.turn"].effort[:, 5], -3.5, rtol=1e-9)
+    tension = s.coupling("B").tension
+    np.testing.assert_allclose(tension["p-w"], 335.0, rtol=1e-9)
+    lean = np.arcsin(0.05 / 0.2)
+    half = 0.5 * np.array([600 * np.cos(lean), -70 * np.sin(lean), 0])
+    for name in ("bw.1", "bw.2"):
+        np.testing.assert_allclose(s[name].force, np.broadcast_to(half, (3, 3)), atol=1e-9)
+
+
+def test_turns_that_nothing_counts_need_teeth():
+    with pytest.raises(mg.DeclarationError, match="nothing counts the turns between the pulleys of p-w"):
+        on_bearings(turns=False)
+    assert mg.check(on_bearings(turns=False, teeth=True)).mobility == 1
+
+
+def test_a_belt_without_places_of_its_pairs_is_counted():
+    m = drive()
+    bare = [mg.Pair(p.name, "R", p.a, p.b) for p in m.pairs]
+    assert mg.check(m.replace(pairs=bare)).mobility_by_count == 0
+
+
+# --- chains --------------------------------------------------------------------------------------------------------------
+
+PITCH, TEETH = 0.0127, {"w": 24, "i": 12, "p": 18}
+
+
+def chain(**more):
+    gears = [mg.Pulley(k, k, (*THREE[k], 0), Z, teeth=n, pitch=PITCH) for k, n in TEETH.items()]
+    drive = mg.BeltDrive("B", over=["w", "i", "p"], backs=["i"], **more)
+    loads = [mg.Effort("arm", 12.0), mg.Effort("w", -3.0)]
+    places = {k: THREE[k] for k in ("w", "p")}
+    return mg.Mechanism("chain", None, [*hinges(places), ARM, ON_ARM], ["p"], loads, gears=gears, couplings=[drive])
+
+
+def test_a_chain_runs_unevenly_and_the_same_with_every_tooth():
+    """Rollers that sit stay at their distance but for whole pitches; tensioner and speed return with every tooth of the driver."""
+    tooth = 2 * np.pi / TEETH["p"]
+    turn = np.linspace(0, 2 * tooth, 41)
+    s = mg.solve(chain(polygon=True), {"p": mg.Motion(turn, 10.0, 0.0)})
+    arm, speed = s["arm"].position[:, 0], s["w"].velocity[:, 0] / 10
+    np.testing.assert_allclose(arm[:21], arm[20:], atol=1e-10)
+    assert 1e-3 < np.ptp(arm) < 1e-2
+    assert speed.min() < 0.75 - 5e-3 < 0.75 + 5e-3 < speed.max()
+    np.testing.assert_allclose(s["w"].position[-1], 2 * tooth * 0.75, atol=1e-10)
+    assert s.checks.power.max() < 1e-9
+    # rollers nearest to where the strand from p to w touches: their distance is the same but for whole pitches
+    b, left = s.coupling("B"), []
+    for k in range(len(turn)):
+        at_ = []
+        for name, touch in zip(("p", "w"), b.ends["p-w"][k], strict=True):
+            n, center, angle_ = TEETH[name], np.array(THREE[name]), s[name].position[k, 0]
+            there = np.arctan2(*(touch[:2] - center)[::-1])
+            roller = angle_ + 2 * np.pi / n * np.round((there - angle_) * n / (2 * np.pi))
+            at_.append(center + PITCH / (2 * np.sin(np.pi / n)) * np.array([np.cos(roller), np.sin(roller)]))
+        left.append(np.linalg.norm(at_[1] - at_[0]) / PITCH)
+    off = np.array(left) - left[0]
+    np.testing.assert_allclose(off, np.round(off), atol=2e-3)
+    assert np.ptp(b.span["p-w"]) < 1e-12 < np.ptp(off)
+
+
+def test_a_chain_of_short_pitch_is_a_belt():
+    """The wave of the arm, ``R (1 - cos(pi / teeth))`` of every sprocket, falls with the square of the pitch."""
+    waves = []
+    for n in (1, 2):
+        gears = [mg.Pulley(k, k, (*THREE[k], 0), Z, teeth=n * z, pitch=PITCH / n) for k, z in TEETH.items()]
+        tooth = 2 * np.pi / TEETH["p"] / n
+        s = mg.kinematics(chain(polygon=True).replace(gears=gears), {"p": mg.Motion(np.linspace(0, tooth, 61), 1.0)})
+        waves.append(np.ptp(s["arm"].position))
+    assert 0 < waves[1] < waves[0] / 3
+
+
+def test_chords_need_teeth_and_a_center_that_moves():
+    with pytest.raises(mg.DeclarationError, match="no center moves"):
+        mg.Mechanism(
+            "c", pairs=hinges(TWO), gears=[mg.Pulley(k, k, (*p, 0), Z, teeth=20, pitch=0.005) for k, p in TWO.items()],
+            couplings=[mg.BeltDrive("B", over=["p", "w"], polygon=True)],
+        )  # fmt: skip
+    with pytest.raises(mg.DeclarationError, match="needs teeth= and pitch="):
+        tensioner(polygon=True)
+
+
 def test_energy_of_a_tensioner_that_swings():
     """Free motion with springs, centers moving: the balance of energy closes, and the length stays."""
     heavy = [

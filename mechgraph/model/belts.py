@@ -41,7 +41,7 @@ from mechgraph.fields import (
     second_direction,
 )
 from mechgraph.maths.se3 import Array, cross, identity
-from mechgraph.model.couplings import MeshStep, fitting_of
+from mechgraph.model.couplings import MeshStep, fitting_of, motion_of
 from mechgraph.model.lines import LineCoupling, LinesAt, LinkPlace, Places, Relation, meeting, pose_along, way
 from mechgraph.quantities import FORCE, LENGTH, shown, unknown, wrong
 
@@ -334,6 +334,11 @@ class BeltDrive(LineCoupling):
             )
         elif clear:
             yield f"does not touch {', '.join(map(repr, clear))} there; move the pulley, or change on which side it is (backs=)"
+        elif uncounted := self._uncounted(m):
+            yield (
+                f"nothing counts the turns between the pulleys of {uncounted}, which have no teeth; give teeth= and pitch=, or a pair Fr "
+                "beside the bearings about the same axis, as mg.parts.bearings has it"
+            )
         elif self.polygon and self._fixed(m):
             yield (
                 "polygon = True: no center moves, and a chain whose speed rises and falls with every tooth has slack there, which is not "
@@ -377,7 +382,12 @@ class BeltDrive(LineCoupling):
 
     def placed(self, m: Any) -> Self:
         """One span with its row in a mechanism: linear in the turns of pairs where these are about the axes of its pulleys."""
-        pulleys, laid, k = self.pulleys(m), self._laid(m), self.span or 0
+        pulleys, k = self.pulleys(m), self.span or 0
+        if not m.has_geometry:
+            steps = self._way(m, pulleys[k].link, pulleys[(k + 1) % len(pulleys)].link)
+            names = [name for step in steps for name in m.pairs[step.pair].freedom_names]
+            return self._put(m, steps, dict.fromkeys(names, 1.0))
+        laid = self._laid(m)
         own = k, (k + 1) % len(pulleys)
         (a, b), numbers = (place_of(pulleys[i]) for i in own), tuple(float(laid.w[i]) for i in own)
         steps = self._way(m, a.link, b.link)
@@ -400,11 +410,21 @@ class BeltDrive(LineCoupling):
             longer=0.0 if self.length is None or k else self.length - float(laid.course.length[0]),
         )
 
-    def _fixed(self, m: Any) -> bool:
-        """Whether all rows are linear: no center moves."""
+    def _turning(self, m: Any) -> list[Turns]:
+        """The turns on the way along every span."""
         pulleys = self.pulleys(m)
         ends = zip(pulleys, (*pulleys[1:], pulleys[0]), strict=True)
-        return all(_turns_of(m, self._way(m, a.link, b.link), place_of(a), place_of(b)).fixed for a, b in ends)
+        return [_turns_of(m, self._way(m, a.link, b.link), place_of(a), place_of(b)) for a, b in ends]
+
+    def _fixed(self, m: Any) -> bool:
+        """Whether all rows are linear: no center moves."""
+        return all(turns.fixed for turns in self._turning(m))
+
+    def _uncounted(self, m: Any) -> str:
+        """The first span along which turns go uncounted and no teeth tell them; nothing where there is none."""
+        pulleys = self.pulleys(m)
+        ends = zip(self.span_names, self._turning(m), pulleys, (*pulleys[1:], pulleys[0]), strict=True)
+        return next((name for name, turns, a, b in ends if not turns.known and np.isinf(self._period(a, b))), "")
 
     @staticmethod
     def _period(a: Pulley, b: Pulley) -> float:
@@ -515,40 +535,48 @@ class Turns(NamedTuple):
 
 def _turns_of(m: Any, steps: Sequence[MeshStep], a: LinkPlace, b: LinkPlace) -> Turns:
     """The turns on the way between two pulleys."""
-    fitting = fitting_of(m)
-    first = a.seen(identity())
-    last = b.seen(pose_along(m, tuple(steps)))
+    fitting, first, last = fitting_of(m), a.seen(identity()), b.seen(pose_along(m, tuple(steps)))
     z = first.axis[:, 0, 0] / np.linalg.norm(first.axis)
     before: dict[str, float] = {}
     behind: dict[str, float] = {}
-    fixed = known = True
+    fixed = known = at_first = True
     for i, step in enumerate(steps):
         pair, X = m.pairs[step.pair], pose_along(m, tuple(steps[:i]))
         if not pair.type.f:
             continue
-        marker = pair.markers[0 if step.sense > 0 else 1]
-        p, w = X[:, :3] @ np.asarray(marker.point) + X[:, 3], X[:, :3] @ np.asarray(marker.axis)
-        w = w / np.linalg.norm(w)
-        parallel = float(np.abs(cross(w, z)).max()) <= fitting
-        names = [n for n, f in zip(pair.freedom_names, pair.type.freedoms, strict=True) if f.turns]
-        if not (pair.type.f == 1 and names and parallel and not any(pair.type.freedoms[0].per_pitch)):
-            fixed = False
-            known = known and (
-                not names or (len(names) == 1 and parallel and pair.type.drivable[pair.freedom_names.index(names[0])])
-            )
-            behind |= {name: step.sense * float(np.sign(w @ z)) for name in names if known}
-            continue
-        turn = {names[0]: step.sense * float(np.sign(w @ z))}
-        about = [
-            float(np.abs(cross(p - place.point[:, 0, 0], z)).max()) <= fitting * max(1.0, float(np.abs(p).max()))
-            for place in (first, last)
+        beside = [k for k, _ in m.once(meeting)[pair.a] if {m.pairs[k].a, m.pairs[k].b} == {pair.a, pair.b}]
+        ways = [
+            step,
+            *(MeshStep(k, step.sense if m.pairs[k].a == pair.a else -step.sense) for k in beside if k != step.pair),
         ]
-        if about[0] and not behind and fixed:
-            before |= turn
-        else:
-            behind |= turn
-            fixed = fixed and about[1]
+        turn = next((found for one in ways if (found := _counted(m, one, X, z, fitting)) is not None), None)
+        known = known and turn is not None
+        p = X[:, :3] @ np.asarray(pair.markers[0 if step.sense > 0 else 1].point) + X[:, 3]
+        reach = fitting * max(1.0, float(np.abs(p).max()))
+        about = [float(np.abs(cross(p - place.point[:, 0, 0], z)).max()) <= reach for place in (first, last)]
+        at_first = at_first and bool(turn) and about[0]
+        (before if at_first else behind).update(turn or {})
+        fixed = fixed and bool(turn) and motion_of(pair) == "turn" and (at_first or about[1])
     return Turns(before, behind, fixed, known)
+
+
+def _counted(m: Any, step: MeshStep, X: Array, z: Array, fitting: float) -> dict[str, float] | None:
+    """The freedom of a pair that counts turns about ``z``, with its sense, where the link before has the pose X; nothing where the pair
+    does not turn, None where its turns have no coordinate of their own. Turns about other axes are taken for small.
+    """
+    pair = m.pairs[step.pair]
+    R = X[:, :3] @ pair.markers[0 if step.sense > 0 else 1].pose()[:, :3]
+    found: dict[str, float] = {}
+    for name, freedom, single in zip(pair.freedom_names, pair.type.freedoms, pair.type.drivable, strict=True):
+        if not freedom.turns:
+            continue
+        axis = R @ np.asarray(freedom.twist[:3])
+        if not single:
+            return None
+        if float(np.abs(cross(axis, z)).max()) <= fitting:
+            found[name] = step.sense * float(np.sign(axis @ z))
+    turns = any(freedom.turns for freedom in pair.type.freedoms)
+    return found if len(found) == 1 or not turns else None
 
 
 def pretensions(m: Any) -> list[tuple[BeltDrive, list[int]]]:

@@ -24,6 +24,7 @@ from mechgraph.pairs.contact_types import is_open, takes_curves
 from mechgraph.pairs.curves import Travel, outside
 from mechgraph.pairs.travelling import Beside
 from mechgraph.result.solution import Solution
+from mechgraph.result.views import CouplingResult
 from mechgraph.show import shapes
 from mechgraph.show.shapes import FreedomLine, Shape, frame_along, lines_of, symbol
 from mechgraph.show.stage import (
@@ -201,7 +202,9 @@ def _tensions(name: str, along: Array, solution: Solution | None, positions: Any
     """
     if solution is None or not solution.has_forces:
         return np.ones(along.shape[:2])
-    force = solution.coupling(name).force.reshape(-1, 3)[positions]
+    found = solution.coupling(name)
+    assert isinstance(found, CouplingResult)
+    force = found.force.reshape(-1, 3)[positions]
     ways = along / np.linalg.norm(along, axis=2, keepdims=True) * np.array([-1.0, 1.0])[:, None]
     share = (ways * force[:, None]).sum(axis=2)
     return np.asarray(np.where(share == share.max(axis=1, keepdims=True), np.linalg.norm(force, axis=1)[:, None], 0.0))
