@@ -106,6 +106,25 @@ def stages() -> mg.Solution:
     return mg.solve(m, {"A": mg.Motion(np.linspace(0.0, np.deg2rad(420.0), 73), velocity=10.0)})
 
 
+def tensioner() -> mg.Solution:
+    """A belt over three pulleys, held tight by a spring on the arm of its idler."""
+    z, at = (0, 0, 1), {"p": (0.0, 0.0, 0.0), "w": (0.2, 0.0, 0.0), "i": (0.1, 0.022, 0.0)}
+    radii = {"p": 0.016, "w": 0.032, "i": 0.02}
+    joints = [
+        ("A", "frame", "p", at["p"]),
+        ("B", "frame", "w", at["w"]),
+        ("C", "arm", "i", at["i"]),
+        ("D", "frame", "arm", (0.15, 0.07, 0)),
+    ]
+    pairs = [mg.Pair(name, "R", a, b, point=p, axis=z) for name, a, b, p in joints]
+    m = mg.Mechanism(
+        "tensioner", pairs=pairs, gears=[mg.Pulley(k, k, p, z, radius=radii[k]) for k, p in at.items()], drives=["A"],
+        couplings=[mg.BeltDrive("belt", over=["w", "i", "p"], backs=["i"])],
+        loads=[mg.Effort("B", -3.0), mg.TorsionSpring("D", stiffness=6.0, free=0.7)], units=SI,
+    )  # fmt: skip
+    return mg.solve(m, {"A": mg.Motion(np.linspace(0.0, 4 * np.pi, 73), velocity=10.0)})
+
+
 def engine() -> mg.Solution:
     """An engine in the plane, its gas force known over two turns of the crank."""
     angle = np.deg2rad([0, 10, 25, 60, 120, 180, 360, 540, 600, 660, 700, 720])
@@ -164,6 +183,7 @@ ENTRIES = [
     Entry("Cam with roller arm", example("16", "mechanism", turn("A", 20.0)), "../how-to/cam.md"),
     Entry("Cam with roller", cam, "../how-to/cam.md"),
     Entry("Two stages of gears", stages, "../how-to/gears.md"),
+    Entry("Belt drive with a tensioner", tensioner, "../how-to/belts.md"),
     Entry("Engine in the plane", engine, "../how-to/planar.md"),
     Entry("Planetary train", example("14", "planetary", turn("S", 10.0, 1260.0), 1), "../how-to/gears.md"),
     Entry("Excavator", dig, "../tutorials/excavator.md"),

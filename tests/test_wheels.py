@@ -142,9 +142,9 @@ def test_other_wheels_interleave_at_the_pitch_point(kind: str) -> None:
 def test_length_and_wrap_of_belts() -> None:
     """20 and 40 teeth of pitch 5 at 200: length 551.2672, wrap of the small pulley 170.8714 degrees; crossed 561.4537."""
     radii = [20 * 5 / (2 * np.pi), 40 * 5 / (2 * np.pi)]
-    centers = np.array([[[0.0, 0, 0]], [[200.0, 0, 0]]])
+    centers = np.array([[0.0, 200.0], [0, 0], [0, 0]])[:, :, None]
     for senses, length in (((1.0, 1.0), 551.2672), ((1.0, -1.0), 561.4537)):
-        path, number = belt_path(centers, np.array([Z]), radii, senses)
+        path, number = belt_path(centers, np.array(Z)[:, None], np.array(radii) * senses)
         steps = np.linalg.norm(np.diff(np.concatenate([path, path[:, :1]], axis=1), axis=1), axis=2)[0]
         on = number % 1 > 0
         # arcs are drawn by chords: c = 2 r sin(arc / 2 r)
@@ -178,6 +178,32 @@ def test_the_tight_strand_of_a_belt_is_the_thick_one() -> None:
         assert (width[tight], width[slack]) == pytest.approx((0.2, 0.07))
     plain = scene(m)  # no forces are known
     assert len({np.linalg.norm(plain.frames[p.frame][0][:, 0]).round(12) for p in parts(plain, "strand")}) == 1
+
+
+def test_a_belt_follows_its_tensioner_and_swells_with_its_tensions() -> None:
+    """Around two pulleys and under an idler on its back; the lower strand has 258 N, the others 353 N (docs/how-to/belts.md)."""
+    at = {"p": (0, 0, 0), "w": (0.2, 0, 0), "i": (0.1, 0.035, 0)}
+    radii = {"p": 0.1 / (2 * np.pi), "w": 0.2 / (2 * np.pi), "i": 0.02}
+    pairs = [mg.Pair(k, "R", "arm" if k == "i" else "frame", k, point=p, axis=Z) for k, p in at.items()]
+    pairs.append(mg.Pair("arm", "R", "frame", "arm", point=(0.16, 0.06, 0), axis=Z))
+    m = mg.Mechanism(
+        "belt", pairs=pairs, gears=[mg.Pulley(k, k, p, Z, radius=radii[k]) for k, p in at.items()], drives=["p"], frame="frame",
+        couplings=[mg.BeltDrive("b", over=["w", "i", "p"], backs=["i"])], loads=[mg.Effort("w", -3.0), mg.Effort("arm", 4.0)],
+    )  # fmt: skip
+    s = mg.solve(m, {"p": np.linspace(0.0, 2.0, 4)})
+    found = scene(s)
+    strands = [found.frames[p.frame] for p in parts(found, "strand")]
+    ends = np.stack([X[:, :, 3] for X in strands], axis=1)
+    for k, r in radii.items():
+        away_from = np.linalg.norm(ends - s.link(k).point(at[k]).position[:, None], axis=2)
+        assert away_from.min(axis=1) == pytest.approx(np.full(4, r))
+        assert (np.abs(away_from - r) < 1e-9).sum(axis=1).tolist() == [25] * 4
+    spans = sorted(strands, key=lambda X: -np.linalg.norm(X[0, :, 2]))[:3]
+    wide = {round(float(X[0, 1, 3] + X[0, 1, 2] / 2), 3): np.linalg.norm(X[0, :, 0]) / found.symbol for X in spans}
+    low, *others = (wide[y] for y in sorted(wide))
+    assert others == pytest.approx([0.2, 0.2], rel=1e-6)
+    assert low == pytest.approx(0.07 + 0.13 * 258.287 / 352.535, abs=1e-5)
+    assert len(parts(found, "wheel")) == 2 * 3
 
 
 def test_teeth_are_drawn_where_they_are_large_enough() -> None:

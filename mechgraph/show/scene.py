@@ -24,7 +24,7 @@ from mechgraph.pairs.contact_types import is_open, takes_curves
 from mechgraph.pairs.curves import Travel, outside
 from mechgraph.pairs.travelling import Beside
 from mechgraph.result.solution import Solution
-from mechgraph.result.views import CouplingResult
+from mechgraph.result.views import BeltResult, CouplingResult
 from mechgraph.show import shapes
 from mechgraph.show.shapes import FreedomLine, Shape, frame_along, lines_of, symbol
 from mechgraph.show.stage import (
@@ -38,7 +38,7 @@ from mechgraph.show.stage import (
     slide_of,
     stretched,
 )
-from mechgraph.show.wheels import READABLE, belt_path
+from mechgraph.show.wheels import READABLE, DrawnBelt, belt_path
 
 __all__ = ["Label", "DrawnPart", "DrawnPlace", "Scene", "place_of_states", "scene", "scene_at"]
 
@@ -180,30 +180,32 @@ def gearing(stage: DrawnPose, solution: Solution | None, positions: Any) -> Iter
             yield DrawnPart("wheel", wheel.name, wheel.link, frame, wheel.mark(flat))
     for belt in stage.belts:
         own = [stage.wheels[i] for i in belt.over]
-        centers = np.stack([stage.on(w.link, w.at) for w in own])
-        axis = stage.place.poses[own[0].link][:, :3, :3] @ own[0].axes[:, 2]
-        path, span = belt_path(centers, axis, [w.radius for w in own], belt.senses)
+        centers = np.stack([stage.on(w.link, w.at).T for w in own], axis=1)
+        axis = (stage.place.poses[own[0].link][:, :3, :3] @ own[0].axes[:, 2]).T
+        path, span = belt_path(centers, axis, np.array([w.radius for w in own]) * belt.senses)
         along = np.roll(path, -1, axis=1) - path
-        pull = _tensions(belt.name, along[:, span % 1 == 0], solution, positions)
-        most = float(np.nanmax(pull, initial=0.0)) or 1.0
+        pull = _tensions(belt, along[:, span % 1 == 0], solution, positions)
+        most = float(np.max(np.nan_to_num(pull), initial=0.0)) or 1.0
         for i, k in enumerate(span):
             # half the width of a belt over a symbol: slack, and with the greatest tension
             tension = (1.0 - k % 1.0) * pull[:, int(np.floor(k))] + k % 1.0 * pull[:, int(np.ceil(k))]
-            width = stage.symbol * (0.07 + 0.13 * tension / most)
+            width = stage.symbol * (0.07 + 0.13 * np.where(np.isnan(tension), 0.4, tension / most))
             frame = f"belt:{belt.name}:{i}"
             stage.frames[frame] = stretched(along[:, i], path[:, i], np.linalg.norm(along[:, i], axis=1), width)
             yield DrawnPart("strand", belt.name, "", frame, shapes.prism(6, 1.0, 0.0, 1.0))
 
 
-def _tensions(name: str, along: Array, solution: Solution | None, positions: Any) -> Array:
-    """Tensions ``(T, spans)`` of a belt whose spans run ``along (T, spans, 3)``: that of the tight one of two; alike where none is known.
+def _tensions(belt: DrawnBelt, along: Array, solution: Solution | None, positions: Any) -> Array:
+    """Tensions ``(T, spans)`` of a belt whose spans run ``along (T, spans, 3)``, NaN where they are not known.
 
-    The span that comes to the second pulley pulls it back, the one that leaves it draws it on.
+    Where the tight one of two spans bears all: the one that comes to the second pulley pulls it back, the one that leaves it draws it on.
     """
     if solution is None or not solution.has_forces:
-        return np.ones(along.shape[:2])
-    found = solution.coupling(name)
-    assert isinstance(found, CouplingResult)
+        return np.full(along.shape[:2], np.nan)
+    found = solution.coupling(belt.name)
+    if isinstance(found, BeltResult):
+        tension = np.stack([found.tension[name].reshape(-1)[positions] for name in belt.spans], axis=1)
+        return np.maximum(tension, 0.0)
     force = found.force.reshape(-1, 3)[positions]
     ways = along / np.linalg.norm(along, axis=2, keepdims=True) * np.array([-1.0, 1.0])[:, None]
     share = (ways * force[:, None]).sum(axis=2)

@@ -3,9 +3,6 @@
 A tooth at the radius r has half the angle ``psi(r) = pi / (2 z) + 2 x tan a / z + inv a_t - inv a_r``, ``cos a_r = r_b / r``, with the base
 radius r_b and ``inv a = tan a - a``. Inside a ring the same holds for the spaces.
 
-A span of a belt from pulley i to pulley j, which turn in the senses s (1 or -1) about one axis z, a distance D apart along e, runs along
-``t = cos g e - sin g (z x e)``, ``sin g = (s_j r_j - s_i r_i) / D``, and meets each pulley at ``c - s r (z x t)``.
-
 Source: Litvin and Fuentes, Gear Geometry and Applied Theory, 2004, chapter 10.
 """
 
@@ -18,7 +15,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mechgraph.fields import axes_of, second_direction
 from mechgraph.maths.se3 import Array
+from mechgraph.model.belts import BeltDrive, course
 from mechgraph.model.couplings import Axes, Belt, BevelGears, Contact, Rack, SpurGears, WormGear
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.show.shapes import Shape, polyline
@@ -288,40 +287,29 @@ def interleaved(wheels: Sequence[Wheel], meshes: Iterable[DrawnMesh], poses: Map
     return out
 
 
-def belt_path(centers: Array, axis: Array, radii: Sequence[float], senses: Sequence[float]) -> tuple[Array, Array]:
-    """Points ``(T, n ARC, 3)`` of a closed belt over pulleys with ``centers (n, T, 3)``, which turn about ``axis (T, 3)`` in their senses.
+def belt_path(centers: Array, axis: Array, w: Array) -> tuple[Array, Array]:
+    """Points ``(T, n ARC, 3)`` of a belt over pulleys with ``centers (3, n, T)``, signed radii ``w (n,)`` and ``axis (3, T)``.
 
     And the span of every piece behind a point: ``k`` from pulley k to the next one, from ``k - 1`` to ``k`` on pulley k.
     """
-    n = len(radii)
-    runs = []
-    for i in range(n):
-        j = (i + 1) % n
-        d = centers[j] - centers[i]
-        d = d - (d * axis).sum(axis=1, keepdims=True) * axis
-        D = np.linalg.norm(d, axis=1, keepdims=True)
-        e = d / D
-        sine = (senses[j] * radii[j] - senses[i] * radii[i]) / D
-        runs.append(np.sqrt(np.maximum(1.0 - sine**2, 0.0)) * e - sine * np.cross(axis, e))
-    points, number = [], []
-    for i in range(n):
-        before, behind = runs[i - 1], runs[i]
-        turn = np.arctan2((np.cross(before, behind) * axis).sum(axis=1), (before * behind).sum(axis=1))
-        wrap = senses[i] * ((senses[i] * turn + 1e-9) % (2 * np.pi) - 1e-9)
-        for j in range(ARC):
-            a = (j / (ARC - 1) * wrap)[:, None]
-            t = np.cos(a) * before + np.sin(a) * np.cross(axis, before)
-            points.append(centers[i] - senses[i] * radii[i] * np.cross(axis, t))
-            number.append(float(i) if j == ARC - 1 else i - 1 + (j + 0.5) / (ARC - 1))
-    return np.stack(points, axis=1), np.array(number)
+    made = course(centers, axis[:, None], w)
+    part = np.linspace(0.0, 1.0, ARC)[:, None, None]
+    turn = part * np.sign(w)[:, None] * made.wrap
+    out = np.roll(made.spans.end, 1, axis=1) - centers  # where the belt runs onto each pulley
+    across = np.cross(axis[:, None], out, axis=0)
+    points = centers[:, None] + np.cos(turn) * out[:, None] + np.sin(turn) * across[:, None]
+    k = np.arange(len(w))
+    number = np.concatenate([k - 1 + (part[:-1, :, 0] + part[1:, :, 0]) / 2, k[None].astype(float)])
+    return points.transpose(3, 2, 1, 0).reshape(points.shape[3], -1, 3), number.T.ravel()
 
 
 class DrawnBelt(NamedTuple):
-    """A belt over wheels by number, in order, which it turns in the ``senses``; global."""
+    """A belt over wheels by number, in order, which it turns in the ``senses``; ``spans`` are named where each has its tension."""
 
     name: str
     over: tuple[int, ...]
     senses: tuple[float, ...]
+    spans: tuple[str, ...] = ()
 
 
 class Seat(NamedTuple):
@@ -357,7 +345,18 @@ def gears_of(m: Mechanism, poses: Mapping[str, Array]) -> tuple[list[Wheel], lis
         own.append(len(wheels) - 1)
         return own[-1]
 
+    named = {}
+    for gear in m.gears:
+        pose, axes = poses[gear.link], axes_of(gear.axis, second_direction(gear.axis))
+        seat = Seat(gear.link, pose, pose[:, :3] @ np.asarray(gear.point) + pose[:, 3], pose[:, :3] @ axes)
+        named[gear.name] = number(
+            seat.wheel(gear.name, seat.point, seat.axes, 0, gear.pitch_radius, 0.05 * gear.pitch_radius)
+        )
     for c in m.couplings:
+        if isinstance(c, BeltDrive) and not c.span:
+            belts.append(
+                DrawnBelt(c.belt, tuple(named[name] for name in c.over), tuple(c.senses.tolist()), c.span_names)
+            )
         if not isinstance(c, Contact):
             continue
         seats = [_seat(m, poses, q, link) for q, link in zip((c.a, c.b), c.gears(m), strict=True)]
