@@ -9,7 +9,7 @@ from matplotlib.path import Path
 import mechgraph as mg
 from mechgraph import show
 from mechgraph.show.scene import DrawnPart, Scene, scene
-from mechgraph.show.wheels import DrawnMesh, Wheel, belt_path, interleaved
+from mechgraph.show.wheels import DrawnMesh, Wheel, belt_path, gears_of, interleaved
 
 Z = (0.0, 0.0, 1.0)
 
@@ -137,6 +137,94 @@ def test_other_wheels_interleave_at_the_pitch_point(kind: str) -> None:
             shape = wheel.toothed(flat)
             assert np.isfinite(shape.vertices).all()
             assert {i for row in (*shape.faces, *shape.lines) for i in row} <= set(range(len(shape.vertices)))
+
+
+def stage(distance: float, **more: object) -> mg.Mechanism:
+    """20 and 40 teeth of module 2 at a distance."""
+    at = {"p": (0.0, 0.0, 0.0), "w": (distance, 0.0, 0.0)}
+    gears = [mg.Gear(k, k, n, at[k], Z, module=2.0, **more) for k, n in (("p", 20), ("w", 40))]  # type: ignore[arg-type]
+    pairs = [mg.Pair(k, "R", "frame", k, point=p, axis=Z) for k, p in at.items()]
+    return mg.Mechanism("stage", pairs=pairs, gears=gears, couplings=[mg.Mesh("m", "p", "w")], drives=["p"])
+
+
+def test_gears_further_apart_have_backlash_on_both_sides() -> None:
+    """At 61.2 teeth keep clear of each other by half the backlash along the normal, ``2 a (inv aw - inv a) cos aw``, on either side."""
+    found = scene(mg.kinematics(stage(61.2), {"p": np.linspace(0.0, 0.3, 5)}))
+    aw, a = np.arccos(60.0 * np.cos(np.deg2rad(20.0)) / 61.2), np.deg2rad(20.0)
+    play = 2 * 61.2 * (np.tan(aw) - aw - np.tan(a) + a) * np.cos(aw)
+    for t in range(5):
+        p, w = outlines(found, t)
+        assert overlap(p, w) == overlap(w, p) == 0.0
+        assert away(p, w).min() == pytest.approx(play / 2, rel=0.05)
+
+
+def test_a_marked_tooth_stays_where_it_is_declared() -> None:
+    found = scene(mg.kinematics(stage(60.0, mark=(0, 1, 0)), {"p": [0.0]}))
+    for outline, center in zip(outlines(found, 0), ([0.0, 0.0], [60.0, 0.0]), strict=True):
+        up = (outline - center)[:-1]
+        tip = up[up[:, 1] > up[:, 1].max() - 1e-6]
+        assert tip[:, 0].mean() == pytest.approx(0.0, abs=1e-9)
+
+
+def test_planets_mesh_with_sun_and_ring() -> None:
+    """Phases go from wheel to wheel; (24 + 60) / 3 is whole, so that the last planet fits too."""
+    at = {f"p{i}": 42.0 * np.array([np.cos(a), np.sin(a), 0.0]) for i, a in enumerate(2 * np.pi * np.arange(3) / 3)}
+    pairs = [mg.Pair(k, "R", "frame", k, point=(0, 0, 0), axis=Z) for k in ("sun", "arm")]
+    pairs += [mg.Pair(k, "R", "arm", k, point=p, axis=Z) for k, p in at.items()]
+    gears = [
+        mg.Gear("sun", "sun", 24, (0, 0, 0), Z, module=2.0),
+        mg.Gear("ring", "frame", 60, (0, 0, 0), Z, module=2.0, internal=True),
+    ]
+    gears += [mg.Gear(k, k, 18, p, Z, module=2.0) for k, p in at.items()]
+    meshes = [mg.Mesh(f"{k} {other}", k, other) for k in at for other in ("sun", "ring")]
+    m = mg.Mechanism("set", pairs=pairs, gears=gears, couplings=meshes, drives=["sun"], frame="frame")
+    found = scene(mg.kinematics(m, {"sun": np.linspace(0.0, 1.0, 3)}))
+    toothed = {p.owner: p for p in parts(found, "wheel") if p.scales[0] > 0}
+    for t in range(3):
+        line = {k: found.vertices(p, t)[list(p.shape.lines[0]), :2] for k, p in toothed.items()}
+        for k in at:
+            assert max(overlap(line[k], line["sun"]), overlap(line["sun"], line[k])) < 0.02 * 2.0
+            near = line[k][np.linalg.norm(line[k], axis=1) > 59.0]
+            stuck = near[~Path(line["ring"]).contains_points(near)]
+            assert not len(stuck) or away(stuck, line["ring"]).max() < 0.02 * 2.0
+
+
+@pytest.mark.parametrize("kind", ["rack", "bevel", "worm", "screw"])
+def test_every_kind_of_mesh_is_drawn_with_teeth_that_interleave(kind: str) -> None:
+    """At the pitch point, a whole motion long, tooth stands against gap."""
+    x, z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+    b, r = np.pi / 4, 20.0 / np.cos(np.pi / 4)
+    made = {
+        "rack": (("R", (0, 0, 0), z), ("P", (0, -30, 0), x), mg.Gear("a", "a", 20, (0, 0, 0), z, module=2.0),
+                 mg.GearRack("b", "b", (5, -20, 0), x, (0, 1, 0), module=2.0)),
+        "bevel": (("R", (90, 0, 0), x), ("R", (0, 0, 90), z), mg.BevelGear("a", "a", 20, (90, 0, 0), x, module=4.0),
+                  mg.BevelGear("b", "b", 40, (0, 0, 90), z, module=4.0)),
+        "worm": (("R", (0, 0, 0), x), ("R", (0, 50, 0), z), mg.Worm("a", "a", 2, (0, 0, 0), x, radius=10.0),
+                 mg.WormWheel("b", "b", 40, (0, 50, 0), z)),
+        "screw": (("R", (0, 0, 0), x), ("R", (0, 0, 2 * r), (0, 1, 0)), mg.Gear("a", "a", 20, (0, 0, 0), x, module=2.0, helix_angle=b),
+                  mg.Gear("b", "b", 20, (0, 0, 2 * r), (0, 1, 0), module=2.0, helix_angle=b)),
+    }[kind]  # fmt: skip
+    pairs = [
+        mg.Pair(k, symbol, "frame", k, point=p, axis=axis) for k, (symbol, p, axis) in zip("ab", made[:2], strict=True)
+    ]
+    m = mg.Mechanism(kind, pairs=pairs, gears=made[2:], couplings=[mg.Mesh("m", "a", "b")], drives=["a"])
+    s = mg.solve(m, {"a": np.linspace(0.0, 0.7, 5)}, loads=[mg.Effort("b", 1.0)])
+    found = scene(s)
+    assert {p.owner for p in parts(found, "wheel") if p.scales[0] > 0} == {"a", "b"}
+    poses = {k: s.link(k).pose[:, :3] for k in "ab"}
+    wheels = {w.name: w for w in gears_of(m, {k: np.eye(3, 4) for k in ("frame", "a", "b")})[0]}
+    P = s.coupling("m").point
+    for t in range(5):
+        counts, senses = [], []
+        for k in "ab":
+            own = [
+                (q - poses[k][t, :, 3]) @ poses[k][t, :, :3]
+                for q in (P[t], P[t] + 1e-4 * np.cross(x if kind != "rack" else z, P[0]))
+            ]
+            here, ahead = (float(wheels[k].count(q)) for q in own)
+            counts.append(here)
+            senses.append(np.sign(ahead - here))
+        assert (senses[0] * counts[0] - senses[1] * counts[1]) % 1.0 == pytest.approx(0.5, abs=1e-6)
 
 
 def test_length_and_wrap_of_belts() -> None:

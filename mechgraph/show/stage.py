@@ -174,7 +174,7 @@ class DrawnPose:
         sides = ((load, side) for load in laws for side in (0, 1) if (load.a, load.b)[side] == link)
         X = self.place.poses[link][0]
         held = ((self.held(load)[side][0] - X[:3, 3]) @ X[:3, :3] for load, side in sides)
-        shafts = (w.at for w in self.wheels if w.link == link and link != self.m.frame and not w.is_rack)
+        shafts = (w.at for w in self.wheels if w.link == link and link != self.m.frame)
         return [
             *(at for name, at in ends if name == link),
             *shafts,

@@ -11,21 +11,22 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from mechgraph.fields import axes_of, second_direction
 from mechgraph.maths.se3 import Array
-from mechgraph.model.belts import BeltDrive, course
+from mechgraph.model.belts import BeltDrive, Pulley, course, place_of
 from mechgraph.model.couplings import Axes, Belt, BevelGears, Contact, Rack, SpurGears, WormGear
+from mechgraph.model.gears import Gear, GearRack, Mesh, Worm
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.show.shapes import Shape, polyline
 
 TIP, ROOT, RIM = 1.0, 1.25, 1.6
 """Heights of teeth over and below the pitch line, and thickness of what bears them, over the module."""
-FLANK, AROUND, ARC = 5, 64, 25
-"""Points along a flank, around a circle, and along a belt on a pulley."""
+FLANK, AROUND, ARC, TEETH_IN_A_ROW = 5, 64, 25, 24
+"""Points along a flank, around a circle, and along a belt on a pulley; teeth of a rack that are drawn."""
 READABLE = 8.0
 """Pixels from which on a tooth is drawn as one."""
 
@@ -36,7 +37,8 @@ class Wheel:
 
     ``axes (3, 3)``: the direction of the first tooth, one at right angles, and the axis, as columns, in the link's frame; of a rack the
     direction of its teeth, that in which they point, and across. ``phase``: by what part of a tooth the first one is off. ``radius``: of
-    the pitch circle; infinite of a rack. ``cone``: half the angle of the pitch cone. ``length``: of a rack or worm.
+    the pitch circle; infinite of a rack. ``cone``: half the angle of the pitch cone. ``length``: of a rack or worm. ``marked``: whether the
+    first tooth is declared to be where it is.
     """
 
     name: str
@@ -54,6 +56,7 @@ class Wheel:
     cone: float = 0.0
     length: float = 0.0
     phase: float = 0.0
+    marked: bool = False
 
     @property
     def is_rack(self) -> bool:
@@ -256,17 +259,15 @@ def interleaved(wheels: Sequence[Wheel], meshes: Iterable[DrawnMesh], poses: Map
 
     From wheel to wheel: where meshes close a ring, the last one shows whether the teeth fit.
     """
-    out, fixed = list(wheels), set[int]()
+    out, fixed = list(wheels), {i for i, wheel in enumerate(wheels) if wheel.marked}
     met: dict[int, list[DrawnMesh]] = {}
     for mesh in meshes:
         met.setdefault(mesh.a, []).append(mesh)
         met.setdefault(mesh.b, []).append(mesh)
     reached: list[tuple[int, int, DrawnMesh]] = []
-    for first in met:
-        if first in fixed:
-            continue
+    for first in (*sorted(fixed & set(met)), *met):
+        queue = [first] if first not in fixed or out[first].marked else []
         fixed.add(first)
-        queue = [first]
         for known in queue:
             for mesh in met[known]:
                 other = mesh.a + mesh.b - known
@@ -345,30 +346,117 @@ def gears_of(m: Mechanism, poses: Mapping[str, Array]) -> tuple[list[Wheel], lis
         own.append(len(wheels) - 1)
         return own[-1]
 
-    named = {}
+    named, seats = {}, {}
     for gear in m.gears:
-        pose, axes = poses[gear.link], axes_of(gear.axis, second_direction(gear.axis))
-        seat = Seat(gear.link, pose, pose[:, :3] @ np.asarray(gear.point) + pose[:, 3], pose[:, :3] @ axes)
-        named[gear.name] = number(
-            seat.wheel(gear.name, seat.point, seat.axes, 0, gear.pitch_radius, 0.05 * gear.pitch_radius)
-        )
+        seats[gear.name] = _placed_seat(gear, poses)
+        if type(gear) in PLACED:
+            named[gear.name] = number(PLACED[type(gear)](gear, seats[gear.name]))
     for c in m.couplings:
         if isinstance(c, BeltDrive) and not c.span:
-            belts.append(
-                DrawnBelt(c.belt, tuple(named[name] for name in c.over), tuple(c.senses.tolist()), c.span_names)
+            over = tuple(named[name] for name in c.over)
+            belts.append(DrawnBelt(c.belt, over, tuple(c.senses.tolist()), c.span_names))
+        elif isinstance(c, Mesh):
+            one, two = c.pair_of(m)
+            ends = [end.seen(poses[end.link]) for end in c.ends]
+            P = c.relation(ends[0], ends[1], np.array(c.numbers)[:, None, None]).point[:, 0, 0]
+            if (both := MET.get((one.kind, two.kind))) is not None:
+                for gear, wheel in zip(*both(one, two, P, seats), strict=True):
+                    named[gear.name] = number(replace(wheel, name=gear.name, marked=gear.mark is not None))
+            meshes.append(
+                _mesh(named[c.a], named[c.b], P, next(seats[g.name] for g in (one, two) if not isinstance(g, GearRack)))
             )
-        if not isinstance(c, Contact):
-            continue
-        seats = [_seat(m, poses, q, link) for q, link in zip((c.a, c.b), c.gears(m), strict=True)]
-        p, z, q, w = (v[:, None] for seat in seats for v in (seat.point, seat.axes[:, 2]))
-        P = c.lines(Axes(p, z, q, w))[0][:, 0, 0]
-        a, b = (number(wheel) for wheel in DRAWN[type(c)](c, P, *seats))
-        if isinstance(c, Belt):
-            belts.append(DrawnBelt(c.name, (a, b), (1.0, -1.0 if c.crossed else 1.0)))
-        else:
-            along = np.cross(seats[0].axes[:, 2], P - seats[0].point)
-            meshes.append(DrawnMesh(a, b, P, along / np.linalg.norm(along)))
+        elif isinstance(c, Contact):
+            own = [_seat(m, poses, q, link) for q, link in zip((c.a, c.b), c.gears(m), strict=True)]
+            p, z, q, w = (v[:, None] for seat in own for v in (seat.point, seat.axes[:, 2]))
+            P = c.lines(Axes(p, z, q, w))[0][:, 0, 0]
+            i, j = (number(wheel) for wheel in DRAWN[type(c)](c, P, *own))
+            if isinstance(c, Belt):
+                belts.append(DrawnBelt(c.name, (i, j), (1.0, -1.0 if c.crossed else 1.0)))
+            else:
+                meshes.append(_mesh(i, j, P, own[0]))
     return interleaved(wheels, meshes, poses), meshes, belts
+
+
+def _mesh(a: int, b: int, P: Array, seat: Seat) -> DrawnMesh:
+    """Two wheels by number that mesh at a point, one of them sitting there."""
+    along = np.cross(seat.axes[:, 2], P - seat.point)
+    return DrawnMesh(a, b, P, along / np.linalg.norm(along))
+
+
+def _placed_seat(gear: Any, poses: Mapping[str, Array]) -> Seat:
+    place = place_of(gear) if isinstance(gear, Pulley) else gear.place
+    pose, z, x = poses[place.link], np.asarray(place.axis), np.asarray(place.mark)
+    z = z / np.linalg.norm(z)
+    axes = np.column_stack([x, np.cross(z, x), z])
+    return Seat(place.link, pose, pose[:, :3] @ np.asarray(place.point) + pose[:, 3], pose[:, :3] @ axes)
+
+
+def _cylindrical(g: Any, seat: Seat) -> Wheel:
+    angles = {"pressure": g.pressure_angle, "helix": g.helix_angle, "shift": g.shift, "internal": g.internal}
+    return seat.wheel(
+        g.name,
+        seat.point,
+        seat.axes,
+        g.teeth,
+        g.radius,
+        g.module,
+        width=g.width or 0.0,
+        marked=g.mark is not None,
+        **angles,
+    )
+
+
+def _in_a_row(g: Any, seat: Seat) -> Wheel:
+    x, y = seat.axes[:, 2], seat.axes[:, 0]
+    angles = {"pressure": g.pressure_angle, "helix": g.helix_angle, "width": g.width or 0.0}
+    axes = np.column_stack([x, y, np.cross(x, y)])
+    return seat.wheel(
+        g.name,
+        seat.point,
+        axes,
+        1,
+        np.inf,
+        g.module / np.cos(g.helix_angle),
+        length=TEETH_IN_A_ROW * np.pi * g.module,
+        **angles,
+    )
+
+
+def _pulley(g: Any, seat: Seat) -> Wheel:
+    return seat.wheel(g.name, seat.point, seat.axes, 0, g.pitch_radius, 0.05 * g.pitch_radius)
+
+
+PLACED: dict[type[Any], Callable[[Any, Seat], Wheel]] = {Gear: _cylindrical, GearRack: _in_a_row, Pulley: _pulley}
+"""Wheels of gears that say all of themselves."""
+
+
+def _bevels(one: Any, two: Any, P: Array, seats: Mapping[str, Seat]) -> tuple[tuple[Any, Any], Iterator[Wheel]]:
+    said = SimpleNamespace(
+        name="",
+        teeth=(one.teeth, two.teeth),
+        module=one.module,
+        pressure_angle=one.pressure_angle,
+        spiral_angle=one.spiral_angle,
+    )
+    return (one, two), _bevel(said, P, seats[one.name], seats[two.name])
+
+
+def _worms(one: Any, two: Any, P: Array, seats: Mapping[str, Seat]) -> tuple[tuple[Any, Any], Iterator[Wheel]]:
+    worm, wheel = (one, two) if isinstance(one, Worm) else (two, one)
+    said = SimpleNamespace(
+        name="",
+        teeth=(worm.teeth, wheel.teeth),
+        radius=worm.radius,
+        pressure_angle=worm.pressure_angle,
+        left_hand=worm.left_hand,
+    )
+    return (worm, wheel), _worm(said, P, seats[worm.name], seats[wheel.name])
+
+
+MET: dict[tuple[str, str], Callable[..., tuple[tuple[Any, Any], Iterator[Wheel]]]] = {
+    ("bevel", "bevel"): _bevels, ("worm", "worm_wheel"): _worms, ("worm_wheel", "worm"): _worms,
+}  # fmt: skip
+"""Wheels of gears of which the size follows from the other one."""
 
 
 def _seat(m: Mechanism, poses: Mapping[str, Array], freedom: str, link: str) -> Seat:
