@@ -106,6 +106,31 @@ def stages() -> mg.Solution:
     return mg.solve(m, {"A": mg.Motion(np.linspace(0.0, np.deg2rad(420.0), 73), velocity=10.0)})
 
 
+def floating_sun() -> mg.Solution:
+    """A planetary set whose sun floats between three planets, which share the load as statics asks."""
+    z, arm = (0, 0, 1), 0.042
+    at = [(arm * np.cos(a), arm * np.sin(a), 0) for a in 2 * np.pi * np.arange(3) / 3]
+    pairs = [
+        mg.Pair("S", "E", "frame", "sun", point=(0, 0, 0), axis=z),
+        mg.Pair("C", "R", "frame", "arm", point=(0, 0, 0), axis=z),
+    ]
+    pairs += [mg.Pair(f"P{i}", "R", "arm", f"planet {i}", point=p, axis=z) for i, p in enumerate(at)]
+    gears = [mg.Gear("sun", "sun", 24, (0, 0, 0), z, module=0.002)]
+    gears += [mg.Gear("ring", "frame", 60, (0, 0, 0), z, module=0.002, internal=True)]
+    gears += [mg.Gear(f"planet {i}", f"planet {i}", 18, p, z, module=0.002) for i, p in enumerate(at)]
+    meshes = [mg.Mesh(f"{other} {i}", other, f"planet {i}") for i in range(3) for other in ("sun", "ring")]
+    m = mg.Mechanism(
+        "floating sun",
+        pairs=pairs,
+        gears=gears,
+        couplings=meshes,
+        drives=["S.Rz"],
+        loads=[mg.Effort("C", -40.0)],
+        units=SI,
+    )
+    return mg.solve(m, {"S.Rz": mg.Motion(np.linspace(0.0, np.deg2rad(420.0), 73), velocity=10.0)})
+
+
 def tensioner() -> mg.Solution:
     """A belt over three pulleys, held tight by a spring on the arm of its idler."""
     z, at = (0, 0, 1), {"p": (0.0, 0.0, 0.0), "w": (0.2, 0.0, 0.0), "i": (0.1, 0.022, 0.0)}
@@ -183,6 +208,7 @@ ENTRIES = [
     Entry("Cam with roller arm", example("16", "mechanism", turn("A", 20.0)), "../how-to/cam.md"),
     Entry("Cam with roller", cam, "../how-to/cam.md"),
     Entry("Two stages of gears", stages, "../how-to/gears.md"),
+    Entry("Planetary set with a floating sun", floating_sun, "../how-to/gears.md"),
     Entry("Belt drive with a tensioner", tensioner, "../how-to/belts.md"),
     Entry("Engine in the plane", engine, "../how-to/planar.md"),
     Entry("Planetary train", example("14", "planetary", turn("S", 10.0, 1260.0), 1), "../how-to/gears.md"),
@@ -305,7 +331,7 @@ class Film:
         moves = [f"{a:.2f} {b:.2f}" for a, b in at], [f"{angle:.2f}" for angle in np.rad2deg(turn)]
         color = self.color(part.link or self.frame)
         fill = color if part.role in ("wheel", "roller") and part.shape.faces else "none"
-        inner = f'<path d="{path}" fill="{fill}" fill-opacity="0.28" stroke="{color}" stroke-width="{width}"/>'
+        inner = f'<path d="{path}" fill="{fill}" fill-opacity="0.28" fill-rule="evenodd" stroke="{color}" stroke-width="{width}"/>'
         inner = f'<g transform="rotate({moves[1][0]})">{inner}{animated("transform", moves[1], "rotate")}</g>'
         return f'<g transform="translate({moves[0][0]})">{inner}{animated("transform", moves[0], "translate")}</g>'
 
