@@ -161,10 +161,9 @@ class DrawnPose:
         Not where something runs on its profile, which is drawn as such, nor where a guide of its own stands on the ground.
         """
         ends = (
-            (name, np.asarray(marker.point, dtype=float) + k * self.piston(p) * (marker.pose()[:, :3] @ slide_of(p)))
-            for p in self.m.pairs
-            if p.type.bears
-            for k, (name, marker) in enumerate(zip((p.a, p.b), p.markers, strict=True))
+            np.asarray(p.markers[k].point, dtype=float)
+            + k * self.piston(p) * (p.markers[k].pose()[:, :3] @ slide_of(p))
+            for p, k in self.ends_on.get(link, ())
             if not (
                 any(step.back == bool(k) and is_profile(p, step) for step in takes_curves(p.type))
                 or (not k and self.grounded(p))
@@ -175,11 +174,16 @@ class DrawnPose:
         X = self.place.poses[link][0]
         held = ((self.held(load)[side][0] - X[:3, 3]) @ X[:3, :3] for load, side in sides)
         shafts = (w.at for w in self.wheels if w.link == link and link != self.m.frame)
-        return [
-            *(at for name, at in ends if name == link),
-            *shafts,
-            *held,
-        ]
+        return [*ends, *shafts, *held]
+
+    @cached_property
+    def ends_on(self) -> dict[str, list[tuple[Pair, int]]]:
+        """The pairs that bear a link, by its name, and whether it is their link a (0) or b (1)."""
+        out: dict[str, list[tuple[Pair, int]]] = {}
+        for p in self.m.pairs:
+            for k, link in enumerate((p.a, p.b) if p.type.bears else ()):
+                out.setdefault(link, []).append((p, k))
+        return out
 
     def piston(self, pair: Pair) -> float:
         """How far from its marker on link b the piston of a cylinder is drawn, along its slide; 0 of other pairs.
@@ -193,13 +197,8 @@ class DrawnPose:
         eyes = []
         for link, marker in zip((pair.a, pair.b), pair.markers, strict=True):
             X, u = marker.pose(), marker.pose()[:, :3] @ slide_of(pair)
-            others = (p for p in self.m.pairs if p is not pair and p.type.bears)
-            away = (
-                end.pose()[:, 3] - X[:, 3]
-                for p in others
-                for name, end in zip((p.a, p.b), p.markers, strict=True)
-                if name == link
-            )
+            others = ((p, k) for p, k in self.ends_on.get(link, ()) if p is not pair)
+            away = (p.markers[k].pose()[:, 3] - X[:, 3] for p, k in others)
             eyes.append([float(d @ u) for d in away if np.linalg.norm(np.cross(d, u)) < FLAT_THICKNESS * self.size])
         if not all(eyes):
             return 0.0
@@ -229,10 +228,14 @@ class DrawnPose:
 
     def symbol_size(self, pair: Pair) -> float:
         """Half width of a symbol: less where another pair is near."""
-        here = self.points[pair.name, pair.b][0]
-        gaps = (float(np.linalg.norm(here - self.points[p.name, p.b][0])) for p in self.m.pairs if p is not pair)
-        nearest = min((gap for gap in gaps if gap > FLAT_THICKNESS * self.size), default=self.size)
+        gaps = np.linalg.norm(self.places - self.points[pair.name, pair.b][0], axis=1)
+        nearest = gaps[gaps > FLAT_THICKNESS * self.size].min(initial=self.size)
         return float(np.clip(0.4 * nearest, 0.45 * self.symbol, self.symbol))
+
+    @cached_property
+    def places(self) -> Array:
+        """Where the pairs are at the first position, ``(P, 3)``."""
+        return np.array([self.points[p.name, p.b][0] for p in self.m.pairs])
 
     def freedom(self, name: str) -> tuple[Pair, int, FreedomLine, str]:
         """The pair of a freedom, its number there, its line, and the frame of that."""
