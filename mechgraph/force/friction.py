@@ -83,8 +83,8 @@ def _places(here: Configuration, dq: Array, normal: Array, load: Friction, mu: f
     force = _rows(np.zeros((3, 3, T)), np.broadcast_to(np.eye(3)[:, :, None], (3, 3, T)))
     none = np.zeros((6, 3, T))
     if row.touching:
-        at = next(iter(row.reactions or ())).frame
-        c = here.frames[number][at][:, 3, i]
+        before = next(iter(row.reactions or ())).frame
+        c = here.frames[number][before][:, 3, i]
         r = (pair.radius_b or 0.0) / L
         size = np.sqrt((normal[3:, k] ** 2).sum(axis=0))
         n = normal[3:, k] / np.where(size > 0, size, 1.0)

@@ -139,7 +139,8 @@ class Friction(Load):
                 f"of: pair {pair.name} of type {row.symbol}: {why}; expected one that turns about, slides along or touches at a place"
             ]
         takes = {
-            "radius": any(rows[one] for one in ("journal", "screw", "ball", "plane")), "thrust_radius": rows["journal"], "width": rows["slide"],
+            "radius": any(rows[one] for one in ("journal", "screw", "ball", "plane")), "thrust_radius": rows["journal"],
+            "width": rows["slide"],
             "length": rows["journal"] or rows["slide"], "flank": rows["screw"],
         }  # fmt: skip
         out = [

@@ -24,7 +24,7 @@ from mechgraph.pairs.contact_types import is_open, takes_curves
 from mechgraph.pairs.curves import Travel, outside
 from mechgraph.pairs.travelling import Beside
 from mechgraph.result.solution import Solution
-from mechgraph.result.views import BeltResult, CouplingResult
+from mechgraph.result.views import BeltResult
 from mechgraph.show import shapes
 from mechgraph.show.shapes import FreedomLine, Shape, frame_along, lines_of, symbol
 from mechgraph.show.stage import (
