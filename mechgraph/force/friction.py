@@ -112,8 +112,8 @@ def _places(here: Configuration, dq: Array, normal: Array, load: Friction, mu: f
         return
     if rubs_as_ball(row):
         spin = np.sqrt((twist[:3] ** 2).sum(axis=0))
-        share = mu / np.hypot(1.0, mu) if load.model == "circle" else mu
-        yield Place(k, force, -share * r * _couple(twist[:3] / np.where(spin > 0, spin, np.inf)), none, preload)
+        part = mu / np.hypot(1.0, mu) if load.model == "circle" else mu
+        yield Place(k, force, -part * r * _couple(twist[:3] / np.where(spin > 0, spin, np.inf)), none, preload)
         return
     axes: dict[int, dict[bool, int]] = {}
     for j, f in enumerate(row.freedoms):
