@@ -59,6 +59,8 @@ from mechgraph.model.response_setup import Event, ResponseSetup, Stop
 from mechgraph.model.toml import library_names as library
 from mechgraph.modes.assemblies import Assemblies, AssembliesOver, assemblies
 from mechgraph.modes.branches import Branches, branches
+from mechgraph.pairs.cam_laws import CamLaw, Segment, cam_laws
+from mechgraph.pairs.cams import least_base_radius
 from mechgraph.pairs.contact_types import Hertz
 from mechgraph.pairs.curves import Curve
 from mechgraph.pairs.factors import Bookkeeping, Component, Freedom
@@ -80,18 +82,19 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Assemblies", "AssembliesOver", "AssemblyError", "Belt", "BeltDrive", "BevelGear", "BevelGears", "Bookkeeping",
-    "Branches", "Chain", "Compiled", "Component", "ContentError", "Coupling", "Curve", "Damper", "DeadPointError",
-    "DeclarationError", "Decomposition", "DeterminacyReport", "Drive", "Effort", "Event", "Families", "FileError",
-    "ForceLaw", "ForceTable", "Formulation", "FreeBody", "Freedom", "Friction", "FrictionError", "Gear", "GearRack",
-    "Gravity", "Group", "Hertz", "Identity", "IndeterminateError", "Journal", "Link", "Marker", "Mechanism",
-    "MechgraphError", "MechgraphWarning", "Mesh", "Misfit", "MissingExtraError", "Motion", "MultipleJoint",
-    "OverTime", "Pair", "PairType", "Pulley", "Rack", "ReachError", "Response", "ResponseError", "ResponseSetup",
-    "ShapeError", "Solution", "Spring", "SpurGears", "Stiffness", "Stop", "Structure", "Study", "StudyError",
-    "Surface", "SystemGroup", "Tolerances", "TorsionSpring", "Transmission", "Worm", "WormGear", "WormWheel",
-    "Wrench", "assemble", "assemblies", "atlas", "branches", "chain", "check", "compile", "equilibrium", "formulate",
-    "free_body", "groups", "identify", "inertia", "kinematics", "library", "linearize", "load", "load_chains",
-    "multiple_joints", "over_time", "pair_types", "parts", "respond", "save", "save_chains", "solve", "split_joint",
-    "structure", "study", "system_groups", "transmission", "write_report",
+    "Branches", "CamLaw", "Chain", "Compiled", "Component", "ContentError", "Coupling", "Curve", "Damper",
+    "DeadPointError", "DeclarationError", "Decomposition", "DeterminacyReport", "Drive", "Effort", "Event",
+    "Families", "FileError", "ForceLaw", "ForceTable", "Formulation", "FreeBody", "Freedom", "Friction",
+    "FrictionError", "Gear", "GearRack", "Gravity", "Group", "Hertz", "Identity", "IndeterminateError", "Journal",
+    "Link", "Marker", "Mechanism", "MechgraphError", "MechgraphWarning", "Mesh", "Misfit", "MissingExtraError",
+    "Motion", "MultipleJoint", "OverTime", "Pair", "PairType", "Pulley", "Rack", "ReachError", "Response",
+    "ResponseError", "ResponseSetup", "Segment", "ShapeError", "Solution", "Spring", "SpurGears", "Stiffness", "Stop",
+    "Structure", "Study", "StudyError", "Surface", "SystemGroup", "Tolerances", "TorsionSpring", "Transmission",
+    "Worm", "WormGear", "WormWheel", "Wrench", "assemble", "assemblies", "atlas", "branches", "cam_laws", "chain",
+    "check", "compile", "equilibrium", "formulate", "free_body", "groups", "identify", "inertia", "kinematics",
+    "least_base_radius", "library", "linearize", "load", "load_chains", "multiple_joints", "over_time", "pair_types",
+    "parts", "respond", "save", "save_chains", "solve", "split_joint", "structure", "study", "system_groups",
+    "transmission", "write_report",
 ]  # fmt: skip
 
 

@@ -490,7 +490,10 @@ def further_doors(folder: Path) -> list[Door]:
 
     def ready(kind: Callable, symbol: str) -> Callable:
         """A shape of a pair in a mechanism."""
-        where, size = {"Ps": "curve", "Sg": "curve", "Sp": "surface"}[symbol], {"Sg": {"radius": 0.05}}.get(symbol, {})
+        where, size = (
+            {"Ps": "curve", "Rg": "curve", "Sg": "curve", "Sp": "surface"}[symbol],
+            {"Sg": {"radius": 0.05}}.get(symbol, {}),
+        )
 
         def made(**more: Any) -> object:
             shaped = mg.Pair(
@@ -673,6 +676,41 @@ def further_doors(folder: Path) -> list[Door]:
                 "arm": 2.0,
                 "pivot": 2.5,
                 "mirrored": False,
+                "offset": 0.0,
+                "follower": "roller",
+                "law": None,
+            },
+        ),
+        (
+            "Curve.barrel",
+            ready(mg.Curve.barrel, "Rg"),
+            (),
+            {
+                "center": (0, 0, 0),
+                **shape,
+                "law": None,
+                "angle": turn(),
+                "lift": rise(),
+                "slope": rise(1),
+                "bend": rise(2),
+                "roller_radius": 0.1,
+                "radius": 1.0,
+            },
+        ),
+        (
+            "Curve.globoid",
+            ready(mg.Curve.globoid, "Rg"),
+            (),
+            {
+                **shape,
+                "law": None,
+                "angle": turn(),
+                "swing": rise(),
+                "slope": rise(1),
+                "bend": rise(2),
+                "roller_radius": 0.1,
+                "distance": 3.0,
+                "arm": 1.0,
             },
         ),
         ("Surface", mg.Surface, (), {}),

@@ -12,7 +12,9 @@ import pytest
 import mechgraph as mg
 
 PAGE = Path(__file__).parents[1] / "docs" / "how-to" / "drive-by-a-law.md"
-LAWS = re.findall(r'^\| `"(\w+)"` \| `(?:rise|speed|samples)', PAGE.read_text(encoding="utf-8"), re.MULTILINE)
+LAWS = re.findall(
+    r'^\| `"(\w+)"` \| `(?:rise|speed|samples|conditions|start)', PAGE.read_text(encoding="utf-8"), re.MULTILINE
+)
 """What the manual lists."""
 RISES = ["cycloidal", "harmonic", "poly345", "poly4567"]
 H, T, START = 1.7, 0.4, -0.3

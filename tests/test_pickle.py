@@ -58,6 +58,8 @@ def things() -> dict[str, Any]:
         "response": mg.respond(mg.load("windows-2"), (0, 0.2)), "response in charts": mg.respond(pushed, (0, 0.2)),
         "ResponseError": mg.ResponseError("stopped", s), "StudyError": mg.StudyError("ended", s), "event": mg.Event("A0", 0.1),
         "surface": mg.Surface.sphere(radius=0.1), "curve": mg.Curve.circle(radius=0.1),
+        "segment": mg.Segment("scca", 0.1, 2.0, sine=0.2, constant=0.3, cosine=0.2),
+        "law of a cam": mg.CamLaw([mg.Segment("poly345", h, 1.0) for h in (0.1, -0.1)], turn=2.0),
         "on a curve": mg.Pair("X", "Sg", "a", "b", curve=mg.Curve.ellipse(a=0.2, b=0.1)),
         "spur": mg.SpurGears("g", "A", "B", teeth=(20, 40)), "bevel": mg.BevelGears("g", "A", "B", teeth=(20, 40), module=0.1),
         "worm": mg.WormGear("g", "A", "B", teeth=(1, 40), radius=0.1), "rack": mg.Rack("g", "A", "B", radius=0.1),

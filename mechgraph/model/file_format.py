@@ -23,6 +23,7 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.model.response_setup import Event, ResponseSetup, Stop
+from mechgraph.pairs.cam_laws import CamLaw, Segment
 from mechgraph.pairs.contact_types import Hertz
 from mechgraph.pairs.factors import Bookkeeping, Component, Freedom
 from mechgraph.pairs.given import CURVES, Function
@@ -143,6 +144,8 @@ TABLES_OF_FILE: dict[str, FileTable] = {
     "stiffness": _table(Stiffness, words="Stiffness of a pair by its reaction components."),
     "misfit": _table(Misfit, words="Misfit of the seat of a pair by its reaction components."),
     "film": _table(Journal, words="The oil film of a journal bearing."),
+    "cam_law": _table(CamLaw),
+    "segment": _table(Segment, needed=("law",)),
     **{f"curve {kind}": _table(curve) for kind, curve in WRITABLE.items()},
     **{f"surface {kind}": _table(surface) for kind, surface in WRITABLE_SURFACES.items()},
     **{f"coupling {kind}": _table(coupling) for kind, coupling in EVERY_COUPLING.items()},

@@ -10,19 +10,19 @@ First and second derivative of a function that is known by its values, with an e
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Protocol
 
 import numpy as np
 import scipy
-from numpy.polynomial import Polynomial, chebyshev
+from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
 
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import FREEDOM_NAME, SERIES, TABLE, Described
 from mechgraph.maths.se3 import Array
+from mechgraph.pairs.cam_laws import RISES, SCCA, Segment
 from mechgraph.quantities import LENGTH, PURE, TIME, has_quantity, real_array, shown, wrong
 
 CHEBYSHEV_POINTS = 32
@@ -182,36 +182,40 @@ class MotionLaw(Protocol):
 
 @dataclass(frozen=True)
 class DwellRise:
-    """Dwell, rise, dwell.
+    """Dwell, rise, dwell: the law of a segment of a cam (``pairs.cam_laws``) over a duration T.
 
     s = start + rise y(tau), s' = rise / T y'(tau), s'' = rise / T^2 y''(tau), tau = t / T.
 
-    `value`, `first` and `second` are y, y' and y'' on 0 <= tau <= 1, with y(0) = 0 and y(1) = 1. Outside, the
-    position is held and the rates are 0; at the ends themselves they are those of the rise.
+    y(0) = 0 and y(1) = 1, but for laws by conditions, which say the rise. Outside, the position is held and the rates are 0; at
+    the ends themselves they are those of the rise.
     """
 
-    value: Callable[[Array], Array]
-    first: Callable[[Array], Array]
-    second: Callable[[Array], Array]
+    name: str
     choices: tuple[tuple[str, ...], ...] = (("rise", "duration"),)
     optional: tuple[str, ...] = ("start",)
 
     def rates(self, t: Array, given: Mapping[str, Any]) -> Rates:
         """Return position, velocity and acceleration at t."""
-        rise, duration = given["rise"], given["duration"]
+        shape = {key: value for key, value in given.items() if key in SHAPE_OF_LAW}
+        rise, duration, whole = given.get("rise", 1.0), given.get("duration", 1.0), 1.0
+        if "conditions" in shape:
+            if np.ndim(duration):
+                raise LawFault("duration must be one number beside conditions, which stand at times")
+            whole = float(duration)
+        numbers = {"rise": 1.0} if "rise" in given else {}
+        segment = Segment(self.name, over=whole, **numbers, **shape)
+        if faults := segment.faults(""):
+            raise LawFault("; ".join(faults))
         inside = (t >= 0.0) & (t <= duration)
         tau = np.clip(t / duration, 0.0, 1.0)
+        pieces = segment.pieces().scaled(1.0, 1.0 / whole)
+        y = pieces.at(tau, 3)
+        y = np.where(tau == 1.0, pieces.ends[1][:3].reshape(3, *(1,) * tau.ndim), y)
         return (
-            given.get("start", 0.0) + rise * self.value(tau),
-            np.where(inside, rise / duration * self.first(tau), 0.0),
-            np.where(inside, rise / duration**2 * self.second(tau), 0.0),
+            given.get("start", 0.0) + rise * y[0],
+            np.where(inside, rise / duration * y[1], 0.0),
+            np.where(inside, rise / duration**2 * y[2], 0.0),
         )
-
-
-def _polynomial(*coefficients: float) -> DwellRise:
-    """Return the rise y = sum_k c_k tau^k, coefficients from the constant term up."""
-    y = Polynomial(coefficients)
-    return DwellRise(y, y.deriv(1), y.deriv(2))
 
 
 @dataclass(frozen=True)
@@ -394,32 +398,18 @@ def _not_smooth(t: float) -> LawFault:
     )
 
 
+SHAPE_OF_LAW = ("sine", "constant", "cosine", "coefficients", "conditions", "knots")
+"""Arguments that say the shape of a rise."""
 LAWS: Mapping[str, MotionLaw] = {
-    "cycloidal": DwellRise(
-        lambda tau: tau - np.sin(math.tau * tau) / math.tau,
-        lambda tau: 1.0 - np.cos(math.tau * tau),
-        lambda tau: math.tau * np.sin(math.tau * tau),
-    ),
-    "harmonic": DwellRise(
-        lambda tau: (1.0 - np.cos(np.pi * tau)) / 2.0,
-        lambda tau: np.pi / 2.0 * np.sin(np.pi * tau),
-        lambda tau: np.pi**2 / 2.0 * np.cos(np.pi * tau),
-    ),
-    "poly345": _polynomial(0, 0, 0, 10, -15, 6),
-    "poly4567": _polynomial(0, 0, 0, 0, 35, -84, 70, -20),
+    **{name: DwellRise(name) for name in (*SCCA, *RISES)},
+    "scca": DwellRise("scca", optional=("start", "sine", "constant", "cosine")),
+    "polynomial": DwellRise("polynomial", (("rise", "duration", "coefficients"), ("duration", "conditions"))),
+    "bspline": DwellRise("bspline", (("duration", "conditions", "knots"),)),
+    "dwell": DwellRise("dwell", ((),)),
     "constant_speed": ConstantSpeed(),
     "sampled": SampledLaw(),
 }
-r"""The laws by name.
-
-With tau = t / duration and a rise of 1 (Norton, Cam Design and Manufacturing Handbook, 2009, double dwell):
-
-- cycloidal: y = tau - sin(2 pi tau) / (2 pi); acceleration continuous, at most 2 pi;
-- harmonic: y = (1 - cos(pi tau)) / 2; acceleration jumps at both ends, at most pi^2 / 2;
-- poly345: y = 10 tau^3 - 15 tau^4 + 6 tau^5; acceleration continuous, at most 10 / sqrt 3;
-- poly4567: y = 35 tau^4 - 84 tau^5 + 70 tau^6 - 20 tau^7; jerk continuous, acceleration at most
-  84 / (5 sqrt 5).
-"""
+"""The laws by name; those of the segments of a cam, from dwell to dwell, and two that have no ends."""
 
 
 __all__ = ["LAWS", "Motion"]
@@ -580,16 +570,27 @@ class Motion(Described):
         speed: ArrayLike | None = None,
         samples: tuple[ArrayLike, ArrayLike] | None = None,
         degree: int | None = None,
+        sine: float | None = None,
+        constant: float | None = None,
+        cosine: float | None = None,
+        coefficients: ArrayLike | None = None,
+        conditions: Mapping[Any, float] | ArrayLike | None = None,
+        knots: ArrayLike | None = None,
     ) -> Motion:
         """Return the motion that a law prescribes at times t, with t stored.
 
         ==================  ========================  ===================================================
         law                 arguments                 position
         ==================  ========================  ===================================================
-        ``cycloidal``       rise, duration            start + rise y(t / duration), constant before 0 and
-        ``harmonic``                                  after duration
-        ``poly345``
-        ``poly4567``
+        those of            rise, duration            start + rise y(t / duration), constant before 0 and
+        ``mg.cam_laws()``                             after duration
+        ``scca``            and sine, constant,       likewise
+                            cosine
+        ``polynomial``      and coefficients; or      likewise; by conditions, which say the rise
+                            duration, conditions
+        ``bspline``         duration, conditions,     by conditions
+                            knots
+        ``dwell``           none                      start
         ``constant_speed``  rise, duration; or speed  start + speed t for all t, speed = rise / duration
         ``sampled``         samples=(times, values)   spline through the samples
         a function          none                      f(t)
@@ -607,6 +608,8 @@ class Motion(Described):
             Times, increasing, and values there; n >= 4.
         degree : int
             Degree of the spline through samples, 3 or 5. Default: 5, with fewer than 6 samples 3.
+        sine, constant, cosine, coefficients, conditions, knots
+            Shape of the law, as of ``mg.Segment``, with times in place of angles.
 
         Returns
         -------
@@ -634,6 +637,7 @@ class Motion(Described):
             )
         numeric: dict[str, Any] = {"rise": rise, "duration": duration, "start": start, "speed": speed}
         everything: dict[str, Any] = {**numeric, "samples": samples, "degree": degree}
+        everything |= dict(zip(SHAPE_OF_LAW, (sine, constant, cosine, coefficients, conditions, knots), strict=True))
         given = {key: value for key, value in everything.items() if value is not None}
         faults = _argument_faults(rule, given)
         if t is None:

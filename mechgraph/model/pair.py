@@ -260,7 +260,7 @@ class Pair(Described):
     hertz : Hertz, optional
         Materials, for the contact pressure.
     curve : Curve, optional
-        Curve in the frame of link a along which the marker travels: P, C, Sg, and required for Ps and Kc. ``point`` is then a place
+        Curve in the frame of link a along which the marker travels: P, C, Sg, and required for Ps, Kc and Rg. ``point`` is then a place
         on it (default: where it begins), ``axis`` and ``second`` are those of its frame there; in a straight slot (Ps) ``axis`` is
         that of the pin.
     curve_b : Curve, optional
@@ -288,7 +288,7 @@ class Pair(Described):
     """
 
     name: Annotated[str, TEXT("freedoms are named NAME.Rz and so on")]
-    type: Annotated[Any, TEXT("R P H C U S E Sc Sg Cp Sp Tc Fr W, with a curve Ps Kc, or a `[[pair_type]]`")]
+    type: Annotated[Any, TEXT("R P H C U S E Sc Sg Cp Sp Tc Fr W, with a curve Ps Kc Rg, or a `[[pair_type]]`")]
     a: Annotated[str, LINK_NAME("first link; groove, plane and slot belong to it; the reaction is that of `a` on `b`")]
     b: Annotated[str, LINK_NAME("second link")]
     _: KW_ONLY

@@ -149,6 +149,15 @@ ROWS = {
             touching=Touching(("Fy",), a=(0.0, 0.0), b=(0.0, 1.0), curved=True),
         ),
         table_row(
+            "Rg",
+            "roller in groove",
+            [FOLLOWING, "Tz", "rotation"],
+            ["Fy@2"],
+            efforts=["Fx@2", "Fz@2", "Mx@2", "My@2", "Mz@2"],
+            dual=False,
+            touching=Touching(("Fy",), a=(0.0, 0.0), b=(0.0, 1.0), curved=True),
+        ),
+        table_row(
             "Kc",
             "curves in contact",
             [FOLLOWING, BESIDE],
@@ -314,10 +323,11 @@ def curve_faults(row: Any, curve: Curve, curve_b: Any, roller: Any, point: Any, 
             f"{where}curve: frame='held' is for {' and '.join(HELD)}; a pair {row.symbol} turns with its curve"
         )
     plane = roller or any(place.tangent == X for place in places)
+    turns = any(step.holds_rotation for step in row.steps)  # so that it follows a groove about the cam
     found += [
         f"{where}{name}: is not planar; a planar curve is required by pair {row.symbol}{' with a roller' if roller else ''}"
         for name, given in curves.items()
-        if plane and not given.once(Travel).is_plane
+        if plane and not given.once(Travel).is_plane and not (given.once(Travel).is_groove and turns)
     ]
     if roller and not found:
         found += roller_faults(curve, roller, "roller: ", where, _side(curve, point))

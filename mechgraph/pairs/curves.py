@@ -120,10 +120,10 @@ FRAMES = ("minimizing", "guided", "held")
 class Curve(Described, Once):
     """Base of the curves in the frame of a link; make one by ``Curve.circle(...)`` and so on.
 
-    ``line``, ``circle``, ``ellipse``, ``helix``, ``involute``, ``cam``, ``arm_cam``, ``through`` (points) and ``function`` make
-    curves. The moving frame has the tangent as one direction. ``"minimizing"`` rotates as little as possible about it (a plane curve
-    keeps its normal); ``"guided"`` keeps the direction ``guide`` in the plane of tangent and third direction; ``"held"`` does not
-    rotate (P and C): a body on a circle is then translated, as the coupler of a parallelogram.
+    ``line``, ``circle``, ``ellipse``, ``helix``, ``involute``, ``cam``, ``arm_cam``, ``barrel``, ``globoid``, ``through`` (points) and
+    ``function`` make curves. The moving frame has the tangent as one direction. ``"minimizing"`` rotates as little as possible about it
+    (a plane curve keeps its normal); ``"guided"`` keeps the direction ``guide`` in the plane of tangent and third direction;
+    ``"held"`` does not rotate (P and C): a body on a circle is then translated, as the coupler of a parallelogram.
 
     Examples
     --------
@@ -147,6 +147,8 @@ class Curve(Described, Once):
     function: ClassVar[Any]
     cam: ClassVar[Any]
     arm_cam: ClassVar[Any]
+    barrel: ClassVar[Any]
+    globoid: ClassVar[Any]
 
     frame: Annotated[str, TEXT("how the frame turns about the tangent", choices=FRAMES)] = "minimizing"
     guide: Annotated[
@@ -211,6 +213,10 @@ class Curve(Described, Once):
 
     def place_at(self, u: Array) -> Any:
         """The place with its frame, where that is known by other means than derivatives; else None."""
+        return None
+
+    def depth(self, u: Array) -> Array | None:
+        """The third axis of the frame and its derivatives ``(4, 3, ...)``, at right angles to the tangent, where the curve says it."""
         return None
 
     def beside(self, distance: float, y: Array) -> Curve | None:
@@ -489,7 +495,9 @@ class Travel:
         self.length = float(s[-1] - s[0])
         self.is_closed = curve.is_closed
         self.guide, self.is_plane = self._guide()
-        self.minimizing = curve.frame == "minimizing"
+        self.is_groove = curve.depth(curve.grid[:1]) is not None
+        self.is_plane = self.is_plane and not self.is_groove
+        self.minimizing = curve.frame == "minimizing" and not self.is_groove
         self.closing = 0.0
         self._turn: Pieces | None = None
         if self.minimizing and not self.is_plane:
@@ -555,6 +563,17 @@ class Travel:
         dr = (dc * bend + c * (_dot(ddt, y) + r * _dot(dt, k))) / m + c * c * dc * bend / m**3
         return x, t, dt, ddt, y, k, r, dr
 
+    def _in_groove(self, s: Array) -> tuple[Array, ...]:
+        """The same of the frame whose third axis the curve says: ``r = -k' . y``."""
+        u = self._parameter_at(s)
+        (x, t, dt, ddt), known = self._rates(u), self.curve.depth(u)
+        assert known is not None
+        u1, u2, _ = _parameter_rates(self.curve.at(u))
+        k, dk, ddk = known[0], known[1] * u1, known[2] * (u1 * u1) + known[1] * u2
+        y = cross(k, t)
+        dy = cross(dk, t) + cross(k, dt)
+        return x, t, dt, ddt, y, k, -_dot(dk, y), -_dot(ddk, y) - _dot(dk, dy)
+
     def at(self, s: Array) -> CurvePlace:
         """Position and frame at arc lengths ``(...)``, real or complex."""
         if self.is_plane:
@@ -567,7 +586,7 @@ class Travel:
             y = cross(k, t)
             # t' = c y with the curvature c towards y
             return CurvePlace(x, t, dt, y, k, _dot(dt, y) * k, _dot(ddt, y) * k)
-        x, t, dt, ddt, y, k, r, dr = self.guided(s)
+        x, t, dt, ddt, y, k, r, dr = self._in_groove(s) if self.is_groove else self.guided(s)
         w, dw = cross(t, dt), cross(t, ddt)
         if not self.minimizing:
             w, dw = w + r * t, dw + dr * t + r * dt
@@ -611,9 +630,9 @@ class Travel:
     # --- facts -------------------------------------------------------------------------------------------------------
 
     def curvature(self, s: Array) -> Array:
-        """Curvature ``|t'|``; of a plane curve with the sign of ``t' . y``, positive where it bends towards y."""
+        """Curvature ``|t'|``; of a plane curve, or across a groove, ``t' . y``, positive where it bends towards y."""
         here = self.at(s)
-        return _dot(here.dt, here.y) if self.is_plane else np.asarray(np.sqrt(_dot(here.dt, here.dt)))
+        return _dot(here.dt, here.y) if self.is_plane or self.is_groove else np.asarray(np.sqrt(_dot(here.dt, here.dt)))
 
     def nearest(self, p: Array) -> tuple[float, float]:
         """Arc length of the point of the curve that is nearest to ``p (3,)``, and its distance."""
@@ -754,6 +773,8 @@ def roller_faults(curve: Curve, radius: float, what: str, where: str, side: floa
     travel = curve.once(Travel)
     towards = -outside(curve) if side is None else side
     bend = towards * travel.curvature(travel.s)
+    if travel.is_groove:
+        bend = np.abs(bend)  # a groove has two walls
     worst = int(np.argmax(bend))
     if radius * bend[worst] < 1 - SHAPES.standstill:
         return []
