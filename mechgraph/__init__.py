@@ -50,11 +50,13 @@ from mechgraph.model import parts
 from mechgraph.model.belts import BeltDrive, Pulley
 from mechgraph.model.couplings import Belt, BevelGears, Coupling, Rack, SpurGears, WormGear
 from mechgraph.model.friction import Friction
+from mechgraph.model.gear_facts import MeshFacts, mesh_facts
 from mechgraph.model.gears import BevelGear, Gear, GearRack, Mesh, Worm, WormWheel
 from mechgraph.model.loads import Damper, Effort, ForceLaw, ForceTable, Gravity, Spring, TorsionSpring, Wrench
 from mechgraph.model.mechanism import Mechanism, chain
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Pair
+from mechgraph.model.planets import planet_places
 from mechgraph.model.response_setup import Event, ResponseSetup, Stop
 from mechgraph.model.toml import library_names as library
 from mechgraph.modes.assemblies import Assemblies, AssembliesOver, assemblies
@@ -86,15 +88,15 @@ __all__ = [
     "DeadPointError", "DeclarationError", "Decomposition", "DeterminacyReport", "Drive", "Effort", "Event",
     "Families", "FileError", "ForceLaw", "ForceTable", "Formulation", "FreeBody", "Freedom", "Friction",
     "FrictionError", "Gear", "GearRack", "Gravity", "Group", "Hertz", "Identity", "IndeterminateError", "Journal",
-    "Link", "Marker", "Mechanism", "MechgraphError", "MechgraphWarning", "Mesh", "Misfit", "MissingExtraError",
-    "Motion", "MultipleJoint", "OverTime", "Pair", "PairType", "Pulley", "Rack", "ReachError", "Response",
-    "ResponseError", "ResponseSetup", "Segment", "ShapeError", "Solution", "Spring", "SpurGears", "Stiffness", "Stop",
-    "Structure", "Study", "StudyError", "Surface", "SystemGroup", "Tolerances", "TorsionSpring", "Transmission",
-    "Worm", "WormGear", "WormWheel", "Wrench", "assemble", "assemblies", "atlas", "branches", "cam_laws", "chain",
-    "check", "compile", "equilibrium", "formulate", "free_body", "groups", "identify", "inertia", "kinematics",
-    "least_base_radius", "library", "linearize", "load", "load_chains", "multiple_joints", "over_time", "pair_types",
-    "parts", "respond", "save", "save_chains", "solve", "split_joint", "structure", "study", "system_groups",
-    "transmission", "write_report",
+    "Link", "Marker", "Mechanism", "MechgraphError", "MechgraphWarning", "Mesh", "MeshFacts", "Misfit",
+    "MissingExtraError", "Motion", "MultipleJoint", "OverTime", "Pair", "PairType", "Pulley", "Rack", "ReachError",
+    "Response", "ResponseError", "ResponseSetup", "Segment", "ShapeError", "Solution", "Spring", "SpurGears",
+    "Stiffness", "Stop", "Structure", "Study", "StudyError", "Surface", "SystemGroup", "Tolerances", "TorsionSpring",
+    "Transmission", "Worm", "WormGear", "WormWheel", "Wrench", "assemble", "assemblies", "atlas", "branches",
+    "cam_laws", "chain", "check", "compile", "equilibrium", "formulate", "free_body", "groups", "identify", "inertia",
+    "kinematics", "least_base_radius", "library", "linearize", "load", "load_chains", "mesh_facts", "multiple_joints",
+    "over_time", "pair_types", "parts", "planet_places", "respond", "save", "save_chains", "solve", "split_joint",
+    "structure", "study", "system_groups", "transmission", "write_report",
 ]  # fmt: skip
 
 

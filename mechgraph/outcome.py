@@ -19,7 +19,7 @@ from mechgraph.kinematics.motion_path import BLOCK, DriverPath, Positions, Statu
 from mechgraph.kinematics.prescribed import DriverMotion
 from mechgraph.kinematics.rates import PassiveMotion, Rates, Velocities, accuracy, at_dead_points, disagreement, rates
 from mechgraph.kinematics.solver import closure_solver
-from mechgraph.kinematics.state import ClosureSolver, Configuration, FactoredClosure
+from mechgraph.kinematics.state import ClosureSolver, Configuration, FactoredClosure, strayed
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.singular_point import passed
@@ -119,6 +119,8 @@ class Outcome:
         return self.found is None or bool(self.found.moved.any())
 
     def _put(self, motion: BlockMotion, f: FactoredClosure | None) -> None:
+        if fault := strayed(motion.here):
+            raise DeclarationError(f"solve {self.line.m.name!r}", [fault])
         self.trajectory.has_forces |= self.line.options.method is not None
         if not self.line.options.method or f is None:
             self.trajectory.put(motion, None)

@@ -165,7 +165,7 @@ def _multipliers(draft: _Draft) -> None:
     m = draft.m
     for g, coupling in enumerate(m.couplings):
         places = [m.freedom(freedom) for freedom in coupling.freedoms]
-        couple = any(m.pairs[k].type.freedoms[j].turns for k, j in places)
+        couple = not coupling.is_force and any(m.pairs[k].type.freedoms[j].turns for k, j in places)
         size = Symbol("M" if couple else "F", "C", name=coupling.name)
         unknown = draft.unknown(size, coupling.name, "coupling", couple, f"multiplier of the coupling {coupling.name}")
         if coupling.steps:

@@ -38,6 +38,8 @@ class LineRows:
         first = system.first_column
         terms = [(i, k, step.sense) for i, step in steps for k in range(first[step.pair], first[step.pair + 1])]
         rows, columns, senses = (np.array(part) for part in zip(*terms, strict=True))
+        self._last: tuple[Array, bool, LinesAt] | None = None
+        self._start_poses: Array | None = None
         self._at_start: tuple[Array, Array] | None = None
         self._terms = rows.astype(np.intp), columns.astype(np.intp), senses.astype(float)
 
@@ -49,19 +51,29 @@ class LineRows:
             found.setdefault(hash((id(c.relation), id(c.other))), (c.relation, []))[1].append(i)
         return [(relation, np.array(rows)) for relation, rows in found.values()]
 
+    @cached_property
+    def _local(self) -> list[tuple[Array, Array, Array]]:
+        """Points from the origins of the internal link frames over L, axes and marks there ``(3, n, 1)``, on links a and on links b."""
+        par, out = self.system.par, []
+        for side in (0, 1):
+            ends = [c.ends[side] for c in self.couplings]
+            point, axis, mark = (np.array([getattr(end, name) for end in ends]).T for name in ("point", "axis", "mark"))
+            axis, mark = (v / np.sqrt((v * v).sum(axis=0)) for v in (axis, mark))
+            local = (point - par.offset[:, self.links[side]]) / par.L
+            out.append((local[..., None], axis[..., None], mark[..., None]))
+        return out
+
     def _places(self, poses: Array, side: int, rows: Index) -> Places:
         """The places on links a (side 0) or b of some rows, where all links have the poses ``(3, 4, N, T)``."""
-        par, links = self.system.par, self.links[side, rows]
-        X = poses[:, :, links]
-        ends = [self.couplings[i].ends[side] for i in rows]
-        point, axis, mark = (np.array([getattr(end, name) for end in ends]).T for name in ("point", "axis", "mark"))
-        axis, mark = (v / np.sqrt((v * v).sum(axis=0)) for v in (axis, mark))
-        local = (point - par.offset[:, links]) / par.L
+        X = poses[:, :, self.links[side, rows]]
+        local, axis, mark = (part[:, rows] for part in self._local[side])
         R = X[:, :3]
-        return Places(rotate(R, local[..., None]) + X[:, 3], rotate(R, axis[..., None]), rotate(R, mark[..., None]))
+        return Places(rotate(R, local) + X[:, 3], rotate(R, axis), rotate(R, mark))
 
     def lines(self, poses: Array, other: bool = False) -> LinesAt:
         """Values and lines of all rows, or of their other flanks, where all links have the poses ``(3, 4, N, T)``."""
+        if self._last is not None and self._last[0] is poses and self._last[1] is other:
+            return self._last[2]
         n, T = len(self.couplings), poses.shape[-1]
         value, point, along = (np.zeros((*shape, T), dtype=poses.dtype) for shape in ((n,), (3, n), (3, n)))
         for relation, rows in self._groups:
@@ -70,7 +82,9 @@ class LineRows:
                 self._places(poses, 0, rows), self._places(poses, 1, rows), numbers
             )
             value[rows], point[:, rows], along[:, rows] = made
-        return LinesAt(value, point, along)
+        found = LinesAt(value, point, along)
+        self._last = poses, other, found  # the same poses are asked for several times
+        return found
 
     def wrenches(self, poses: Array, other: bool = False) -> Array:
         """Unit forces on b along the lines, ``(6, n, T)`` about the internal origin."""
@@ -87,7 +101,8 @@ class LineRows:
         if self._at_start is None:
             s = self.system
             x = np.repeat(s.state_of(s.start_coordinates(s.m.start)[:, None]), s.par.batch, axis=1)
-            self._at_start = self._values_at(like(s, x)), x
+            at_start = like(s, x)
+            self._at_start, self._start_poses = (self._values_at(at_start), x), at_start.poses
         return self._at_start
 
     def _values_at(self, here: Any) -> Array:
@@ -116,6 +131,24 @@ class LineRows:
         pair, number = s.m.freedom(name)
         row = s.single_rows[s.first_column[pair] + number]
         return np.asarray((x[row] - x0[row]).real)
+
+    def strayed(self, here: Any, tolerance: float) -> str | None:
+        """Which shafts leave the places that a relation is about, by more than a tolerance (radians, lengths over L); None for none."""
+        self._closed(type(here))
+        assert self._start_poses is not None
+        rows = np.arange(len(self.couplings))
+        now, then = ([self._places(X, side, rows) for side in (0, 1)] for X in (here.poses, self._start_poses))
+        for i, c in enumerate(self.couplings):
+            own = [Places(*(part[:, i : i + 1] for part in end)) for end in (*now, *then)]
+            off = c.strayed(*own)
+            worst = 0.0 if off is None else float(np.abs(off).max(initial=0.0))
+            if worst > tolerance:
+                links = " or ".join(repr(end.link) for end in c.ends)
+                return (
+                    f"coupling {c.name!r}: the axis of its gear on {links} moves against the other one, by up to {worst:.3g} (radians, or "
+                    "lengths over L); these gears need axes that keep their places: hold the shaft in bearings, or give cylindrical gears"
+                )
+        return None
 
     def error(self, here: Any) -> Array:
         """The largest of them."""

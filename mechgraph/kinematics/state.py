@@ -43,7 +43,7 @@ from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import LeastNorm
 from mechgraph.maths.se3 import Array, Index, Mask, compose, cross, cross_twist, finite_twist, move_twist, multiplied
 from mechgraph.maths.tolerances import PATH, RANKS
-from mechgraph.model.couplings import Axes, BaseCoupling, Contact, Lines
+from mechgraph.model.couplings import Axes, BaseCoupling, Contact, Lines, fitting_of
 from mechgraph.model.lines import LineCoupling, moving_lines
 from mechgraph.pairs import pair_type as evaluation
 
@@ -504,6 +504,15 @@ class ClosureSolver(Protocol):
         """Increments ``(F, T)`` without the motions that are held: no correction can remove what a prediction adds to them."""
 
 
+def strayed(here: Configuration) -> str | None:
+    """Which shafts of gears leave the places that their relations are about; None for none."""
+    m = here.system.m
+    if not m.once(moving_lines) or not here.T:
+        return None
+    which = np.array([g for g, c in enumerate(m.couplings) if c.name in m.once(moving_lines)])
+    return LineRows(here.system, which).strayed(here, max(fitting_of(m), 1e-7))
+
+
 class ContactLines:
     """Lines of all contacts at the positions of a configuration, internal units about the internal origin."""
 
@@ -555,6 +564,8 @@ class ContactLines:
             other = rows.lines(here.poses, other=True).along[:, 0]
             n[:, 1] = np.where(self.turned[g][1], other, n[:, 1]) if g in self.turned else other
         G = np.concatenate([cross(P, n), n]) * here.system.row_scale[row] * here.system.par.L
+        if here.system.m.planar:
+            G[np.delete(np.arange(6), here.system.graph.span)] = 0.0
         return G, P
 
     @cached_property
@@ -567,9 +578,8 @@ class ContactLines:
         """
         here, m = self.here, self.here.system.m
         found = {}
-        for g in [i for i, c in enumerate(m.couplings) if isinstance(c, LineCoupling) and not c.linear]:
-            c = m.couplings[g]
-            if c.other is None or c.other is c.relation:
+        for g, c in enumerate(m.couplings):
+            if not isinstance(c, LineCoupling) or c.linear or c.other is None or c.other is c.relation:
                 continue
             rows, loops = LineRows(here.system, np.array([g])), here.system.graph.loop_rows
             change = (rows.jacobian(here, other=True) - rows.jacobian(here))[0]

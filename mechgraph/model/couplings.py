@@ -52,6 +52,8 @@ class BaseCoupling(Described, ABC):
     name: str
     terms: Terms
     constant: float | None
+    is_force: ClassVar[bool] = False
+    """Whether its multiplier is a force, whatever its freedoms are."""
     steps: tuple[Any, ...] = ()
     """Pairs on the way along which the force of the coupling is closed, where it acts along a line of its own."""
 

@@ -19,9 +19,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from math import atan, cos, pi, sin, tan
-from typing import Annotated, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import numpy as np
 
@@ -55,7 +55,6 @@ from mechgraph.pairs.pair_type import PairType
 from mechgraph.quantities import LENGTH, PURE, shown, unknown, wrong
 
 _FULL = float(np.deg2rad(20.0))
-_ANGLE = {"degrees": True}
 
 
 def involute(a: Any) -> Any:
@@ -151,20 +150,24 @@ class _Toothed(Described):
     """What gears share: a place on a link."""
 
     kind: ClassVar[str]
-    link: str
-    width: float | None = None
+    if TYPE_CHECKING:
+        name: str
+        link: str
+        point: Any
+        axis: Any
+        mark: Any
 
     def __post_init__(self) -> None:
         self.read_numbers()
 
-    @property
+    @cached_property
     def place(self) -> LinkPlace:
         """The place with unit directions."""
-        axis = np.asarray(self.axis, dtype=float)  # type: ignore[attr-defined]
+        axis: Array = np.asarray(self.axis, dtype=float)
         axis = axis / np.linalg.norm(axis)
-        mark = np.asarray(second_direction(axis) if self.mark is None else self.mark, dtype=float)  # type: ignore[attr-defined]
+        mark: Array = np.asarray(second_direction(axis) if self.mark is None else self.mark, dtype=float)
         mark = mark - axis * (mark @ axis)
-        return LinkPlace(self.link, self.point, tuple(axis), tuple(mark / np.linalg.norm(mark)))  # type: ignore[attr-defined]
+        return LinkPlace(self.link, self.point, tuple(axis), tuple(mark / np.linalg.norm(mark)))
 
     def value_faults(self, where: str) -> list[str]:
         """See ``Described``."""
@@ -181,9 +184,10 @@ class _Toothed(Described):
 class _Involute(_Toothed):
     """Cylindrical gears and racks: angles of their teeth."""
 
-    module: float
-    pressure_angle: float
-    helix_angle: float
+    if TYPE_CHECKING:
+        module: float
+        pressure_angle: float
+        helix_angle: float
 
     @property
     def transverse_angle(self) -> float:
@@ -203,8 +207,8 @@ class _Involute(_Toothed):
 
 _POINT = POINT("in the middle of its width, on its axis", LENGTH)
 _MODULE = POSITIVE("normal module, at the pitch circle", LENGTH)
-_PRESSURE = NUMBER("of the flanks, in the normal section", PURE, minimum=0.0, **_ANGLE)
-_HELIX = NUMBER("at the pitch circle, right-hand positive", PURE, **_ANGLE)
+_PRESSURE = NUMBER("of the flanks, in the normal section", PURE, degrees=True, minimum=0.0)
+_HELIX = NUMBER("at the pitch circle, right-hand positive", PURE, degrees=True)
 _WIDTH = POSITIVE("of the teeth", LENGTH, default="wider than the other gear")
 _MARK = DIRECTION("across the axis: the middle of a tooth", default="one across the axis, of no meaning")
 
@@ -264,7 +268,7 @@ class GearRack(_Involute):
     normal: Annotated[Any, DIRECTION("out of its teeth, towards the pinion")]
     module: Annotated[float, _MODULE]
     pressure_angle: Annotated[float, _PRESSURE] = _FULL
-    helix_angle: Annotated[float, NUMBER("minus that of its pinion", PURE, **_ANGLE)] = 0.0
+    helix_angle: Annotated[float, NUMBER("minus that of its pinion", PURE, degrees=True)] = 0.0
     width: Annotated[float | None, _WIDTH] = None
 
     @property
@@ -297,9 +301,9 @@ class BevelGear(_Toothed):
     axis: Annotated[Any, DIRECTION("its axis")]
     module: Annotated[float, POSITIVE("at the middle of the face", LENGTH)]
     pressure_angle: Annotated[float, _PRESSURE] = _FULL
-    spiral_angle: Annotated[float, NUMBER("right-hand positive, minus that of its mate", PURE, **_ANGLE)] = 0.0
+    spiral_angle: Annotated[float, NUMBER("right-hand positive, minus that of its mate", PURE, degrees=True)] = 0.0
     cone: Annotated[
-        float | None, NUMBER("half angle of its pitch cone", PURE, default="as teeth and axes ask for", **_ANGLE)
+        float | None, NUMBER("half angle of its pitch cone", PURE, default="as teeth and axes ask for", degrees=True)
     ] = None
     mark: Annotated[Any, _MARK] = None
 
@@ -400,6 +404,9 @@ class Mesh(LineCoupling):
         ),
     ] = "auto"
 
+    held: ClassVar[tuple[bool, bool]] = (False, False)
+    """Which gears must not slide along their axes."""
+
     def __post_init__(self) -> None:
         self.read_numbers()
         for name, value in (("terms", ()), ("constant", None), ("steps", ())):
@@ -427,13 +434,19 @@ class Mesh(LineCoupling):
             elif (one.kind, two.kind) not in _KINDS:
                 found.append(f"a {one.kind} and a {two.kind} do not mesh; expected {_words_of_kinds(one.kind)}")
             elif m.has_geometry and m.once(_placed_soundly):
-                found += self._seen(m).misfits(fitting_of(m))
+                found += self.seen(m).misfits(fitting_of(m))
         return [where + fault for fault in found]
 
-    def _seen(self, m: Any) -> Meeting:
-        one, two = self.pair_of(m)
-        steps = self._steps(m)[0]
-        return _KINDS[one.kind, two.kind](one, two, one.place.seen(identity()), two.place.seen(pose_along(m, steps)))
+    def seen(self, m: Any) -> Meeting:
+        """Both gears where they meet."""
+        known = m.once(_meetings)
+        if (self.a, self.b) not in known:
+            one, two = self.pair_of(m)
+            steps = self._steps(m)[0]
+            places = one.place.seen(identity()), two.place.seen(pose_along(m, steps))
+            known[self.a, self.b] = _KINDS[one.kind, two.kind](one, two, *places)
+        met: Meeting = known[self.a, self.b]
+        return met
 
     def _steps(self, m: Any) -> tuple[tuple[MeshStep, ...], bool]:
         """The pairs on the way from a to b, and whether all of them are R or P."""
@@ -453,17 +466,18 @@ class Mesh(LineCoupling):
             names = [m.pairs[step.pair].freedom_names for step in steps]
             ones = {name: 1.0 for some in names for name in some}
             return self._put(m, steps, ones if plain else None, ends=(one.place, two.place))
-        met = self._seen(m)
+        met = self.seen(m)
         flanks = met.flanks(self.flank != "backward")
-        lines = [relation(met.a, met.b, np.array(met.numbers)[:, None, None]) for relation in flanks]
         ends, coefficients = (one.place, two.place), None
         if plain:
-            coefficients = self._coefficients(m, steps, lines[0], ends)
+            line = flanks[0](met.a, met.b, np.array(met.numbers)[:, None, None])
+            coefficients = self._coefficients(m, steps, line, ends)
         known = {
             "ends": ends,
             "numbers": met.numbers,
             "relation": flanks[0],
             "period": met.period,
+            "held": met.held,
             "other": flanks[1] if self.flank == "auto" else flanks[0],
         }
         return self._put(m, steps, coefficients, **known)
@@ -479,15 +493,32 @@ class Mesh(LineCoupling):
         backward = on_line(m, back, ends[1], racks[1], fitting_of(m))
         if len(forward) + len(backward) < len(steps):
             return None
-        met, powers = self._seen(m), []
+        met, powers = self.seen(m), []
         for place, rack in zip((met.a, met.b), racks, strict=True):
             z, p = place.axis[:, 0, 0], place.point[:, 0, 0]
-            powers.append(float(n @ (z if rack else np.cross(z, P - p))))
+            powers.append(float(n @ (z if rack else cross(z, P - p))))
         signs = [*((s, powers[0]) for s in forward), *((s, powers[1]) for s in reversed(backward))]
         return {
             m.pairs[step.pair].freedom_names[0]: step.sense * sign * power
             for step, (sign, power) in zip(steps, signs, strict=True)
         }
+
+    def strayed(self, a: Places, b: Places, a0: Places, b0: Places) -> Array:
+        """See ``LineCoupling``: the angle between the axes, and of those that cross their distance and where they are along them."""
+        found = [_dot(a.axis, b.axis) - _dot(a0.axis, b0.axis)]
+        if self.relation not in (*BETWEEN.values(),):
+            # parallel axes: their cosine falls with the square
+            lean = cross(a.axis, b.axis) if self.relation in CYLINDRICAL.values() else a.axis * 0.0
+            return np.asarray(np.sqrt(_dot(lean, lean)))
+        for one, two in (((a, b), (a0, b0)),):
+            places = []
+            for p, q in (one, two):
+                w, d = cross(p.axis, q.axis), q.point - p.point
+                square = _dot(w, w)
+                places.append((_dot(d, w) / np.sqrt(square), _dot(cross(d, q.axis), w) / square, _dot(cross(d, p.axis), w) / square))
+            apart, along_a, along_b = (now - then for now, then in zip(*places, strict=True))
+            found += [apart, *(along for along, held in zip((along_a, along_b), self.held, strict=True) if held)]
+        return np.asarray(np.abs(found).max(axis=0))
 
     def in_own_units(self, units: Any, turns: Any) -> Self:
         """See ``BaseCoupling``."""
@@ -516,13 +547,13 @@ def on_line(m: Any, steps: tuple[MeshStep, ...], place: LinkPlace, slides: bool,
         pair: Pair = m.pairs[step.pair]
         before, behind = (pair.markers[int((step.sense > 0) == later)] for later in (False, True))
         axis = np.asarray(before.axis, dtype=float)
-        w, q = axis / np.linalg.norm(axis), np.asarray(before.point, dtype=float)
-        off = 0.0 if slides else np.abs(np.cross(q - p, z)).max() / max(1.0, np.abs(q - p).max())
-        if motion_of(pair) != ("slide" if slides else "turn") or max(off, np.abs(np.cross(z, w)).max()) > fitting:
+        w, q = axis / np.sqrt(axis @ axis), np.asarray(before.point, dtype=float)
+        off = 0.0 if slides else np.abs(cross(q - p, z)).max() / max(1.0, np.abs(q - p).max())
+        if motion_of(pair) != ("slide" if slides else "turn") or max(off, np.abs(cross(z, w)).max()) > fitting:
             break
         senses.append(float(np.sign(z @ w)))
         axis = np.asarray(behind.axis, dtype=float)
-        along, z = (p - q) @ z, senses[-1] * axis / np.linalg.norm(axis)
+        along, z = (p - q) @ z, senses[-1] * axis / np.sqrt(axis @ axis)
         p = np.asarray(behind.point, dtype=float) + along * z
     return senses
 
@@ -535,6 +566,11 @@ def _reached(m: Any) -> set[str]:
         out |= ahead
         queue += sorted(ahead)
     return out
+
+
+def _meetings(m: Any) -> dict[tuple[str, str], Meeting]:
+    """Where gears meet, as far as it was asked for."""
+    return {}
 
 
 def _placed_soundly(m: Any) -> bool:
@@ -554,6 +590,7 @@ class Meeting:
 
     numbers: tuple[float, ...] = ()
     period: float = np.inf
+    held: tuple[bool, bool] = (False, False)
 
     def __init__(self, one: Any, two: Any, a: Places, b: Places) -> None:
         self.one, self.two, self.a, self.b = one, two, a, b
@@ -668,7 +705,29 @@ class Parallel(Meeting):
         if not found:
             found += self._at_distance(fitting, inner, names)
             found += _apart(one, two, self.h)
-        return found
+        return found or list(self._off_gap())
+
+    def _off_gap(self) -> Iterator[str]:
+        """Teeth that do not stand in gaps, where both gears have a mark."""
+        one, two, k = self.one, self.two, self.k
+        if one.mark is None or two.mark is None:
+            return
+        d = self.b.point - self.a.point
+        across = d - self.a.axis * self.h
+        turns = 0.5
+        for gear, place, way in ((one, self.a, 1.0), (two, self.b, -1.0)):
+            e = across * (way * np.sign(gear.base_radius * k) / self.distance)
+            lean = self.h * one.base_lean / one.base_radius if gear is one else 0.0
+            own = float(angle(e, place.mark, self.a.axis)[0, 0]) + lean
+            turns += np.sign(gear.base_radius) * gear.teeth * own / (2 * pi)
+        off = turns - round(turns)
+        pitch = 2 * pi * abs(one.base_radius) / cos(self.working_angle) / one.teeth
+        # a thousandth of a tooth: the mark is rounded
+        if abs(off) > max(self.backlash, 0.0) / (2 * pitch) + 1e-3:
+            yield (
+                f"teeth of {one.name!r} and {two.name!r} are {abs(off):.4g} of a tooth off the gaps, by their marks; turn that of "
+                f"{two.name!r} by {360 * abs(off) / two.teeth:.6g} degrees one way, or leave it out"
+            )
 
     def _at_distance(self, fitting: float, inner: bool, names: str) -> Iterator[str]:
         one, two, d = self.one, self.two, self.distance
@@ -678,8 +737,8 @@ class Parallel(Meeting):
             return
         if self.backlash < -4.0 * fitting * nominal:
             yield (
-                f"{names} jam at the distance {d:.7g}, which asks for the sum {self.asked_shifts:.7g} of shifts (ring minus gear inside); they "
-                f"have {self.shifts:.7g} (without shifts the distance is {nominal:.7g})"
+                f"{names} jam at the distance {d:.7g}, which asks for the sum {self.asked_shifts:.7g} of shifts (ring minus gear inside); "
+                f"they have {self.shifts:.7g} (without shifts the distance is {nominal:.7g})"
             )
         tips = [tip_radius(g) for g in (one, two)]
         reach = abs(tips[0] - tips[1]) if inner else sum(tips)
@@ -736,7 +795,8 @@ class WithRack(Meeting):
         wanted = pinion.radius + pinion.module * pinion.shift
         if distance < wanted - 2.0 * fitting * wanted or distance > wanted + 2.0 * pinion.module:
             found.append(
-                f"the pitch line of {rack.name!r} is {distance:.7g} before the axis of {pinion.name!r}, against its normal; expected {wanted:.7g}"
+                f"the pitch line of {rack.name!r} is {distance:.7g} from the axis of {pinion.name!r}, against its normal; expected "
+                f"{wanted:.7g}"
             )
         return [*found, *_apart(pinion, rack, float(_dot(d, z)[0, 0]))]
 
@@ -837,6 +897,8 @@ class Tilted(Parallel):
 class Bevels(Still):
     """Bevel gears on axes that intersect."""
 
+    held = (True, True)
+
     @property
     def _pair(self) -> BevelGears:
         one, two = self.one, self.two
@@ -878,6 +940,11 @@ class Bevels(Still):
 
 class Worms(Still):
     """A worm and its wheel."""
+
+    @property
+    def held(self) -> tuple[bool, bool]:  # type: ignore[override]
+        """A worm may slide, its wheel may not."""
+        return self._sign < 0, self._sign > 0
 
     @property
     def _sign(self) -> float:

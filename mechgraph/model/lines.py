@@ -71,6 +71,7 @@ class LineCoupling(BaseCoupling):
     period: float = float("inf")
     longer: float = 0.0
     linear: bool = False
+    is_force = True
 
     @property
     def text(self) -> str:
@@ -80,6 +81,12 @@ class LineCoupling(BaseCoupling):
     def whole_turns(self, along: Array, a: Places, b: Places, turned: Callable[[str], Array]) -> Array | None:
         """What whole turns add to the value ``(T,)`` of a row with the direction ``along (3, 1, T)`` between two places, by how much
         freedoms have grown since the start, ``turned(name) (T,)``; None where its residue modulo ``period`` tells as much.
+        """
+        return None
+
+    def strayed(self, a: Places, b: Places, a0: Places, b0: Places) -> Array | None:
+        """By how much ``(n, T)`` the places are out of those that its relation is about, radians and lengths, where they were ``a0, b0``
+        ``(3, n, 1)`` at the start; None where it holds wherever they are.
         """
         return None
 

@@ -29,6 +29,7 @@ from mechgraph.memo import carried, under
 from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.declaration import Parts, declaration_faults, flat_start, item_faults, mapping_faults
 from mechgraph.model.loads import Gravity, Load
+from mechgraph.model.planets import planet_faults
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.model.parts import Parts as Catalogued
@@ -297,6 +298,8 @@ class Mechanism(Parts, Shown):
         self._finish(start, faults + mapping_faults(units=units, start=start, expected=expected))
         self._set(couplings=tuple(one for c in self.couplings for one in c.written(self)))
         self._doubt()
+        for fault in planet_faults(self) if self.gears and "_changed_from" not in vars(self) else ():
+            warnings.warn(f"mechanism {self.name!r}: {fault}", MechgraphWarning, stacklevel=3)
 
     def _set(self, **fields: Any) -> None:
         for key, value in fields.items():

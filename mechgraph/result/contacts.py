@@ -24,6 +24,7 @@ from mechgraph.errors import DeclarationError
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import SHAPES
 from mechgraph.model.belts import BeltDrive
+from mechgraph.model.gears import Mesh
 from mechgraph.model.pair import Pair
 from mechgraph.pairs.contact_types import (
     Pressed,
@@ -532,7 +533,30 @@ def lift_offs(values: Trajectory) -> tuple[LiftOff, ...]:
     """Where contacts that are only pushed, or do not say that they are held, would have to pull."""
     found = contacts_of(values).values() if values.has_forces and bool((values.status() == OK).any()) else ()
     slack = slack_spans(values) if values.has_forces else ()
-    return (*(lift for contact in found for lift in contact.lift_off), *slack)
+    pulled = pulled_flanks(values) if values.has_forces else ()
+    return (*(lift for contact in found for lift in contact.lift_off), *slack, *pulled)
+
+
+def pulled_flanks(values: Trajectory) -> Iterator[LiftOff]:
+    """Where flanks of teeth would have to pull: given ones, and those of gears whose centers move, which touch on one flank."""
+    unit = unit_of(values.mechanism.units, FORCE)
+    meshes = [(k, one) for k, one in enumerate(values.whole.couplings) if isinstance(one, Mesh)]
+    if not meshes:
+        return
+    multipliers, loose = values.multipliers()
+    for k, one in meshes:
+        push = (-1.0 if one.flank == "backward" else 1.0) * np.where(loose[k], 0.0, np.nan_to_num(multipliers[k]))
+        # part of the greatest force below which a pull is rounding
+        pulls = push < -1e-9 * float(np.abs(push).max(initial=0.0))
+        if one.other is not one.relation and pulls.any():
+            pulls &= ~values.turned_over(k)
+        for found in stretches(values, pulls.reshape(values.batch), push.reshape(values.batch)):
+            pull = f"{found.amount:.4g}{' ' * bool(unit)}{unit}"
+            text = (
+                f"mesh {one.name}: its flank would have to pull {found.where}, with up to {pull}; with centers that move it keeps to one "
+                "flank. Forces there are not physical. Give flank='forward' or 'backward' as the load asks, or more load"
+            )
+            yield LiftOff(one.name, *found[:4], text, found.amount)
 
 
 def slack_spans(values: Trajectory) -> Iterator[LiftOff]:

@@ -770,6 +770,13 @@ class Trajectory:
         scales = [np.broadcast_to(self._system_at(block).row_scale[row], len(block)) for block in blocks]
         return np.asarray(self._L**2 * np.concatenate(scales) * self._force("multipliers")[coupling])
 
+    def turned_over(self, coupling: int) -> Mask:
+        """Where ``(T,)`` the other flank of a mesh takes over, as its centers stand still."""
+        if self._system.m.couplings[coupling].name not in self._system.m.once(moving_lines):
+            return np.ones(self._count, dtype=bool)
+        found = self._evaluated(lambda block: ContactLines(block.here).turned[coupling][1][None].astype(float))
+        return np.asarray(found[0] > 0.5)
+
     def contact(self, coupling: int) -> tuple[Array, Array]:
         """Force of gears on the second one, and the point where it acts, ``(..., 3)``."""
         c = self._system.m.couplings[coupling]

@@ -279,5 +279,5 @@ def driver_value(m: Mechanism, name: str, value: float) -> str:
 
 def coupling_unit(m: Mechanism, coupling: BaseCoupling) -> str:
     """The unit of the multiplier: a force where all freedoms are slides, else a moment."""
-    slides = not any(m.turns(name) for name in coupling.freedoms)
+    slides = coupling.is_force or not any(m.turns(name) for name in coupling.freedoms)
     return unit_of(m.units, (1 if slides else 2, 1, -2))

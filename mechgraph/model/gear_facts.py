@@ -1,0 +1,215 @@
+"""What meshes of gears amount to: ratios, angles, circles, contact ratios, backlash.
+
+Source: ISO 21771:2007, Cylindrical involute gears and gear pairs; G. Niemann and H. Winter, Maschinenelemente II, 2003, chapters 21, 22.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import acos, pi, sin, sqrt, tan
+from typing import Any
+
+import numpy as np
+
+from mechgraph.errors import DeclarationError
+from mechgraph.model.gears import Gear, Mesh, Parallel, WithRack, tip_radius
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.quantities import door
+
+NAN2 = (float("nan"), float("nan"))
+
+
+@dataclass(frozen=True)
+class MeshFacts:
+    """What a mesh amounts to at the declared places, lengths in the units of the mechanism; NaN and empty where it has no such thing.
+
+    Attributes
+    ----------
+    kind : str
+        ``parallel``, ``rack``, ``crossed``, ``bevels``, ``worms``.
+    ratio : float
+        ``N_b / N_a``.
+    distance, working_angle : float
+        Of the axes; working pressure angle in the plane across them [rad].
+    pitch_radii, tip_radii, root_radii : tuple of float
+        Of a and b: working pitch circles; tip circles, shortened to keep the clearance; root circles at a dedendum of 1.25 modules.
+    asked_shifts : float
+        Sum of the profile shifts (ring minus gear) at which the gears run without backlash at this distance.
+    contact_ratio, overlap_ratio : float
+        Of the profiles, and by the helix.
+    backlash : float
+        Along the working pitch circles: what the distance leaves and what is declared; ``backlash_angles`` of a and b [rad].
+    undercut : tuple of float
+        Least shifts of a and b without undercut, in modules.
+    faults : tuple of str
+        Undercut, interference, a contact ratio below 1.
+    """
+
+    kind: str
+    ratio: float
+    distance: float = float("nan")
+    working_angle: float = float("nan")
+    pitch_radii: tuple[float, float] = NAN2
+    tip_radii: tuple[float, float] = NAN2
+    root_radii: tuple[float, float] = NAN2
+    asked_shifts: float = float("nan")
+    contact_ratio: float = float("nan")
+    overlap_ratio: float = float("nan")
+    backlash: float = float("nan")
+    backlash_angles: tuple[float, float] = NAN2
+    undercut: tuple[float, float] = NAN2
+    faults: tuple[str, ...] = ()
+
+
+@door
+def mesh_facts(m: Mechanism) -> dict[str, MeshFacts]:
+    """Return what every ``Mesh`` of a mechanism amounts to.
+
+    Parameters
+    ----------
+    m : Mechanism
+        A mechanism with geometry.
+
+    Returns
+    -------
+    dict of str to MeshFacts
+        By the names of the meshes.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> z, at = (0, 0, 1), {"p": (0, 0, 0), "w": (0.0612, 0, 0)}
+    >>> m = mg.Mechanism(
+    ...     "stage",
+    ...     pairs=[mg.Pair(k, "R", "frame", k, point=x, axis=z) for k, x in at.items()],
+    ...     gears=[mg.Gear(k, k, N, at[k], z, module=0.002) for k, N in (("p", 20), ("w", 40))],
+    ...     couplings=[mg.Mesh("m", "p", "w")],
+    ... )
+    >>> round(mg.mesh_facts(m)["m"].backlash, 9)
+    0.000954013
+    """
+    if not m.has_geometry:
+        raise DeclarationError(f"mechanism {m.name!r}", ["has no geometry; meshes have facts at their places"])
+    return {c.name: _facts(m, c) for c in m.couplings if isinstance(c, Mesh)}
+
+
+def _facts(m: Mechanism, mesh: Mesh) -> MeshFacts:
+    met = mesh.seen(m)
+    if isinstance(met, Parallel):
+        return _parallel(met, mesh)
+    kind = type(met).__name__.lower()
+    if isinstance(met, WithRack):
+        return _rack(met, mesh)
+    return MeshFacts(kind, met.two.teeth / met.one.teeth)
+
+
+def least_shift(gear: Gear) -> float:
+    """The least profile shift without undercut, ``1 - z sin^2 a_t / (2 cos b)``, in modules; none of a gear with its teeth inside."""
+    if gear.internal:
+        return -float("inf")
+    return 1.0 - gear.radius / gear.module * sin(gear.transverse_angle) ** 2
+
+
+def _root(gear: Gear) -> float:
+    """The dedendum is 1.25 modules."""
+    depth = gear.module * (1.25 - gear.shift)
+    return gear.radius + gear.module * (1.25 + gear.shift) if gear.internal else gear.radius - depth
+
+
+def _overlap(met: Any) -> float:
+    """Width in which both run, times the lead of the helix, over the pitch."""
+    if met.one.width is None and met.two.width is None:
+        return float("nan")
+    half_a, half_b = (np.inf if g.width is None else g.width / 2 for g in (met.one, met.two))
+    width = min(half_a, met.h + half_b) - max(-half_a, met.h - half_b)
+    return float(width * abs(sin(met.one.helix_angle)) / (pi * met.one.module))
+
+
+def _parallel(met: Parallel, mesh: Mesh) -> MeshFacts:
+    one, two, d, w = met.one, met.two, met.distance, met.working_angle
+    inner = one.internal or two.internal
+    shorter = 0.0
+    if not inner:
+        shorter = max(0.0, met.shifts - (d - one.radius - two.radius) / one.module)
+    tips = tuple(tip_radius(g, shorter) for g in (one, two))
+    bases = tuple(g.base_radius for g in (one, two))
+    ways = [np.sign(k) * sqrt(max(tip**2 - k**2, 0.0)) for tip, k in zip(tips, bases, strict=True)]
+    length = sum(ways) + (1.0 if inner else -1.0) * d * sin(w)
+    contact = float(length / (2 * pi * abs(bases[0]) / one.teeth))
+    backlash = met.backlash + mesh.backlash
+    radii = tuple(float(abs(k) / np.cos(w)) for k in bases)
+    faults = [
+        f"{g.name!r}: {g.teeth} teeth with the shift {g.shift:g} are undercut by a rack; expected a shift of {least_shift(g):.6g} or more"
+        for g in (one, two)
+        if g.shift < least_shift(g) - 1e-9
+    ]
+    if contact < 1.0:
+        faults.append(f"contact ratio {contact:.4g}: teeth part before the next ones meet; expected more than 1")
+    faults += list(_interference(met, tips, ways)) if not inner else list(_inside(met, tips))
+    return MeshFacts(
+        "parallel", two.teeth / one.teeth, d, w, radii, tips, (_root(one), _root(two)), met.asked_shifts, contact, _overlap(met), backlash,
+        (backlash / radii[0], backlash / radii[1]), (least_shift(one), least_shift(two)), tuple(faults),
+    )  # fmt: skip
+
+
+def _interference(met: Parallel, tips: Any, ways: list[Any]) -> Iterator[str]:
+    """Tips that reach below the base circle of the other gear along the line of action."""
+    whole = met.distance * sin(met.working_angle)
+    for gear, mate, way in ((met.one, met.two, ways[0]), (met.two, met.one, ways[1])):
+        if way > whole * (1 + 1e-12):
+            yield f"the tips of {gear.name!r} reach below the base circle of {mate.name!r}: involutes interfere"
+
+
+def _inside(met: Parallel, tips: Any) -> Iterator[str]:
+    """Interference of a gear and its ring: of involutes, and of tips beside the line of centers."""
+    ring, other = (met.one, met.two) if met.one.internal else (met.two, met.one)
+    top = tips[0] if ring is met.one else tips[1]
+    base = abs(ring.base_radius)
+    if top <= base:
+        yield f"the tip circle {top:.6g} of {ring.name!r} is inside its base circle {base:.6g}; there is no involute there"
+        return
+    # the tips of the ring must not reach the foot of the involute of the gear
+    least = 1.0 - tan(acos(base / top)) / tan(met.working_angle)
+    if other.teeth / ring.teeth < least:
+        yield f"involutes of {other.name!r} and {ring.name!r} interfere: {other.teeth}/{ring.teeth} is below {least:.6g}"
+    if ring.teeth - other.teeth < 8 and _tips_meet(met, ring, other, top):
+        yield f"the tips of {other.name!r} and {ring.name!r} meet beside the line of centers: too few teeth apart"
+
+
+def _tips_meet(met: Parallel, ring: Gear, other: Gear, top: float) -> bool:
+    """Whether tips overlap where both tip circles cross (Niemann and Winter, 22.3)."""
+    d, out = met.distance, tip_radius(other)
+    cosine = (out**2 - top**2 - d**2) / (2 * d * top)
+    if abs(cosine) >= 1.0:
+        return False
+    inv = lambda x: tan(x) - x
+    at_ring = acos(cosine)
+    at_gear = acos(min(1.0, (out**2 + d**2 - top**2) / (2 * d * out)))
+    a, b = acos(other.base_radius / out), acos(abs(ring.base_radius) / top)
+    w = met.working_angle
+    return other.teeth * (inv(a) - inv(w) + pi - at_gear) < ring.teeth * (inv(b) - inv(w) + pi - at_ring)
+
+
+def _rack(met: WithRack, mesh: Mesh) -> MeshFacts:
+    pinion, a = met.pinion, met.pinion.transverse_angle
+    distance = -float((np.ravel(met.there.point - met.at.point)) @ np.ravel(met.there.mark))
+    tip = tip_radius(pinion)
+    # the tip line of the rack is a module above its pitch line
+    behind = (pinion.module - (distance - pinion.radius)) / sin(a)
+    length = sqrt(max(tip**2 - pinion.base_radius**2, 0.0)) - pinion.radius * sin(a) + behind
+    contact = length / (2 * pi * pinion.base_radius / pinion.teeth)
+    backlash = 2.0 * (distance - pinion.radius - pinion.module * pinion.shift) * tan(a) + mesh.backlash
+    faults = []
+    if pinion.shift < least_shift(pinion) - 1e-9:
+        faults.append(f"{pinion.name!r}: {pinion.teeth} teeth are undercut; expected a shift of {least_shift(pinion):.6g} or more")
+    nan = float("nan")
+
+    def both(value: float, other: float) -> tuple[float, float]:
+        return (value, other) if met.sign > 0 else (other, value)
+
+    return MeshFacts(
+        "rack", nan, distance, a, both(pinion.radius, np.inf), both(tip, nan), both(_root(pinion), nan),
+        (distance - pinion.radius) / pinion.module, contact, _overlap(met), backlash, both(backlash / pinion.radius, 0.0),
+        both(least_shift(pinion), nan), tuple(faults),
+    )  # fmt: skip
