@@ -17,7 +17,7 @@ from mechgraph.cli import app
 
 ROOT = Path(__file__).resolve().parents[1]
 PARTS = (
-    *("Parts", "bearings", "cardan_shaft", "cylinder", "four_bar", "gear_stage", "rack_and_pinion", "rod"),
+    *("Parts", "bearings", "cardan_shaft", "cylinder", "four_bar", "gear_stage", "planetary", "rack_and_pinion", "rod"),
     *("screw_drive", "slider_crank", "spring_strut"),
 )
 """Public names of the catalogue of parts."""

@@ -398,6 +398,12 @@ def declared_doors() -> list[tuple[str, Callable, tuple, dict]]:
         ),
         ("parts.four_bar", mg.parts.four_bar, ("j", "a", [(0, 0), (0, 1), (2, 1), (2, 0)], Z), {"mass": 1.0}),
         ("parts.slider_crank", mg.parts.slider_crank, ("j", "a", [(0, 0), (1, 0), (3, 0)], (1, 0), Z), {"mass": 1.0}),
+        (
+            "parts.planetary",
+            mg.parts.planetary,
+            ("j", 24, 30, 84, 3, True),
+            {"module": 1.0, "base": "f", "point": (0, 0, 0), "axis": Z, "pressure_angle": 0.3, "helix_angle": 0.0},
+        ),
         ("parts.Parts", mg.parts.Parts, ((), (), (), ()), {}),
         ("inertia.physical_faults", mg.inertia.physical_faults, (np.eye(3),), {"tol": 1e-9}),
     ]

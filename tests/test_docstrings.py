@@ -21,6 +21,7 @@ MODULES = {
         "cylinder",
         "four_bar",
         "gear_stage",
+        "planetary",
         "rack_and_pinion",
         "rod",
         "screw_drive",

@@ -207,6 +207,48 @@ def test_rack_and_gears_are_the_couplings_they_stand_for():
     assert mg.check(m).ratios == {"G.out.Rz": {"G.in.Rz": -0.5}}
 
 
+@pytest.mark.parametrize("helix", [0.0, 0.3])
+@pytest.mark.parametrize("floating", [True, False])
+def test_a_planetary_set_obeys_willis_and_a_floating_sun_shares_the_load(floating, helix):
+    """24/30/84: carrier 24/108 of the sun with the ring held; sun in the plane: T / (3 r_b) a planet; in a bearing: two too many."""
+    part = mg.parts.planetary("P", 24, 30, 84, module=0.002, floating=floating, helix_angle=helix)
+    drives, loads = ["P.sun.Rz", "P.ring.Rz"], [mg.Effort("P.carrier.Rz", -10.0)]
+    m = mg.Mechanism("set", parts=[part], drives=drives, loads=loads)
+    report = mg.check(m)
+    assert report.redundancy == (0 if floating else 2)
+    s = mg.solve(m, {"P.sun.Rz": [0.0, 1.0, 30.0], "P.ring.Rz": [0.0, 0.0, 2.0]})
+    sun, ring = np.array([0, 1, 30.0]), np.array([0, 0, 2.0])
+    np.testing.assert_allclose(s["P.carrier"].position[:, 0], (24 * sun + 84 * ring) / 108, atol=1e-9)
+    np.testing.assert_allclose(s["P.sun"].effort[:, -1], 10 * 24 / 108, rtol=1e-9)
+    np.testing.assert_allclose(s["P.ring"].effort[:, -1], 10 * 84 / 108, rtol=1e-9)
+    forces = np.array([np.linalg.norm(s.coupling(f"P.sun{i}").force, axis=-1) for i in (1, 2, 3)])
+    if floating and not helix:
+        base = 24 * 0.001 * np.cos(np.deg2rad(20))
+        np.testing.assert_allclose(forces, 10 * 24 / 108 / (3 * base), rtol=1e-9)
+    elif not floating:
+        assert np.isnan(forces).all()
+
+
+def test_a_planetary_set_in_the_plane_and_the_places_of_its_planets():
+    """20/17/54 by 3: 74 / 3 is no integer, so the planets stand at 0, 121.6216, 238.3784 degrees."""
+    part = mg.parts.planetary("P", 20, 17, 54, module=2.0, point=(10, 0))
+    m = mg.Mechanism("set", parts=[part], drives=["P.sun.Rz", "P.ring.Rz"], planar=True)
+    assert mg.check(m).determinate
+    places = [np.rad2deg(np.arctan2(p.point[1], p.point[0] - 10)) % 360 for p in m.pairs[3:]]
+    np.testing.assert_allclose(places, [0, 121.6216, 238.3784], atol=5e-5)
+    s = mg.kinematics(m, {"P.sun.Rz": [0.0, 2.0], "P.ring.Rz": 0.0})
+    np.testing.assert_allclose(s["P.carrier"].position[:, 0], [0, 2 * 20 / 74], atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["cylinder", "rod", "strut", "rack", "gears", "four-bar", "slider-crank"])
+def test_parts_of_two_numbers_fit_a_planar_mechanism(name):
+    part = FLAT[name]
+    m = mg.Mechanism("m", pairs=[mg.Pair("A", "R", "frame", "boom", point=(0, 0))], parts=[part], planar=True)
+    twin = mg.Mechanism("m", pairs=[PIN], parts=[part])
+    one, two = mg.check(m), mg.check(twin)
+    assert (one.mobility, one.redundancy) == (two.mobility, 0)
+
+
 def test_a_slider_crank_has_the_torque_of_the_books():
     """r .05, l .15, 60 degrees, 1000 N: F r (sin t + tan p cos t) = 50.8390, F tan p = 301.5113."""
     r, l, t = 0.05, 0.15, np.deg2rad(60)
@@ -235,6 +277,15 @@ PARTS = {
     "gears": mg.parts.gear_stage("P", "frame", (0, 0), (1, 0), Z, teeth=(20, 30), helix_angle=0.1),
     "four-bar": mg.parts.four_bar("P", "frame", [(0, 0), (0, 1), (3, 2), (4, 0)], mass=3.0),
     "slider-crank": mg.parts.slider_crank("P", "frame", [(0, 0), (1, 0), (4, 0)], (1, 0), mass=3.0),
+    "planetary": mg.parts.planetary("P", 24, 30, 84, module=0.002),
+}
+
+
+FLAT = {
+    "cylinder": mg.parts.cylinder("P", "frame", (1, -1), "boom", (1, 0), mass=4.0),
+    "rod": mg.parts.rod("P", "frame", (0, 1), "boom", (1, 0)),
+    **{name: PARTS[name] for name in ("strut", "gears", "four-bar", "slider-crank")},
+    "rack": mg.parts.rack_and_pinion("P", "frame", (0, 1), Z, (1, 0), radius=0.1),
 }
 
 
@@ -305,6 +356,8 @@ WRONG = {
     "a guide askew": (lambda: mg.parts.slider_crank("P", "a", [(0, 0), (1, 0), (2, 0)], Z), ["right angles"]),
     "no springs": (
         lambda: mg.parts.spring_strut("P", "a", (0, 0), "b", (1, 0), stiffness=-1.0, damping=-2.0), ["stiffness = -1.0", "damping = -2.0"]),
+    "planets that touch": (lambda: mg.parts.planetary("P", 24, 30, 84, 6, module=0.002), ["= 27; expected more than planet + 2 = 32"]),
+    "teeth that do not fit": (lambda: mg.parts.planetary("P", 24, 30, 80, module=0.002), ["expected sun + 2 planet = 84"]),
     "no part": (lambda: mg.Mechanism("m", pairs=[PIN], parts=[PIN]), ["parts = ", "mg.parts.rod"]),
     "names twice": (lambda: crane(jack(), jack()), ["'jack.tube' is declared 2 times", "'jack.lift' is declared 2 times"]),
 }  # fmt: skip

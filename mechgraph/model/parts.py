@@ -10,6 +10,7 @@ import functools
 import inspect
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import Any, ParamSpec
 
 import numpy as np
@@ -20,8 +21,8 @@ from mechgraph.fields import second_direction
 from mechgraph.maths import inertia
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import SHAPES
-from mechgraph.model.belts import Pulley
 from mechgraph.model.couplings import BaseCoupling, Rack, SpurGears
+from mechgraph.model.gears import Gear, Mesh
 from mechgraph.model.loads import Effort, Load, Spring
 from mechgraph.model.pair import Link, Pair
 from mechgraph.quantities import (
@@ -53,8 +54,8 @@ class Parts:
         Links that the part brings; it may name others.
     pairs : tuple of Pair
         Its pairs.
-    gears : tuple of Pulley
-        Its pulleys.
+    gears : tuple of gear
+        Its gears and pulleys.
     couplings : tuple of Coupling
         Its couplings.
     loads : tuple of load
@@ -70,7 +71,7 @@ class Parts:
 
     links: tuple[Link, ...] = ()
     pairs: tuple[Pair, ...] = ()
-    gears: tuple[Pulley, ...] = ()
+    gears: tuple[Any, ...] = ()
     couplings: tuple[BaseCoupling, ...] = ()
     loads: tuple[Load, ...] = ()
 
@@ -777,6 +778,109 @@ def gear_stage(
     )
     mesh = SpurGears(f"{name}.mesh", *turns, teeth, module, helix_angle=helix_angle, internal=internal)
     return Parts(pairs=pairs, couplings=(mesh,))
+
+
+@_part
+def planetary(
+    name: str,
+    sun: Count,
+    planet: Count,
+    ring: Count,
+    planets: Count = 3,
+    floating: bool = True,
+    *,
+    module: float,
+    base: str = "frame",
+    point: ArrayLike = (0.0, 0.0, 0.0),
+    axis: ArrayLike = PLANE_NORMAL,
+    pressure_angle: float = float(np.deg2rad(20.0)),
+    helix_angle: float = 0.0,
+) -> Parts:
+    """Return a planetary gear set: sun, ring and carrier, which turn on one link, and planets on the carrier.
+
+    Freedoms ``name.sun.Rz``, ``name.ring.Rz``, ``name.carrier.Rz``: two of them are driven or held, and ``z_s w_s + z_r w_r = (z_s + z_r)
+    w_c`` (Willis). A floating sun lies in a plane (E; Fr in a planar mechanism), so that statics shares the load among the planets; in a
+    bearing of its own it makes ``planets - 1`` shares redundant. Places of planets are whole multiples of ``2 pi / (z_s + z_r)``, the
+    nearest to equal ones. Links ``name.sun``, ``name.ring``, ``name.carrier``, ``name.planet1``, ...; couplings ``name.sun1``,
+    ``name.ring1``, ...
+
+    Parameters
+    ----------
+    name : str
+        Name of the part.
+    sun, planet, ring : int
+        Numbers of teeth, ``ring = sun + 2 planet``.
+    planets : int
+        Number of planets.
+    floating : bool
+        Whether the sun floats between the planets.
+    module : float
+        Normal module [length].
+    base : str
+        Link on which sun, ring and carrier turn.
+    point : (3,) or (2,) array_like
+        Center [length]. Two numbers are for a planar mechanism.
+    axis : (3,) array_like
+        Axis of all gears. Default: z.
+    pressure_angle : float
+        Of the flanks, in the normal section [rad]. Default: 20 degrees.
+    helix_angle : float
+        Of the sun, right-hand positive [rad].
+
+    Returns
+    -------
+    Parts
+
+    Raises
+    ------
+    DeclarationError
+        With every fault: teeth that do not fit, planets that touch each other.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> part = mg.parts.planetary("P", 24, 30, 84, module=0.002)
+    >>> m = mg.Mechanism("set", parts=[part], drives=["P.sun.Rz", "P.ring.Rz"])
+    >>> round(mg.check(m).ratios["P.carrier.Rz"]["P.sun.Rz"], 6)
+    0.222222
+    """
+    given = _Given("planetary", name, base=base)
+    center, z = given.point(point, "point"), given.direction(axis, "axis")
+    m = given.number(module, "module", positive=True)
+    if ring != sun + 2 * planet:
+        given.faults.append(
+            f"ring = {ring}: expected sun + 2 planet = {sun + 2 * planet}; other numbers take profile shifts: declare the gears one by one"
+        )
+    turns = [2 * np.pi * round(i * (sun + ring) / planets) / (sun + ring) for i in range(planets)]
+    apart = float(np.diff([*turns, 2 * np.pi]).min())
+    if planets > 1 and (sun + planet) * np.sin(apart / 2) <= planet + 2:
+        least = (sun + planet) * np.sin(apart / 2)
+        given.faults.append(
+            f"planets = {planets}: the tips of neighbors touch, (sun + planet) sin(half their angle) = {least:.4g}; expected more than "
+            f"planet + 2 = {planet + 2}"
+        )
+    given.end()
+    x = np.array(second_direction(z))
+    distance = m * (sun + planet) / 2 / np.cos(helix_angle)
+    at = [center + distance * (np.cos(t) * x + np.sin(t) * np.cross(z, x)) for t in turns]
+    made = partial(Gear, module=m, pressure_angle=pressure_angle)
+    of = {what: f"{name}.{what}" for what in ("sun", "ring", "carrier")}
+    sunk = ("Fr" if given.flat else "E") if floating else "R"
+    pairs = [
+        Pair(of[what], type_, base, of[what], point=center, axis=z)
+        for what, type_ in (("sun", sunk), ("ring", "R"), ("carrier", "R"))
+    ]
+    gears = [
+        made(of["sun"], of["sun"], sun, center, z, helix_angle=helix_angle),
+        made(of["ring"], of["ring"], ring, center, z, helix_angle=-helix_angle, internal=True),
+    ]
+    meshes = []
+    for i, p in enumerate(at, 1):
+        wheel = f"{name}.planet{i}"
+        pairs.append(Pair(wheel, "R", of["carrier"], wheel, point=p, axis=z))
+        gears.append(made(wheel, wheel, planet, p, z, helix_angle=-helix_angle))
+        meshes += [Mesh(f"{name}.sun{i}", of["sun"], wheel), Mesh(f"{name}.ring{i}", wheel, of["ring"])]
+    return Parts(pairs=tuple(pairs), gears=tuple(gears), couplings=tuple(meshes))
 
 
 @_part
