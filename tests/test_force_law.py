@@ -512,3 +512,16 @@ def test_directions_in_files_studies_and_errors(tmp_path) -> None:
         plane.replace(loads=[spring.replace(along=(1, 0, 1))])
     with pytest.raises(mg.DeclarationError, match=r"along = .*length 0"):
         block(spring.replace(along=(0, 0, 0)))
+
+
+def test_a_direction_out_of_the_plane_has_no_planar_twin() -> None:
+    """In the plane only a part of such a spring would act: it is refused, not turned into another one."""
+    pairs = [
+        mg.Pair("P", "P", "frame", "block", point=(0, 0, 0), axis=X),
+        mg.Pair("R", "R", "block", "arm", point=(0, 0, 0), axis=(0, 0, 1)),
+    ]
+    spring = mg.Spring("frame", "arm", (0, 0, 0), (0, 0.2, 0), 9.0, along=(1, 0, 1))
+    m = mg.Mechanism("both", pairs=pairs, drives=["P", "R"], loads=[spring])
+    with pytest.raises(mg.DeclarationError, match=r"along = \(1.0, 0.0, 1.0\): leaves the plane"):
+        m.to_planar()
+    assert m.replace(loads=[spring.replace(along=(1, 1, 0))]).to_planar().planar

@@ -19,6 +19,7 @@ import scipy
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import (
     BREAKS,
+    DIRECTION,
     FREEDOM_NAME,
     LINK_NAME,
     NAMED_POINT,
@@ -33,7 +34,6 @@ from mechgraph.fields import (
     VECTOR_SERIES,
     Described,
     same_fields,
-    vector_fault,
 )
 from mechgraph.maths.se3 import Array, rotate
 from mechgraph.model.pair import Nameable
@@ -459,13 +459,13 @@ class _ByPlace(Law):
                 f"{self.where}along = {shown(self.along)}: beside the freedom {shown(self.freedom)}, which has its own; leave it out"
             ]
         found = super().faults(names)
-        if self.along is not None and not found and (fault := vector_fault(self.along, "along", direction=True)):
-            found.append(self.where + fault)
+        if self.along is not None and not found and names.planar and self.along[2]:
+            found.append(f"{self.where}along = {shown(self.along)}: leaves the plane; expected z = 0, or two numbers")
         return found
 
 
 _Along = Annotated[
-    Any, VECTOR("fixed direction in the frame of link a: `x` is the part of `q - p` along it", default="from p to q")
+    Any, DIRECTION("fixed direction in the frame of link a: `x` is the part of `q - p` along it", default="from p to q")
 ]
 
 

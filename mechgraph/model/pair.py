@@ -162,6 +162,10 @@ class Nameable(Protocol):
     def link_index(self) -> Mapping[str, int]:
         """Place of every link, by name."""
 
+    @property
+    def planar(self) -> bool:
+        """Whether it is a planar one."""
+
     def freedom_fault(self, name: Any, *, single: bool) -> str | None:
         """Why ``name`` is no freedom (with ``single``: no single freedom), or None."""
 
