@@ -256,7 +256,8 @@ class Film:
         self.bodies = [
             one
             for one in self.found.parts
-            if self.found.normal is not None and (one.role in BODIES or one.frame in ground or one.owner in self.slides)
+            if self.found.normal is not None
+            and (one.role in BODIES or (one.role == "foot" and one.frame in ground) or one.owner in self.slides)
         ]
         profiles = {(part.owner, part.link) for part in self.found.parts if part.role == "wheel" and part.shape.faces}
         self.lines: list[tuple[str, str, Any]] = []
