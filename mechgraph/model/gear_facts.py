@@ -202,7 +202,9 @@ def _rack(met: WithRack, mesh: Mesh) -> MeshFacts:
     backlash = 2.0 * (distance - pinion.radius - pinion.module * pinion.shift) * tan(a) + mesh.backlash
     faults = []
     if pinion.shift < least_shift(pinion) - 1e-9:
-        faults.append(f"{pinion.name!r}: {pinion.teeth} teeth are undercut; expected a shift of {least_shift(pinion):.6g} or more")
+        faults.append(
+            f"{pinion.name!r}: {pinion.teeth} teeth are undercut; expected a shift of {least_shift(pinion):.6g} or more"
+        )
     nan = float("nan")
 
     def both(value: float, other: float) -> tuple[float, float]:

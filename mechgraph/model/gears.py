@@ -515,7 +515,13 @@ class Mesh(LineCoupling):
             for p, q in (one, two):
                 w, d = cross(p.axis, q.axis), q.point - p.point
                 square = _dot(w, w)
-                places.append((_dot(d, w) / np.sqrt(square), _dot(cross(d, q.axis), w) / square, _dot(cross(d, p.axis), w) / square))
+                places.append(
+                    (
+                        _dot(d, w) / np.sqrt(square),
+                        _dot(cross(d, q.axis), w) / square,
+                        _dot(cross(d, p.axis), w) / square,
+                    )
+                )
             apart, along_a, along_b = (now - then for now, then in zip(*places, strict=True))
             found += [apart, *(along for along, held in zip((along_a, along_b), self.held, strict=True) if held)]
         return np.asarray(np.abs(found).max(axis=0))

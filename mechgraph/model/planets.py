@@ -56,7 +56,9 @@ def planet_places(sun: int, ring: int, n: int) -> Array:
         gaps = np.diff(np.append(found, 2 * pi))
         room = float((sun + planet) * np.sin(min(gaps.min(), pi) / 2)) if n > 1 else np.inf
         if room <= planet + 2:
-            faults.append(f"n = {n}: neighbors overlap, ({sun} + {planet}) sin(half their angle) = {room:.6g}; expected more than {planet + 2}")
+            faults.append(
+                f"n = {n}: neighbors overlap, ({sun} + {planet}) sin(half their angle) = {room:.6g}; expected more than {planet + 2}"
+            )
     if faults:
         raise DeclarationError("planet_places", faults)
     return np.asarray(found)
