@@ -558,3 +558,119 @@ def test_a_part_with_two_numbers_a_point_is_planar() -> None:
     assert mg.check(m).verdict == "Determinate (planar): 1 driver, 9 unknowns, 9 equations; every reaction is unique."
     arm = 1.0 * 1.0 / np.hypot(0.5, 1.0)  # of the line of the eyes about O
     assert mg.solve(m, {"jack.lift.Tz": 0.0})["jack.lift"].effort == pytest.approx(10 * 9.81 * 1.0 / arm, rel=1e-9)
+
+
+# --- gears and belts on links --------------------------------------------------------------------------------------------
+
+
+def stage(helix: float = 0.0, **more) -> mg.Mechanism:
+    """Two gears without axes on pins."""
+    far = (0.06 / np.cos(helix), 0.0)
+    pairs = [mg.Pair("A", "R", "frame", "pinion", point=(0, 0)), mg.Pair("B", "R", "frame", "wheel", point=far)]
+    gears = [
+        mg.Gear("g1", "pinion", 20, (0, 0), module=0.002, helix_angle=helix),
+        mg.Gear("g2", "wheel", 40, far, module=0.002, helix_angle=-helix),
+    ]
+    return mg.Mechanism(
+        "stage",
+        pairs=pairs,
+        gears=gears,
+        couplings=[mg.Mesh("m", "g1", "g2")],
+        drives=["A"],
+        loads=[mg.Effort("B", 6.0)],
+        planar=True,
+        **more,
+    )
+
+
+@pytest.mark.parametrize("helix", [0.0, 0.2])
+def test_gears_press_as_in_space(helix: float) -> None:
+    """Closed form: tangential T / r with r = m z / 2 cos b, radial that times tan of the transverse angle (Shigley, 13-10)."""
+    m, r = stage(helix), 0.02 / np.cos(helix)
+    tangential, radial = 3.0 / r, 3.0 / r * np.tan(np.radians(20)) / np.cos(helix)
+    for engine in ENGINES:
+        for method in METHODS:
+            s = mg.solve(m, {"A": [0.1, 0.2]}, engine=engine, method=method)
+            assert np.allclose(np.abs(s["A"].force), [radial, tangential, 0.0], rtol=1e-9)
+    assert mg.check(m).verdict == "Determinate (planar): 1 driver, 6 unknowns, 6 equations; every reaction is unique."
+    assert m.to_spatial().to_planar() == m
+    with pytest.raises(mg.DeclarationError, match="axis: is missing"):
+        m.replace(planar=False, gears=[mg.Gear("g1", "pinion", 20, (0, 0, 0), module=0.002), m.gears[1]])
+    with pytest.raises(mg.DeclarationError, match="leave it out"):
+        m.replace(gears=[m.gears[0].replace(axis=(0, 1, 1)), m.gears[1]])
+    with pytest.raises(mg.DeclarationError, match="worm 'g1': meshes across the plane"):
+        m.replace(gears=[mg.Worm("g1", "pinion", 1, (0, 0), (1, 0), radius=0.01), m.gears[1]])
+
+
+def test_a_rack_takes_the_force_of_its_pinion() -> None:
+    gears = [
+        mg.Gear("g", "pinion", 20, (0, 0), module=0.002),
+        mg.GearRack("r", "slide", (0, -0.02), (1, 0), (0, 1), module=0.002),
+    ]
+    pairs = [
+        mg.Pair("A", "R", "frame", "pinion", point=(0, 0)),
+        mg.Pair("B", "P", "frame", "slide", point=(0, -0.02), axis=(1, 0)),
+    ]
+    couplings, loads = [mg.Mesh("m", "g", "r")], [mg.Effort("B", 1.0)]
+    m = mg.Mechanism("rack", pairs=pairs, gears=gears, couplings=couplings, drives=["A"], loads=loads, planar=True)
+    s = mg.solve(m, {"A": 0.1})
+    assert np.allclose(s["A"].force, [-1.0, -np.tan(np.radians(20)), 0.0])
+    assert s["A"].effort == pytest.approx(-0.02)
+    assert m.to_spatial().to_planar() == m
+
+
+def test_a_floating_sun_shares_its_load() -> None:
+    """Three planets at 120 degrees press with T / (3 rb) each; in a bearing the sun is redundant twice."""
+    module, zs, zp, zr = 0.002, 18, 18, 54
+    places = [0.036 * np.array([np.cos(t), np.sin(t)]) for t in 2 * np.pi * np.arange(3) / 3]
+    gears = [
+        mg.Gear("s", "sun", zs, (0, 0), module=module),
+        mg.Gear("r", "frame", zr, (0, 0), module=module, internal=True),
+    ]
+    gears += [mg.Gear(f"p{i}", f"planet{i}", zp, at, module=module) for i, at in enumerate(places)]
+    meshes = [mg.Mesh(f"{a}{i}", *ends) for i in range(3) for a, ends in (("s", ("s", f"p{i}")), ("r", (f"p{i}", "r")))]
+    for symbol, redundancy in (("Fr", 0), ("R", 2)):
+        pairs = [
+            mg.Pair("C", "R", "frame", "carrier", point=(0, 0)),
+            mg.Pair("S", symbol, "frame", "sun", point=(0, 0)),
+        ]
+        pairs += [mg.Pair(f"P{i}", "R", "carrier", f"planet{i}", point=at) for i, at in enumerate(places)]
+        m = mg.Mechanism(
+            "set",
+            pairs=pairs,
+            gears=gears,
+            couplings=meshes,
+            drives=["S.Rz"],
+            loads=[mg.Effort("C", -8.0)],
+            planar=True,
+        )
+        assert mg.check(m).redundancy == redundancy
+        if not redundancy:
+            s = mg.solve(m, {"S.Rz": [0.0, 0.1]})
+            force = 2.0 / (3 * 0.018 * np.cos(np.radians(20)))
+            assert np.allclose([np.linalg.norm(s.coupling(f"s{i}").force, axis=-1) for i in range(3)], force, rtol=1e-9)
+
+
+def test_a_belt_over_pulleys_without_axes() -> None:
+    """T0 +- M / 2r; the pins carry what both spans pull."""
+    places = {"p": (0, 0), "w": (0.2, 0)}
+    pairs = [mg.Pair(k, "R", "frame", k, point=at) for k, at in places.items()]
+    gears = [mg.Pulley(k, k, at, radius=r) for (k, at), r in zip(places.items(), (0.05, 0.1), strict=True)]
+    belt = mg.BeltDrive("B", over=["p", "w"], pretension=300.0)
+    m = mg.Mechanism(
+        "belt", pairs=pairs, gears=gears, couplings=[belt], drives=["p"], loads=[mg.Effort("w", -20.0)], planar=True
+    )
+    for engine in ENGINES:
+        s = mg.solve(m, {"p": 0.5}, engine=engine)
+        assert s.coupling("B").tension["p-w"] == pytest.approx(200.0)
+        assert s["w"].magnitude == pytest.approx(mg.solve(m.to_spatial(), {"p": 0.5}, engine=engine)["w"].magnitude)
+    assert m.to_spatial().to_planar() == m
+
+
+def test_friction_of_pins_and_guides_in_the_plane() -> None:
+    m = slider_crank()
+    loads = [*m.loads, mg.Friction("D", mu=0.2, length=0.05, width=0.02), mg.Friction("C", mu=0.1, radius=0.02)]
+    motion = {"A": mg.Motion(np.linspace(0.3, 2, 4), velocity=3.0)}
+    s, twin = (mg.solve(one, motion, loads=loads) for one in (m, m.to_spatial()))
+    assert np.allclose(s["A"].effort, twin["A"].effort, rtol=1e-10)
+    assert not np.allclose(s["A"].effort, mg.solve(m, motion)["A"].effort, rtol=1e-2)

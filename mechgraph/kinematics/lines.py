@@ -89,7 +89,10 @@ class LineRows:
     def wrenches(self, poses: Array, other: bool = False) -> Array:
         """Unit forces on b along the lines, ``(6, n, T)`` about the internal origin."""
         at = self.lines(poses, other)
-        return np.concatenate([cross(at.point, at.along), at.along])
+        out = np.concatenate([cross(at.point, at.along), at.along])
+        if self.system.m.planar:  # of gears with a helix the axial force leaves the plane
+            out[np.delete(np.arange(6), self.system.graph.span)] = 0.0
+        return out
 
     @property
     def scale(self) -> Array:

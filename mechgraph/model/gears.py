@@ -18,7 +18,7 @@ gear pairs.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from math import atan, cos, pi, sin, tan
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
@@ -172,6 +172,8 @@ class _Toothed(Described):
     def value_faults(self, where: str) -> list[str]:
         """See ``Described``."""
         found = super().value_faults(where)
+        if self.axis is None:  # type: ignore[attr-defined]
+            found.append(f"{where}axis: is missing; give a direction, e.g. (0, 0, 1) (planar=True needs none)")
         for name in ("pressure_angle", "helix_angle", "spiral_angle"):
             value = getattr(self, name, 0.0)
             if not found and abs(value) >= 1.2:
@@ -229,8 +231,8 @@ class Gear(_Involute):
     link: Annotated[str, LINK_NAME("the link on which it is")]
     teeth: Annotated[int, INTEGER("number of teeth")]
     point: Annotated[Any, _POINT]
-    axis: Annotated[Any, DIRECTION("its axis")]
-    module: Annotated[float, _MODULE]
+    axis: Annotated[Any, DIRECTION("its axis", normal=True, default="in a plane its normal")] = None
+    module: Annotated[float, _MODULE] = field(kw_only=True)
     pressure_angle: Annotated[float, _PRESSURE] = _FULL
     helix_angle: Annotated[float, _HELIX] = 0.0
     shift: Annotated[float, NUMBER("profile shift, in modules; outwards positive")] = 0.0

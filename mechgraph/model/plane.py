@@ -237,7 +237,11 @@ def plane_faults(
             found += _pair_faults(pair)
     for gear in gears:
         if isinstance(gear, Described):
-            found += _leaving(gear, f"{getattr(gear, 'kind', 'gear')} {shown(getattr(gear, 'name', ''))}: ")
+            where = f"{getattr(gear, 'kind', 'gear')} {shown(getattr(gear, 'name', ''))}: "
+            if "axis" in gear.formats and not gear.formats["axis"].normal:
+                found.append(f"{where}meshes across the plane; expected Gear, GearRack or Pulley in a planar mechanism")
+            else:
+                found += _leaving(gear, where)
     for load in loads:
         if isinstance(load, Described):
             found += _leaving(load, getattr(load, "where", ""))
