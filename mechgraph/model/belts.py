@@ -41,7 +41,7 @@ from mechgraph.fields import (
     second_direction,
 )
 from mechgraph.maths.se3 import Array, cross, identity
-from mechgraph.model.couplings import MeshStep, fitting_of, motion_of
+from mechgraph.model.couplings import MeshStep, are_placed, fitting_of, motion_of
 from mechgraph.model.lines import LineCoupling, LinesAt, LinkPlace, Places, Relation, meeting, pose_along, way
 from mechgraph.quantities import FORCE, LENGTH, shown, unknown, wrong
 
@@ -272,7 +272,7 @@ class BeltDrive(LineCoupling):
         """What is wrong with it in a mechanism, one line each."""
         where = f"coupling {shown(self.name)}: "
         found = [where + fault for fault in (self.value_faults("") or self._name_faults(m))]
-        if found or not m.has_geometry or any(pair.faults() for pair in m.pairs):
+        if found or not m.has_geometry or not m.once(are_placed):
             return found
         return [where + fault for fault in self._misfits(m)]
 
@@ -280,7 +280,7 @@ class BeltDrive(LineCoupling):
         """Pulleys that are none, or stand where no belt runs."""
         if len(self.over) < 2:
             yield wrong(self.over, "over", "two pulleys or more")
-        known = {p.name for p in m.gears if isinstance(p, Pulley)}
+        known = m.once(_pulley_names)
         for name in self.over:
             if name not in known:
                 yield f"over: {unknown('pulley', name, known)}"
@@ -464,6 +464,11 @@ class BeltDrive(LineCoupling):
         return course(np.stack(centers, axis=1), z[:, None], self.senses * [p.pitch_radius for p in pulleys])
 
 
+def _pulley_names(m: Any) -> frozenset[str]:
+    """Names of the pulleys of a mechanism."""
+    return frozenset(p.name for p in m.gears if isinstance(p, Pulley) and isinstance(p.name, str))
+
+
 def place_of(p: Pulley) -> LinkPlace:
     """The place of a pulley on its link."""
     return LinkPlace(p.link, p.point, p.axis, second_direction(p.axis))
@@ -544,7 +549,8 @@ def _turns_of(m: Any, steps: Sequence[MeshStep], a: LinkPlace, b: LinkPlace) -> 
         pair, X = m.pairs[step.pair], pose_along(m, tuple(steps[:i]))
         if not pair.type.f:
             continue
-        beside = [k for k, _ in m.once(meeting)[pair.a] if {m.pairs[k].a, m.pairs[k].b} == {pair.a, pair.b}]
+        near = min((m.once(meeting)[link] for link in (pair.a, pair.b)), key=len)
+        beside = [k for k, _ in near if {m.pairs[k].a, m.pairs[k].b} == {pair.a, pair.b}]
         ways = [
             step,
             *(MeshStep(k, step.sense if m.pairs[k].a == pair.a else -step.sense) for k in beside if k != step.pair),

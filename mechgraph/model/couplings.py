@@ -329,7 +329,7 @@ class Contact(BaseCoupling):
         steps = self._way(m)
         if isinstance(steps, str):
             return [where + steps]
-        if not m.once(_are_placed):
+        if not m.once(are_placed):
             return []
         placed = self._axes(m, steps)
         wrong = [placed] if isinstance(placed, str) else self.misfits(placed.axes, fitting_of(m))
@@ -449,7 +449,7 @@ def fitting_of(m: Any) -> float:
     return max(SHAPES.met, 2.0 * sound_tol(m.tol))
 
 
-def _are_placed(m: Any) -> bool:
+def are_placed(m: Any) -> bool:
     """Whether every pair says where it sits, without faults."""
     return all(pair.has_geometry and not pair.faults() for pair in m.pairs)
 

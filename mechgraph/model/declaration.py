@@ -140,6 +140,11 @@ class Parts(Formatted, Once):
         return MappingProxyType(_places(pair.name for pair in self.pairs))
 
     @cached_property
+    def gear_index(self) -> Mapping[str, int]:
+        """Place of every gear and pulley, by name."""
+        return MappingProxyType(_places(gear.name for gear in self.gears))
+
+    @cached_property
     def pair_ends(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Indices of the links a and b of every pair, ``(P,)`` each; -1 for what is no link."""
         place = self.link_index.get
@@ -168,7 +173,7 @@ class Parts(Formatted, Once):
 
     def gear(self, name: str) -> Any:
         """The gear or pulley of that name."""
-        return self.gears[self._index(name, _places(c.name for c in self.gears), "gear")]
+        return self.gears[self._index(name, self.gear_index, "gear")]
 
     def coupling(self, name: str) -> BaseCoupling:
         """The coupling of that name."""
