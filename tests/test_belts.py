@@ -394,6 +394,43 @@ def test_it_is_written_out_and_comes_back_equal(tmp_path: Path):
     np.testing.assert_allclose(s.tension["p-w"], t.tension["p-w"], rtol=1e-12)
 
 
+def test_the_spans_of_a_belt_stay_together():
+    m = drive(pretension=300.0)
+    one, two = m.couplings
+    with pytest.raises(mg.DeclarationError, match="its belt 'B' lacks w-p"):
+        m.replace(couplings=[one])
+    with pytest.raises(mg.DeclarationError, match="lacks w-p"):
+        m.replace(couplings=[one, two.replace(pretension=5.0)])
+    with pytest.raises(mg.DeclarationError, match="belong to the whole belt"):
+        mg.study(
+            m, {"B.w-p.pretension": [1.0, 2.0]}, {"T": lambda s: s.coupling("B").tension["p-w"]}, 3, motions={"p": 0.0}
+        )
+    both = m.replace(couplings=[c.replace(pretension=5.0) for c in m.couplings])
+    assert mg.solve(both, {"p": 0.0}).coupling("B").tension["p-w"] == pytest.approx(5.0)
+    assert not mg.check(m).advice
+
+
+def test_variants_move_the_centers():
+    m = tensioner([mg.Effort("arm", 12.0)])
+    found = mg.study(
+        m, {"arm.point.x": [0.34, 0.36]}, {"T": lambda s: s.coupling("B").tension["w-i"]}, 2, motions={"p": [0.0, 1.0]}
+    )
+    for i in range(2):
+        alone = mg.solve(found.variant(i), {"p": [0.0, 1.0]}).coupling("B").tension["w-i"]
+        np.testing.assert_allclose(found.outputs["T"][i], alone, rtol=1e-9)
+
+
+def test_a_belt_in_the_plane_is_the_spatial_one():
+    m = tensioner([mg.Effort("arm", 12.0), mg.Effort("w", 5.0)])
+    flat = m.to_planar()
+    assert mg.check(flat).determinate
+    one, two = (mg.solve(each, {"p": [0.0, 2.0, 30.0]}) for each in (m, flat))
+    for name in ("p-w", "w-i", "i-p"):
+        np.testing.assert_allclose(one.coupling("B").tension[name], two.coupling("B").tension[name], rtol=1e-11)
+    np.testing.assert_allclose(one["w"].force[:, :2], two["w"].force[:, :2], rtol=1e-11, atol=1e-9)
+    assert flat.to_spatial() == m
+
+
 def test_teeth_and_pitch_make_the_radius():
     p = mg.Pulley("p", "p", (0, 0, 0), Z, teeth=20, pitch=5.0)
     assert p.pitch_radius == pytest.approx(RADII[0])

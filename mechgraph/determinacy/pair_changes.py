@@ -165,6 +165,8 @@ def changes_of(freedoms: Freedoms) -> list[Change]:
             made = _changes_to(group.row, new, frames[:, :, some], stress[pairs], pairs)
             out += [(c.item, 2 * number + turned, c) for turned, c in made]
     for i, power in enumerate(states[rows.count - rows.further :, None]):
+        if not system.m.couplings[i].alone:
+            continue
         relief = int(_ranks(power[None])[0])
         out.append((len(rows.graph.ends) + i, 0, Change(len(rows.graph.ends) + i, None, power, 1, relief)))
     return [c for _, _, c in sorted(out, key=lambda item: item[:2])]

@@ -207,6 +207,7 @@ class BeltDrive(LineCoupling):
     """
 
     kind: ClassVar[str] = "belt_drive"
+    alone: ClassVar[bool] = False
     name: Annotated[str, TEXT("differs from all pairs and couplings", default="g1, g2, ...")]
     over: Annotated[Any, NAMES("its pulleys, in the order in which it runs")]
     backs: Annotated[Any, NAMES("those of them that its back runs over", default="none")] = ()
@@ -300,8 +301,19 @@ class BeltDrive(LineCoupling):
             yield f"its pulleys have the pitches {', '.join(f'{p:g}' for p in sorted(pitches))}; give all the same"
         if self.polygon and any(p.teeth is None for p in pulleys):
             yield "polygon = True: needs teeth= and pitch= of all its sprockets"
+        if self.span is not None and (others := self._unlike(m)):
+            yield f"its belt {self.belt!r} lacks {others}; declare the whole belt, mg.BeltDrive({self.belt!r}, over=[...])"
         if self.span is not None and not 0 <= self.span < len(self.over):
             yield wrong(self.span, "span", f"a place among the {len(self.over)} spans, from 0")
+
+    def _unlike(self, m: Any) -> str:
+        """Spans that are missing beside one of a belt, or have other numbers than it; told by the first one there is."""
+        there = {c.span: c for c in m.once(_spans_of)[self.belt]}
+        if there[min(there)] is not self and there.get(self.span) is self:
+            return ""
+        plain = {"name": "", "span": None}
+        alike = {k for k, c in there.items() if c.replace(**plain) == self.replace(**plain)}
+        return ", ".join(name for k, name in enumerate(self.span_names) if k not in alike)
 
     def _misfits(self, m: Any) -> Iterator[str]:
         """What is wrong with the places of its pulleys."""
@@ -462,6 +474,15 @@ class BeltDrive(LineCoupling):
         z = np.einsum("ijt,j->it", poses[0][:3, :3], pulleys[0].axis)
         z /= np.sqrt((z * z).sum(axis=0))
         return course(np.stack(centers, axis=1), z[:, None], self.senses * [p.pitch_radius for p in pulleys])
+
+
+def _spans_of(m: Any) -> dict[str, list[Any]]:
+    """The spans of every belt of a mechanism, by its name."""
+    found: dict[str, list[Any]] = {}
+    for c in m.couplings:
+        if isinstance(c, BeltDrive) and c.span is not None:
+            found.setdefault(c.belt, []).append(c)
+    return found
 
 
 def _pulley_names(m: Any) -> frozenset[str]:

@@ -57,6 +57,9 @@ class BaseCoupling(Described, ABC):
     steps: tuple[Any, ...] = ()
     """Pairs on the way along which the force of the coupling is closed, where it acts along a line of its own."""
 
+    alone: ClassVar[bool] = True
+    """Whether it stands for itself, so that it may be left out and its numbers varied without others."""
+
     @property
     def freedoms(self) -> tuple[str, ...]:
         """Names of the freedoms, in order."""

@@ -264,6 +264,8 @@ def _coupling_field(m: Mechanism, index: int, rest: str) -> Field | ItemField | 
         return Field("couplings", ((own.stop,),))
     if rest == "constant":
         return f"'{c.name}.constant': coupling {c.name!r} keeps the value that it has at the start; declare constant="
+    if not c.alone:
+        return f"'{c.name}.{rest}': its numbers belong to the whole belt; declare a mechanism for each, or vary pairs, links and loads"
     if not c.varies:
         found = _component(c, rest)
         if found is not None:
