@@ -158,12 +158,19 @@ def test_gears_further_apart_have_backlash_on_both_sides() -> None:
         assert away(p, w).min() == pytest.approx(play / 2, rel=0.05)
 
 
-def test_a_marked_tooth_stays_where_it_is_declared() -> None:
-    found = scene(mg.kinematics(stage(60.0, mark=(0, 1, 0)), {"p": [0.0]}))
-    for outline, center in zip(outlines(found, 0), ([0.0, 0.0], [60.0, 0.0]), strict=True):
-        up = (outline - center)[:-1]
-        tip = up[up[:, 1] > up[:, 1].max() - 1e-6]
+def test_marked_teeth_stay_where_they_are_declared() -> None:
+    """Nothing is turned so that they fit: a mark that points up, and one half a pitch off that, stand in gaps as they are."""
+    m = stage(60.0)
+    p, w = m.gears
+    up, off = (0.0, 1.0, 0.0), (np.sin(np.pi / 40), np.cos(np.pi / 40), 0.0)
+    found = scene(mg.kinematics(m.replace(gears=[p.replace(mark=up), w.replace(mark=off)]), {"p": [0.0, 0.1]}))
+    for outline, center, mark in zip(outlines(found, 0), ([0.0, 0.0], [60.0, 0.0]), (up, off), strict=True):
+        above = (outline - center)[:-1] @ np.array([[mark[1], mark[0]], [-mark[0], mark[1]]])
+        tip = above[above[:, 1] > above[:, 1].max() - 1e-6]
         assert tip[:, 0].mean() == pytest.approx(0.0, abs=1e-9)
+    for t in range(2):
+        a, b = outlines(found, t)
+        assert max(overlap(a, b), overlap(b, a)) < 0.02 * 2.0
 
 
 def test_planets_mesh_with_sun_and_ring() -> None:
