@@ -30,6 +30,7 @@ from mechgraph.errors import (
     ShapeError,
     StudyError,
 )
+from mechgraph.exchange.curve_files import write_curve
 from mechgraph.exchange.files import load, save
 from mechgraph.fields import Formatted
 from mechgraph.graph.atlas import (
@@ -70,6 +71,7 @@ from mechgraph.pairs.journal import Journal
 from mechgraph.pairs.pair_type import PairType, pair_types
 from mechgraph.pairs.seats import Misfit, Stiffness
 from mechgraph.pairs.surfaces import Surface
+from mechgraph.pairs.travelling import cutter_path
 from mechgraph.quantities import with_clear_calls
 from mechgraph.response.equilibrium import equilibrium, linearize
 from mechgraph.response.respond import Response, respond
@@ -127,6 +129,8 @@ methods.TABLE |= {
     "draw_assemblies": _draw_assemblies,
     "draw_branches": _draw_branches,
     "film": film_of,
+    "cutter_path": cutter_path,
+    "write_curve": write_curve,
 }
 
 

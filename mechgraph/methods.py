@@ -8,7 +8,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Literal
 
-Name = Literal["snapped", "equivalent", "to_planar", "to_spatial", "view", "draw_assemblies", "draw_branches", "film"]
+Name = Literal[
+    "snapped",
+    "equivalent",
+    "to_planar",
+    "to_spatial",
+    "view",
+    "draw_assemblies",
+    "draw_branches",
+    "film",
+    "cutter_path",
+    "write_curve",
+]
 TABLE: dict[Name, Callable[..., Any]] = {}
 
 

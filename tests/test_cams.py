@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
+from mechgraph.pairs.curves import Travel
 
 Z = (0, 0, 1)
 D = np.deg2rad
@@ -377,3 +378,74 @@ def test_rounded_samples_are_smoothed():
     miss = [np.abs(read.at(u)[2] - law.at(u)[2]).max() / size for read in (smooth, through)]
     assert miss[0] < 0.02
     assert miss[1] > 3
+
+
+# --- paths of cutters and drawings -----------------------------------------------------------------------------------
+
+
+def test_the_path_of_a_cutter_less_its_radius_is_the_profile():
+    """Acceptance: every point of the profile is the radius of the cutter from its path, and no point is nearer."""
+    cam = SHAPES["cam"]
+    s = np.linspace(0, cam.once(Travel).length, 801)
+    profile, path = (cam.cutter_path(r).at(s)[0] for r in (0.0, 0.016))
+    np.testing.assert_allclose(np.linalg.norm(path - profile, axis=0), 0.016, rtol=1e-12)
+    near = np.linalg.norm(path[:, ::40, None] - profile[:, None], axis=0).min(axis=1)
+    np.testing.assert_allclose(near, 0.016, rtol=1e-9)
+    assert cam.cutter_path(0.01) is cam
+    u = np.linspace(0, 6, 301)
+    assert np.abs(np.linalg.norm(SHAPES["flat"].cutter_path(0.0).at(u)[0], axis=0)).min() >= 0.04 - 1e-12
+
+
+def test_a_cutter_too_large_is_refused():
+    """By the least radius of curvature where the profile is hollow."""
+    law = double_dwell("poly345", rise=0.03, over=1.2)
+    cam = mg.Curve.cam(law=law, base_radius=0.03, roller_radius=0.006)
+    radii = cam.facts(np.linspace(0, 2 * np.pi, 40001)).profile_radius
+    least = -radii[radii < 0].max()
+    cam.cutter_path(0.99 * least)
+    with pytest.raises(mg.DeclarationError, match="the profile is hollow with the radius"):
+        cam.cutter_path(1.01 * least)
+    with pytest.raises(mg.DeclarationError, match="a groove is cut along the path of its roller"):
+        SHAPES["barrel"].cutter_path(0.01)
+
+
+@pytest.mark.parametrize("form", ["spline", "polyline"])
+def test_a_drawing_read_back_is_the_cam_within_the_chord_error(form, tmp_path):
+    """Read by ezdxf: points of every entity, flattened finely, against points of the curves, and the other way round."""
+    ezdxf = pytest.importorskip("ezdxf")
+    cam, error = SHAPES["cam"], 1e-5
+    cam.write(tmp_path / "cam.dxf", error=error, cutter=0.016, form=form, unit="m")
+    drawing = ezdxf.readfile(tmp_path / "cam.dxf")
+    assert drawing.header["$INSUNITS"] == 6
+    length = cam.once(Travel).length
+    for layer, radius in (("PROFILE", 0.0), ("PITCH", 0.01), ("CUTTER", 0.016)):
+        (entity,) = drawing.modelspace().query(f'*[layer=="{layer}"]')
+        if form == "spline":
+            read = np.array([tuple(p) for p in entity.flattening(error / 50, segments=64)])
+        else:
+            corners = np.array([tuple(v.dxf.location) for v in entity.vertices])
+            ends = np.roll(corners, -1, axis=0)
+            read = (corners[:, None] + (ends - corners)[:, None] * np.linspace(0, 1, 9)[:, None]).reshape(-1, 3)
+        curve = cam.cutter_path(radius)
+        u = np.linspace(0, 2 * np.pi if radius == 0.01 else length, 20001)
+        true = curve.at(u)[0].T
+        for one, other in ((read[::31], true), (true[::397], read)):
+            near = np.array([np.linalg.norm(other - p, axis=1).min() for p in one])
+            grain = 0.5 * np.linalg.norm(np.diff(other, axis=0), axis=1).max()
+            assert near.max() < np.hypot(error, grain)
+
+
+def test_a_table_of_a_cam_has_its_facts(tmp_path):
+    cam = SHAPES["cam"]
+    cam.write(tmp_path / "cam.csv", error=1e-5, cutter=0.0)
+    with (tmp_path / "cam.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    u = np.array([float(row["angle"]) for row in rows])
+    np.testing.assert_allclose([float(row["pressure angle"]) for row in rows], cam.facts(u).pressure_angle, atol=1e-15)
+    profile, cut, pitch = (
+        np.array([[float(row[f"{of} {x}"]) for x in "xyz"] for row in rows]) for of in ("profile", "cutter", "pitch")
+    )
+    np.testing.assert_allclose(profile, cut, atol=1e-16)
+    np.testing.assert_allclose(np.linalg.norm(pitch - profile, axis=1), 0.01, rtol=1e-12)
+    with pytest.raises(mg.FileError, match="unknown file extension '.step'"):
+        cam.write(tmp_path / "cam.step", error=1e-5)

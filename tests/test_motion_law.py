@@ -437,3 +437,18 @@ def test_a_stored_motion_with_times_keeps_rest_and_takes_rates(tmp_path) -> None
         mg.save(m, tmp_path / "arm.toml")
         for one in (m, mg.load(tmp_path / "arm.toml")):
             np.testing.assert_allclose(mg.solve(one)["A"].effort[:, 0], expected, atol=1e-9)
+
+
+def test_rates_of_a_function_that_are_not_the_derivatives_are_refused():
+    """60 percent too large, or of the wrong sign: never taken; true ones are, also with a jump of the acceleration."""
+    t = np.linspace(0.0, 3.0, 31)
+    true = lambda t: (np.sin(t), np.cos(t), -np.sin(t))
+    assert mg.Motion.law(true, t=t).velocity[0] == 1.0
+    jumps = lambda t: (np.maximum(t - 1, 0) ** 2, 2 * np.maximum(t - 1, 0), 2.0 * (t > 1))
+    assert mg.Motion.law(jumps, t=t).acceleration[-1] == 2.0
+    assert "velocity that it returns is not the rate of the position" in faults(
+        lambda t: (np.sin(t), 1.6 * np.cos(t), -np.sin(t)), t=t
+    )
+    assert "acceleration that it returns is not the rate of the velocity" in faults(
+        lambda t: (np.sin(t), np.cos(t), np.sin(t)), t=t
+    )

@@ -23,6 +23,7 @@ from mechgraph.errors import DeclarationError
 from mechgraph.fields import FREEDOM_NAME, SERIES, TABLE, Described
 from mechgraph.maths.se3 import Array
 from mechgraph.pairs.cam_laws import RISES, SCCA, Segment
+from mechgraph.pairs.given import between
 from mechgraph.quantities import LENGTH, PURE, TIME, has_quantity, real_array, shown, wrong
 
 CHEBYSHEV_POINTS = 32
@@ -317,7 +318,7 @@ def _checked_samples(samples: Any) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Smooth:
-    """A callable of t: s = f(t), or (s, s', s'') = f(t), taken unchanged.
+    """A callable of t: s = f(t), or (s, s', s'') = f(t), taken unchanged where rates are the derivatives of what they belong to.
 
     It is called with arrays, and if it cannot take them (TypeError, ValueError) with one float at a time.
     Where it returns the position alone, it is differentiated (`derivatives`), in practice to below 1e-10 of the largest
@@ -338,6 +339,7 @@ class Smooth:
                 wanted = "the position or (position, velocity, acceleration)"
                 raise LawFault(f"it must return {wanted}, got a tuple of {len(result)}")
             position, velocity, acceleration = (self._values(part, t) for part in result)
+            self._compare(t)
             return position, velocity, acceleration
         position = self._values(result, t)
         if t.size == 0:
@@ -358,6 +360,34 @@ class Smooth:
                 continue
             return position, *rates
         raise _not_smooth(low)
+
+    def _compare(self, t: Array) -> None:
+        """Refuse rates that are not the derivatives of what they belong to, by central differences between up to 64 of the times.
+
+        The step that fits best counts, as a true rate may change fast; a thousandth of the largest rate is taken for rounding.
+        """
+        times = np.unique(t)[:: max(1, t.size // 64)]
+        if times.size < 2:
+            return
+        at = between(times)
+
+        def ask(u: Array) -> Array:
+            return np.array([self._values(part, u) for part in self._called(u)])
+
+        known = ask(at)
+        for high, words in ((1, ("velocity", "position")), (2, ("acceleration", "velocity"))):
+            miss = np.full(at.shape, np.inf)
+            for part in (1e-2, 1e-3, 1e-4):
+                h = part * np.diff(times)
+                slope = (ask(at + h)[high - 1] - ask(at - h)[high - 1]) / (2.0 * h)
+                miss = np.minimum(miss, np.abs(slope - known[high]))
+            least = np.abs(known[high - 1]).max() * 1e-12 / np.diff(times).min() * 1e4  # rounding of a difference
+            if miss.max() > max(1e-3 * np.abs(known[high]).max(), least):
+                worst = int(np.argmax(miss))
+                raise LawFault(
+                    f"the {words[0]} that it returns is not the rate of the {words[1]}: it differs by {miss[worst]:.3g} from that at "
+                    f"t = {at[worst]:.6g}, where it is {known[high][worst]:.6g}"
+                )
 
     def position(self, t: Array) -> Array:
         """Return the position alone at t, whatever the function returns."""

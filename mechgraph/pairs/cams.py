@@ -167,7 +167,7 @@ class OfLaw(Centred):
         c, s = _turning(angle)
         parts = np.stack([_times(c, a) + _times(s, b), _times(c, b) - _times(s, a), h], axis=1)
         parts *= FACTORIALS[:ORDERS].reshape(-1, *(1,) * (parts.ndim - 1))
-        return np.matmul(self._basis, parts.reshape(ORDERS, 3, -1)).reshape(parts.shape)
+        return np.matmul(self.basis, parts.reshape(ORDERS, 3, -1)).reshape(parts.shape)
 
     def at(self, u: Array) -> Array:
         """``R(-u) y`` with the place y of the follower."""

@@ -21,11 +21,12 @@ from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 import scipy
 
+from mechgraph import methods
 from mechgraph.fields import (
     DIRECTION,
     FLAG,
@@ -223,6 +224,80 @@ class Curve(Described, Once):
         """The curve at a distance towards the normal, which is ``y (3,)`` where it begins, where that is a curve with a name too."""
         return None
 
+    def cutter_path(self, radius: float) -> Curve:
+        """Return the path of the center of a cutter that makes the profile: its equidistant on the outside.
+
+        Of a cam with a roller the profile lies inside the path of the center by the radius of the roller. A radius of zero gives the
+        profile itself. A groove about a cam is cut with the radius of its roller.
+
+        Parameters
+        ----------
+        radius : float
+            Radius of the cutter [length], 0 or more.
+
+        Returns
+        -------
+        Curve
+            By the arc length of this curve (by its own parameter where it is this curve, or one with a name).
+
+        Raises
+        ------
+        DeclarationError
+            For curves that are not plane and closed, and a cutter larger than the radius of curvature where the profile is hollow.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> mg.Curve.circle(radius=0.2).cutter_path(0.05).at(0.0)[0].round(6) + 0
+        array([0.25, 0.  , 0.  ])
+        """
+        made: Curve = methods.call("cutter_path", self, radius)
+        return made
+
+    def write(
+        self,
+        path: Any,
+        *,
+        error: float,
+        cutter: float | None = None,
+        form: Literal["spline", "polyline"] = "spline",
+        unit: str | None = None,
+    ) -> None:
+        """Write the curve as DXF (extra ``dxf``) or CSV: profile, path of the roller's center, path of a cutter, marks.
+
+        DXF has the layers PROFILE, PITCH (where there is a roller), CUTTER and MARKS: the center of a cam and the line to its angle zero.
+        CSV has a line per point, with the parameter (of a cam the angle) first. Points are close enough for chords within ``error``.
+
+        Parameters
+        ----------
+        path : path
+            ``"cam.dxf"`` or ``"cam.csv"``.
+        error : float
+            Largest distance of splines or chords from the curve [length].
+        cutter : float, optional
+            Radius of a cutter whose path is added [length].
+        form : {"spline", "polyline"}
+            Entities of the DXF: splines of degree 3, or polylines.
+        unit : {"mm", "cm", "m", "in", "ft"}, optional
+            Unit of the numbers, for the header of the DXF.
+
+        Raises
+        ------
+        DeclarationError, FileError
+            For values out of range; the file cannot be written. MissingExtraError where ezdxf is not installed.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> from pathlib import Path
+        >>> from tempfile import mkdtemp
+        >>> path = Path(mkdtemp()) / "disc.csv"
+        >>> mg.Curve.circle(radius=20.0).write(path, error=0.1)
+        >>> path.read_text().splitlines()[0]
+        'parameter,profile x,profile y,profile z'
+        """
+        methods.call("write_curve", self, path, error=error, cutter=cutter, form=form, unit=unit)
+
     @property
     def is_profile(self) -> bool:
         """Whether it says the outline of a body, not a slot: a cam."""
@@ -313,12 +388,13 @@ class Centred(Curve):
         return _unit(self.axis)
 
     @cached_property
-    def _basis(self) -> Array:
+    def basis(self) -> Array:
+        """Its own axes ``(3, 3)``, one a column."""
         return axes_of(self.axis, self.second)
 
     def _placed(self, parts: Array) -> Array:
         """Position and derivatives ``(4, 3, ...)`` from those in the own axes."""
-        out = np.matmul(self._basis, parts.reshape(len(parts), 3, -1)).reshape(parts.shape)
+        out = np.matmul(self.basis, parts.reshape(len(parts), 3, -1)).reshape(parts.shape)
         out[0] += np.asarray(self.center).reshape(3, *(1,) * (parts.ndim - 2))
         return out
 
@@ -772,9 +848,8 @@ def roller_faults(curve: Curve, radius: float, what: str, where: str, side: floa
     """
     travel = curve.once(Travel)
     towards = -outside(curve) if side is None else side
-    bend = towards * travel.curvature(travel.s)
-    if travel.is_groove:
-        bend = np.abs(bend)  # a groove has two walls
+    k = travel.curvature(travel.s)
+    bend = np.abs(k) if travel.is_groove else towards * k  # a groove has two walls
     worst = int(np.argmax(bend))
     if radius * bend[worst] < 1 - SHAPES.standstill:
         return []

@@ -11,11 +11,23 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mechgraph.errors import ShapeError
+from mechgraph.errors import DeclarationError, ShapeError
 from mechgraph.maths.se3 import Array, cross
-from mechgraph.pairs.curves import COMPLEX_STEP, ORDERS, Curve, CurvePlace, Travel, turned
+from mechgraph.maths.tolerances import SHAPES
+from mechgraph.pairs.curves import (
+    COMPLEX_STEP,
+    ORDERS,
+    Curve,
+    CurvePlace,
+    Travel,
+    outside,
+    point_text,
+    shape_faults,
+    turned,
+)
 from mechgraph.pairs.factors import UNIT_TWISTS, Factor, Freedom, PoseStack, Stack, entries
 from mechgraph.pairs.surfaces import Surface
+from mechgraph.quantities import is_numeric, wrong
 
 
 class Travelling(Factor):
@@ -337,6 +349,39 @@ class Beside(Curve):
     def grid(self) -> Array:
         """As the curve."""
         return self.base.once(Travel).s if self._named is None else self._named.grid
+
+
+def cutter_path(curve: Curve, radius: float) -> Curve:
+    """See ``Curve.cutter_path``."""
+    if not (is_numeric(radius, ()) and radius >= 0):
+        raise DeclarationError("cutter path", [wrong(radius, "radius", "0 or more")])
+    found = curve.faults("") or shape_faults(curve, "curve")
+    if found:
+        raise DeclarationError("cutter path", found)
+    travel: Travel = curve.once(Travel)
+    distance = radius - curve.roller
+    if distance == 0:
+        return curve
+    if travel.is_groove:
+        where = f"a groove is cut along the path of its roller, with a cutter of radius {curve.roller:.6g}"
+        raise DeclarationError("cutter path", [wrong(radius, "radius", where)])
+    if not (travel.is_plane and curve.is_closed):
+        raise DeclarationError("cutter path", [f"curve: is a {curve.kind} that is not plane and closed; a profile is"])
+    side = outside(curve)
+    if distance > 0:
+        words = f"radius = {radius:.6g}: "
+        hollow = side * travel.curvature(travel.s)
+        worst = int(np.argmax(hollow))
+        if distance * hollow[worst] >= 1 - SHAPES.standstill:
+            at = point_text(travel.at(travel.s[worst : worst + 1]).x[:, 0])
+            largest = 1 / hollow[worst] + curve.roller
+            raise DeclarationError(
+                "cutter path",
+                [
+                    f"{words}the profile is hollow with the radius {largest:.6g} at {at}; take a cutter smaller than that"
+                ],
+            )
+    return Beside(base=curve, distance=side * distance)
 
 
 @dataclass(frozen=True)
