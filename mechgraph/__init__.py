@@ -44,7 +44,7 @@ from mechgraph.graph.atlas import (
     system_groups,
 )
 from mechgraph.graph.chains import Chain
-from mechgraph.kinetostatics import Transmission, assemble, kinematics, solve, transmission
+from mechgraph.kinetostatics import Transmission, assemble, kinematics, least_preload, solve, transmission
 from mechgraph.maths import inertia
 from mechgraph.maths.tolerances import Tolerances
 from mechgraph.model import parts
@@ -96,9 +96,9 @@ __all__ = [
     "Stiffness", "Stop", "Structure", "Study", "StudyError", "Surface", "SystemGroup", "Tolerances", "TorsionSpring",
     "Transmission", "Worm", "WormGear", "WormWheel", "Wrench", "assemble", "assemblies", "atlas", "branches",
     "cam_laws", "chain", "check", "compile", "equilibrium", "formulate", "free_body", "groups", "identify", "inertia",
-    "kinematics", "least_base_radius", "library", "linearize", "load", "load_chains", "mesh_facts", "multiple_joints",
-    "over_time", "pair_types", "parts", "planet_places", "respond", "save", "save_chains", "solve", "split_joint",
-    "structure", "study", "system_groups", "transmission", "write_report",
+    "kinematics", "least_base_radius", "least_preload", "library", "linearize", "load", "load_chains", "mesh_facts",
+    "multiple_joints", "over_time", "pair_types", "parts", "planet_places", "respond", "save", "save_chains", "solve",
+    "split_joint", "structure", "study", "system_groups", "transmission", "write_report",
 ]  # fmt: skip
 
 

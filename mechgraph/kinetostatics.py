@@ -742,6 +742,76 @@ def transmission(s: Solution, output: str, driver: str | None = None) -> Transmi
     return Transmission(s, drivers, output, np.where((s.status == OK), index, np.nan))
 
 
+@door
+def least_preload(s: Solution, pair: str, stiffness: float = 0.0, freedom: str | None = None) -> float:
+    """Compute the least preload of a spring that keeps a contact closed over a solution.
+
+    A spring in the freedom that guides link b presses it with ``F + k d``, d its way from where the spring is longest. With the normal
+    force N without it, and n that of a unit effort in the freedom, ``F >= -N / n - k d`` at all positions.
+
+    Parameters
+    ----------
+    s : Solution
+        A solution with forces.
+    pair : str
+        A contact with one normal force.
+    stiffness : float
+        Stiffness k of the spring [force / length, or torque]. Default: a constant force.
+    freedom : str, optional
+        The freedom in which the spring acts. Default: that of the pair with one freedom between link b and the frame.
+
+    Returns
+    -------
+    float
+        Least force (or torque) where the spring is longest, 0 or more.
+
+    Raises
+    ------
+    DeclarationError
+        No such contact or freedom; the spring does not press everywhere.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> at = (0, 0, 1.0)
+    >>> block = mg.Pair("G", "P", "frame", "block", point=at, axis=(0, 0, 1))
+    >>> table = mg.Pair("T", "P", "frame", "table", point=(0, 0, 0), axis=(0, 0, 1))
+    >>> ball = mg.Pair("K", "Sp", "table", "block", point=at, axis=(0, 0, 1))
+    >>> m = mg.Mechanism(
+    ...     "press", [mg.Link("frame"), mg.Link("table"), mg.Link("block", 2.0, at)], [table, block, ball], ["T"]
+    ... )
+    >>> s = mg.solve(m, {"T": mg.Motion(0.0, acceleration=-3.0)})
+    >>> round(mg.least_preload(s, "K"), 9)
+    6.0
+    """
+    m, c = s.mechanism, s.contact(pair)
+    where = f"least preload of {pair!r}"
+    row = m.pair(pair)
+    if row.type.touching is None or len(row.type.touching.forces) != 1:
+        raise DeclarationError(where, [wrong(row.type.symbol, "type", "a contact with one normal force")])
+    if freedom is None:
+        guides = [p for p in m.pairs if {p.a, p.b} == {row.b, m.frame} and p.type.f == 1]
+        if not guides:
+            raise DeclarationError(
+                where, [f"freedom: no pair with one freedom guides {row.b!r} on the frame; name one"]
+            )
+        freedom = guides[0].freedom_names[0]
+    if fault := m.freedom_fault(freedom, single=True):
+        raise DeclarationError(where, [f"freedom: {fault}"])
+    freedom = m.full_name(freedom)
+    unit = _held(s, freedom, s.actuated).contact(pair).normal_force
+    known = np.isfinite(unit) & np.isfinite(c.normal_force)
+    sense = np.sign(unit[known])
+    if not known.any() or not (sense == sense.flat[0]).all() or not sense.all():
+        raise DeclarationError(
+            where, [f"freedom = {freedom!r}: a spring there does not press the contact at all positions"]
+        )
+    k, j = m.freedom(freedom)
+    way = -sense.flat[0] * s._values.coordinates(k, 0)[..., j][known]
+    needed = -c.normal_force[known] / np.abs(unit[known]) - stiffness * (way - way.min())
+    return max(0.0, float(needed.max()))
+
+
 def _held(s: Solution, output: str, drivers: tuple[str, ...]) -> Solution:
     """The links at rest and without mass at the positions of a solution: the drivers hold a unit effort in the output."""
     m, places = s.mechanism, PositionLabels(s._values)

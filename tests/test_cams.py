@@ -449,3 +449,22 @@ def test_a_table_of_a_cam_has_its_facts(tmp_path):
     np.testing.assert_allclose(np.linalg.norm(pitch - profile, axis=1), 0.01, rtol=1e-12)
     with pytest.raises(mg.FileError, match="unknown file extension '.step'"):
         cam.write(tmp_path / "cam.step", error=1e-5)
+
+
+@pytest.mark.parametrize(("stiffness", "expected"), [(0.0, 50.0), (1000.0, 30.0), (1e4, 0.0)])
+def test_least_preload_of_a_harmonic_follower(stiffness, expected):
+    """Acceptance: 20 mm a turn, .5 kg, 100 rad/s: preload + k h >= m w^2 h / 2 = 50 N, at the highest place."""
+    law = mg.CamLaw([mg.Segment("harmonic", 0.02, np.pi), mg.Segment("harmonic", -0.02, np.pi)])
+    cam = mg.Curve.cam(law=law, base_radius=0.05, roller_radius=0.01, second=(0, 1, 0))
+    at = (0, 0.06, 0)
+    guide = mg.Pair("B", "P", "frame", "follower", point=at, axis=(0, 1, 0))
+    pair = mg.Pair("K", "Ps", "cam", "follower", curve=cam, point=at, closed="force")
+    m = driven(pair, guide, []).replace(links=[mg.Link("frame"), mg.Link("cam"), mg.Link("follower", 0.5, at)])
+    turn = mg.Motion(np.linspace(0, 2 * np.pi, 73), velocity=100.0)
+    with pytest.warns(mg.MechgraphWarning, match="lifts off"):
+        s = mg.solve(m, {"A": turn})
+    found = mg.least_preload(s, "K", stiffness=stiffness)
+    assert found == pytest.approx(expected, abs=1e-8)
+    # with that spring the contact holds, but not with less
+    spring = mg.ForceLaw(freedom="B", law=lambda x, v, t: -(found + stiffness * x))
+    assert mg.solve(m.replace(loads=[spring]), {"A": turn}).contact("K").normal_force.min() > -1e-7
