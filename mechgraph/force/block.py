@@ -23,6 +23,7 @@ from mechgraph.force.reactions import (
     effort_map,
     least_multiples,
     least_under_signs,
+    on_their_flanks,
     orthonormal_stress,
     pair_power,
     pretensioned,
@@ -183,6 +184,7 @@ def forces_of_block(
         loads = loads + held
     wrenches = pretensioned(here, METHODS[task.method](ForceProblem(here, loads, given, task.driven, f)), f)
     lines = ContactLines(here)
+    wrenches = on_their_flanks(here, wrenches, lines)
     found, flank = _least_on_flanks(here, wrenches, f, task, lines)
     dry = [load for load in task.loads if load.follows_reactions]
     rubs = ranges = None

@@ -438,8 +438,17 @@ def internal_state(here: Configuration, loads: Array, flank: Array | None = None
         conditions,
         loads,
         tuple(coefficients),
-        tuple(ContactLines(here).unit(np.ones((len(s.m.couplings), here.T)) if flank is None else flank)),
+        tuple(_lines_of(here, flank)),
     )
+
+
+def _lines_of(here: Configuration, flank: Array | None) -> list[Array]:
+    """Wrenches on gears b for unit multipliers, on the first flanks or on those of signs ``(n, T)``."""
+    lines = ContactLines(here)
+    if flank is None:
+        return lines.unit(np.ones((len(here.system.m.couplings), here.T)))
+    lines.settle(flank)
+    return lines.unit(flank)
 
 
 MethodName = Literal["loop_wrench", "newton_euler", "printed"]
@@ -492,6 +501,40 @@ def effort_map(here: Configuration, t: int, acting: Index) -> scipy.sparse.csr_a
     return scipy.sparse.csr_array(
         scipy.sparse.vstack([efforts, -scipy.sparse.eye_array(others, s.n_rows, k=s.n_rows - others)])
     )
+
+
+def on_their_flanks(here: Configuration, wrenches: Wrenches, lines: ContactLines) -> Wrenches:
+    """The same where gears on moving shafts touch on the flanks that their multipliers ask for, as far as the centers stand still.
+
+    ``wrenches`` were found with the rows of the first flanks; which flanks act is kept in ``lines``.
+    """
+    if not lines.moving or not (wrenches.multipliers[list(lines.moving)] < 0.0).any():
+        return wrenches
+    multipliers, totals = wrenches.multipliers.copy(), wrenches.totals.copy()
+    stress, change = wrenches.stress.copy(), wrenches.multiplier_stress.copy()
+    base = here.system.graph.loop_rows
+    lines.settled = {g: np.zeros(here.T, dtype=bool) for g in lines.moving}
+    for t in range(here.T):
+        own, one = multipliers[:, t].copy(), np.array([t])
+        flips = [g for g in lines.moving if own[g] < 0.0]
+        # flanks follow the signs, which the flanks may change in turn
+        for _ in range(4):
+            every = np.concatenate([own[:, None], change[:, :, t]], axis=1)
+            y = lines.flipped(t, flips, every) if flips else None
+            if y is None:
+                break
+            new = own - y[base:, 0]
+            asked = [g for g in lines.moving if new[g] < 0.0]
+            if asked == flips:
+                more = here.part(one).pair_wrenches(y[..., None])[..., 0]
+                totals[..., t] += more[:, :, 0]
+                stress[..., t] += more[:, :, 1:]
+                multipliers[:, t], change[:, :, t] = new, change[:, :, t] - y[base:, 1:]
+                for g in flips:
+                    lines.settled[g][t] = True
+                break
+            flips = asked
+    return Wrenches(totals, stress, multipliers, change)
 
 
 STRAIN = 1e-4

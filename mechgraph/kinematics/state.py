@@ -519,6 +519,7 @@ class ContactLines:
     def __init__(self, here: Configuration) -> None:
         self.here = here
         self.contacts = [(g, c) for g, c in enumerate(here.system.m.couplings) if c.steps]
+        self.settled: dict[int, Mask] = {}
 
     def __bool__(self) -> bool:
         return bool(self.contacts)
@@ -561,35 +562,48 @@ class ContactLines:
         at = rows.lines(here.poses)
         P, n = (np.repeat(part, 2, axis=1) for part in (at.point, at.along))
         if isinstance(coupling, LineCoupling) and coupling.other is not None:
-            other = rows.lines(here.poses, other=True).along[:, 0]
-            n[:, 1] = np.where(self.turned[g][1], other, n[:, 1]) if g in self.turned else other
+            n[:, 1] = rows.lines(here.poses, other=True).along[:, 0]
         G = np.concatenate([cross(P, n), n]) * here.system.row_scale[row] * here.system.par.L
         if here.system.m.planar:
             G[np.delete(np.arange(6), here.system.graph.span)] = 0.0
         return G, P
 
     @cached_property
-    def turned(self) -> dict[int, tuple[Array, Mask]]:
-        """For every row evaluated from poses with another flank: loop wrenches (as rows of loops ``(rows, T)``) that a unit multiplier on
-        that flank changes, and where there are such ones ``(T,)``: where the centers stand still.
-
-        The rows ``J`` and ``J'`` of both flanks differ by one of the loops, ``J' - J = J_loops^T x``, where closed loops keep the distance
-        of the centers.
-        """
-        here, m = self.here, self.here.system.m
-        found = {}
-        for g, c in enumerate(m.couplings):
-            if not isinstance(c, LineCoupling) or c.linear or c.other is None or c.other is c.relation:
-                continue
-            rows, loops = LineRows(here.system, np.array([g])), here.system.graph.loop_rows
-            change = (rows.jacobian(here, other=True) - rows.jacobian(here))[0]
-            A, x = here.J[:loops], np.zeros((loops, here.T))
-            for t in range(here.T):
-                x[:, t] = np.linalg.lstsq(A[..., t].T, change[:, t], rcond=1e-11)[0]
-            left = np.abs(np.einsum("rft,rt->ft", A, x) - change).max(axis=0, initial=0.0)
-            # of rows of size one: rounding where the centers stand still
-            found[g] = x, np.asarray(left <= 1e-9)
+    def moving(self) -> dict[int, Array]:
+        """For every row evaluated from poses that has another flank: the row of that flank in place of its own in J, less it ``(F, T)``."""
+        here, found = self.here, {}
+        for g, c in enumerate(here.system.m.couplings):
+            if isinstance(c, LineCoupling) and not c.linear and c.other is not None and c.other is not c.relation:
+                rows = LineRows(here.system, np.array([g]))
+                found[g] = (rows.jacobian(here, other=True) - rows.jacobian(here))[0]
         return found
+
+    def flipped(self, t: int, flips: Sequence[int], multipliers: Array) -> Array | None:
+        """What is added to multipliers of all rows ``(rows, k)`` at a position where some rows stand on their other flanks; None where
+        the motion does not keep their centers.
+
+        With the rows ``J'`` of these flanks the same efforts need ``J'^T y = sum_g (J'_g - J_g) m_g``, which has a solution in all columns
+        where both rows hold the same motions; ``multipliers (n, k)`` of the couplings.
+        """
+        base = self.here.system.graph.loop_rows
+        A = self.here.J[..., t].copy()
+        change = np.stack([self.moving[g][:, t] for g in flips], axis=1)
+        A[[base + g for g in flips]] += change.T
+        y = np.linalg.lstsq(A.T, change, rcond=1e-11)[0]
+        left = np.abs(A.T @ y - change).max(initial=0.0)
+        # of rows of size one: rounding where the centers stand still
+        return None if left > 1e-9 else np.asarray(y @ multipliers[list(flips)])
+
+    def settle(self, flank: Array) -> None:
+        """Say which flanks act, by signs ``(n, T)`` of multipliers that were found on them."""
+        n, T = len(self.here.system.m.couplings), self.here.T
+        signs, nothing = np.broadcast_to(flank, (n, T)), np.zeros((n, 1))
+        self.settled = {g: np.zeros(T, dtype=bool) for g in self.moving}
+        for t in range(T if self.moving else 0):
+            flips = [g for g in self.moving if signs[g, t] < 0.0]
+            if flips and self.flipped(t, flips, nothing) is not None:
+                for g in flips:
+                    self.settled[g][t] = True
 
     def _lines(self, g: int, axes: Axes) -> Lines:
         """Points and directions of the force; of variants with gears of their own those of each."""
@@ -610,7 +624,8 @@ class ContactLines:
         """
         out = []
         for (g, _), (G, _) in zip(self.contacts, self.wrenches, strict=True):
-            acting = np.where(flank[g] < 0.0, G[:, 1], G[:, 0])
+            there = (flank[g] < 0.0) & self.settled.get(g, np.array(g not in self.moving))
+            acting = np.where(there, G[:, 1], G[:, 0])
             value = multipliers[g]
             out.append(acting.reshape(6, *(1,) * (value.ndim - 1), self.here.T) * value)
         return out
@@ -637,10 +652,6 @@ class ContactLines:
             for g, step, column in steps:
                 E = here.E[:, column] * coefficients[g, column]
                 out[:, step.pair] -= E.reshape(6, *(1,) * (multipliers.ndim - 2), here.T) * multipliers[g]
-        for g, (x, there) in self.turned.items():
-            acting = np.broadcast_to(np.where((flank[g] < 0.0) & there, multipliers[g], 0.0), multipliers.shape[1:])
-            changed = here.pair_wrenches(x[:, None] * acting.reshape(1, -1, here.T))
-            out -= changed.reshape(out.shape)
         return out
 
     def unit(self, flank: Array) -> list[Array]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import acos, pi, sin, sqrt, tan
+from math import acos, cos, pi, sin, sqrt, tan
 from typing import Any
 
 import numpy as np
@@ -132,13 +132,12 @@ def _parallel(met: Parallel, mesh: Mesh) -> MeshFacts:
     shorter = 0.0
     if not inner:
         shorter = max(0.0, met.shifts - (d - one.radius - two.radius) / one.module)
-    tips = tuple(tip_radius(g, shorter) for g in (one, two))
-    bases = tuple(g.base_radius for g in (one, two))
+    tips, bases = (tip_radius(one, shorter), tip_radius(two, shorter)), (one.base_radius, two.base_radius)
     ways = [np.sign(k) * sqrt(max(tip**2 - k**2, 0.0)) for tip, k in zip(tips, bases, strict=True)]
     length = sum(ways) + (1.0 if inner else -1.0) * d * sin(w)
     contact = float(length / (2 * pi * abs(bases[0]) / one.teeth))
     backlash = met.backlash + mesh.backlash
-    radii = tuple(float(abs(k) / np.cos(w)) for k in bases)
+    radii = abs(bases[0]) / cos(w), abs(bases[1]) / cos(w)
     faults = [
         f"{g.name!r}: {g.teeth} teeth with the shift {g.shift:g} are undercut by a rack; expected a shift of {least_shift(g):.6g} or more"
         for g in (one, two)
@@ -162,7 +161,7 @@ def _interference(met: Parallel, tips: Any, ways: list[Any]) -> Iterator[str]:
 
 
 def _inside(met: Parallel, tips: Any) -> Iterator[str]:
-    """Interference of a gear and its ring: of involutes, and of tips beside the line of centers."""
+    """Interference of the involutes of a gear and its ring; that of tips beside the line of centers is not looked at."""
     ring, other = (met.one, met.two) if met.one.internal else (met.two, met.one)
     top = tips[0] if ring is met.one else tips[1]
     base = abs(ring.base_radius)
@@ -173,22 +172,6 @@ def _inside(met: Parallel, tips: Any) -> Iterator[str]:
     least = 1.0 - tan(acos(base / top)) / tan(met.working_angle)
     if other.teeth / ring.teeth < least:
         yield f"involutes of {other.name!r} and {ring.name!r} interfere: {other.teeth}/{ring.teeth} is below {least:.6g}"
-    if ring.teeth - other.teeth < 8 and _tips_meet(met, ring, other, top):
-        yield f"the tips of {other.name!r} and {ring.name!r} meet beside the line of centers: too few teeth apart"
-
-
-def _tips_meet(met: Parallel, ring: Gear, other: Gear, top: float) -> bool:
-    """Whether tips overlap where both tip circles cross (Niemann and Winter, 22.3)."""
-    d, out = met.distance, tip_radius(other)
-    cosine = (out**2 - top**2 - d**2) / (2 * d * top)
-    if abs(cosine) >= 1.0:
-        return False
-    inv = lambda x: tan(x) - x
-    at_ring = acos(cosine)
-    at_gear = acos(min(1.0, (out**2 + d**2 - top**2) / (2 * d * out)))
-    a, b = acos(other.base_radius / out), acos(abs(ring.base_radius) / top)
-    w = met.working_angle
-    return other.teeth * (inv(a) - inv(w) + pi - at_gear) < ring.teeth * (inv(b) - inv(w) + pi - at_ring)
 
 
 def _rack(met: WithRack, mesh: Mesh) -> MeshFacts:

@@ -401,7 +401,7 @@ class Mesh(LineCoupling):
         str,
         TEXT(
             'which flanks touch: `"auto"` as the load asks where centers stand still, else `"forward"`: those by which a positive turn of '
-            'gear a drives gear b; `"backward"`: the others',
+            'gear a (with a rack, of the pinion) drives gear b; `"backward"`: the others',
             choices=FLANKS,
         ),
     ] = "auto"
@@ -507,25 +507,16 @@ class Mesh(LineCoupling):
 
     def strayed(self, a: Places, b: Places, a0: Places, b0: Places) -> Array:
         """See ``LineCoupling``: the angle between the axes, and of those that cross their distance and where they are along them."""
-        found = [_dot(a.axis, b.axis) - _dot(a0.axis, b0.axis)]
-        if self.relation not in (*BETWEEN.values(),):
-            # parallel axes: their cosine falls with the square
-            lean = cross(a.axis, b.axis) if self.relation in CYLINDRICAL.values() else a.axis * 0.0
+        if self.relation not in BETWEEN.values():
+            lean = cross(a.axis, b.axis) if self.relation in CYLINDRICAL.values() else 0.0 * a.axis
             return np.asarray(np.sqrt(_dot(lean, lean)))
-        for one, two in (((a, b), (a0, b0)),):
-            places = []
-            for p, q in (one, two):
-                w, d = cross(p.axis, q.axis), q.point - p.point
-                square = _dot(w, w)
-                places.append(
-                    (
-                        _dot(d, w) / np.sqrt(square),
-                        _dot(cross(d, q.axis), w) / square,
-                        _dot(cross(d, p.axis), w) / square,
-                    )
-                )
-            apart, along_a, along_b = (now - then for now, then in zip(*places, strict=True))
-            found += [apart, *(along for along, held in zip((along_a, along_b), self.held, strict=True) if held)]
+        places = []
+        for p, q in ((a, b), (a0, b0)):
+            w, d = cross(p.axis, q.axis), q.point - p.point
+            square = _dot(w, w)
+            feet = [_dot(cross(d, axis), w) / square for axis in (q.axis, p.axis)]
+            places.append((_dot(p.axis, q.axis), _dot(d, w) / np.sqrt(square), *feet))
+        found = [now - then for now, then, held in zip(*places, (True, True, *self.held), strict=True) if held]
         return np.asarray(np.abs(found).max(axis=0))
 
     def in_own_units(self, units: Any, turns: Any) -> Self:
@@ -723,8 +714,8 @@ class Parallel(Meeting):
         d = self.b.point - self.a.point
         across = d - self.a.axis * self.h
         turns = 0.5
-        for gear, place, way in ((one, self.a, 1.0), (two, self.b, -1.0)):
-            e = across * (way * np.sign(gear.base_radius * k) / self.distance)
+        for gear, place, sense in ((one, self.a, 1.0), (two, self.b, -1.0)):
+            e = across * (sense * np.sign(gear.base_radius * k) / self.distance)
             lean = self.h * one.base_lean / one.base_radius if gear is one else 0.0
             own = float(angle(e, place.mark, self.a.axis)[0, 0]) + lean
             turns += np.sign(gear.base_radius) * gear.teeth * own / (2 * pi)
@@ -777,7 +768,7 @@ class WithRack(Meeting):
 
     def flanks(self, forward: bool) -> tuple[Relation, Relation]:
         """See ``Meeting``."""
-        order = (1.0, -1.0) if forward == (self.sign > 0) else (-1.0, 1.0)
+        order = (1.0, -1.0) if forward else (-1.0, 1.0)
         return RACKED[order[0], self.sign], RACKED[order[1], self.sign]
 
     def misfits(self, fitting: float) -> list[str]:

@@ -774,8 +774,14 @@ class Trajectory:
         """Where ``(T,)`` the other flank of a mesh takes over, as its centers stand still."""
         if self._system.m.couplings[coupling].name not in self._system.m.once(moving_lines):
             return np.ones(self._count, dtype=bool)
-        found = self._evaluated(lambda block: ContactLines(block.here).turned[coupling][1][None].astype(float))
-        return np.asarray(found[0] > 0.5)
+        m = self._force("multipliers")
+
+        def settled(block: BlockMotion) -> Array:
+            lines = ContactLines(block.here)
+            lines.settle(m[:, block.places])
+            return lines.settled.get(coupling, np.zeros(block.here.T))[None].astype(float)
+
+        return np.asarray(self._evaluated(settled)[0] > 0.5)
 
     def contact(self, coupling: int) -> tuple[Array, Array]:
         """Force of gears on the second one, and the point where it acts, ``(..., 3)``."""
@@ -787,6 +793,7 @@ class Trajectory:
 
         def of(block: BlockMotion) -> Array:
             lines, here = ContactLines(block.here), m[:, block.places]
+            lines.settle(here)
             which = [g for g, _ in lines.contacts].index(coupling)
             flank = (here[coupling] < 0.0).astype(np.intp)
             points = lines.wrenches[which][1][:, flank, np.arange(len(block.places))]

@@ -1,0 +1,579 @@
+"""Gears as places on links: facts of meshes against closed forms, forces on any bearings, moving centers, planets, other kinds of gears."""
+
+import time
+import warnings
+
+import numpy as np
+import pytest
+
+import mechgraph as mg
+from mechgraph.model import gears as kinds
+from mechgraph.model.lines import Places
+
+X, Y, Z = np.eye(3)
+RAD = np.deg2rad
+FULL = RAD(20.0)
+
+
+def inv(a):
+    return np.tan(a) - a
+
+
+def on_bearings(name, link, point, axis, bearings):
+    """A shaft on the frame in a pair R, or in a ball, a ball in a groove and a free pair that names its turn; the freedom that turns."""
+    p, u = np.array(point, dtype=float), np.array(axis, dtype=float)
+    if bearings == "R":
+        return [mg.Pair(name, "R", "frame", link, point=point, axis=axis)], f"{name}.Rz"
+    return [
+        mg.Pair(f"{name}S", "S", "frame", link, point=tuple(p - 0.04 * u)),
+        mg.Pair(f"{name}G", "Sg", "frame", link, point=tuple(p + 0.06 * u), axis=axis),
+        mg.Pair(name, "Fr", "frame", link, point=point, axis=axis),
+    ], f"{name}.Rz"
+
+
+def stage(gears, bearings="R", torque=-3.0, **mesh):
+    """Two gears, each on a shaft of its own about its axis, the first driven, a torque on the second."""
+    (pa, qa), (pb, qb) = (on_bearings(n, g.link, g.point, g.axis, bearings) for n, g in zip("AB", gears, strict=True))
+    m = mg.Mechanism(
+        "stage",
+        pairs=[*pa, *pb],
+        gears=gears,
+        couplings=[mg.Mesh("m", gears[0].name, gears[1].name, **mesh)],
+        drives=[qa],
+        loads=[mg.Effort(qb, torque)],
+    )
+    return m, qa, qb
+
+
+def spur(teeth=(20, 40), distance=0.06, module=0.002, helix=0.0, **more):
+    a, b = ({k: v[i] for k, v in more.items()} for i in (0, 1))
+    return [
+        mg.Gear("a", "one", teeth[0], (0, 0, 0), Z, module=module, helix_angle=helix, **a),
+        mg.Gear("b", "two", teeth[1], (distance, 0, 0), Z, module=module, helix_angle=-helix, **b),
+    ]
+
+
+def facts(gears):
+    return mg.mesh_facts(stage(gears)[0])["m"]
+
+
+# --- facts against closed forms (ISO 21771; figures by hand) ---------------------------------------------------------------
+
+
+def test_a_pair_with_profile_shifts():
+    """12 and 24 teeth, module 3, 56.5 apart, shifts .6 and .36."""
+    f = facts(spur((12, 24), 56.5, 3.0, shift=(0.6, 0.36)))
+    assert np.rad2deg(f.working_angle) == pytest.approx(26.08883, abs=5e-6)
+    assert f.asked_shifts == pytest.approx(0.960056, abs=5e-7)
+    np.testing.assert_allclose(2 * np.array(f.tip_radii), [44.84, 79.40], rtol=1e-12)
+    assert f.contact_ratio == pytest.approx(1.202119, abs=1e-6)
+
+
+def test_contact_ratio_backlash_and_force_at_another_distance():
+    """20 and 40 teeth, module 2, at 60 and at 61.2: the base circles, and so the normal force, stay."""
+    assert facts(spur(distance=60.0, module=2.0)).contact_ratio == pytest.approx(1.635186, abs=5e-7)
+    far = facts(spur(distance=61.2, module=2.0))
+    w = np.arccos(60 * np.cos(FULL) / 61.2)
+    assert np.rad2deg(far.working_angle) == pytest.approx(22.88794, abs=5e-6)
+    assert far.backlash == pytest.approx(2 * 61.2 * (inv(w) - inv(FULL)), rel=1e-12)
+    assert far.backlash == pytest.approx(0.954013, abs=5e-7)
+    for distance in (0.06, 0.0612):
+        m, a, _ = stage(spur(distance=distance))
+        assert abs(mg.solve(m, {a: 0.3}).coupling("m").effort) == pytest.approx(1.5 / (0.02 * np.cos(FULL)), rel=1e-12)
+
+
+def test_undercut():
+    """17.09726 teeth are the least without shift: 2 / sin^2 a; twelve need 1 - 12 / 17.09726."""
+    f = facts(spur((12, 24), 56.5, 3.0, shift=(0.6, 0.36)))
+    assert f.undercut[0] == pytest.approx(1 - 12 * np.sin(FULL) ** 2 / 2, rel=1e-12)
+    assert f.undercut[0] == pytest.approx(0.298133, abs=5e-7)
+    cut = facts(spur((12, 24), 54.0, 3.0))
+    assert any("undercut" in fault for fault in cut.faults)
+
+
+def test_helical_gears_and_their_overlap():
+    f = facts(spur(distance=60 / np.cos(RAD(15)), module=2.0, helix=RAD(15), width=(30.0, 40.0)))
+    assert np.rad2deg(f.working_angle) == pytest.approx(20.64690, abs=5e-6)
+    assert f.overlap_ratio == pytest.approx(30 * np.sin(RAD(15)) / (2 * np.pi), rel=1e-12)
+
+
+def test_ring_and_planet():
+    f = facts(spur((30, 84), 54.0, 2.0, internal=(False, True)))
+    assert f.contact_ratio == pytest.approx(1.930568, abs=5e-7)
+    assert not f.faults
+    # the tips of a ring of 84 teeth keep off the foot of involutes of gears with 84 * .226845 = 19.1 teeth or more
+    assert any("interfere" in fault for fault in facts(spur((19, 84), 65.0, 2.0, internal=(False, True))).faults)
+    assert not any("interfere" in fault for fault in facts(spur((20, 84), 64.0, 2.0, internal=(False, True))).faults)
+
+
+@pytest.mark.parametrize(
+    ("gears", "told"),
+    [
+        ([*spur()[:1], mg.Gear("b", "two", 40, (0.06, 0, 0), Z, module=0.0021)], "module 0.002 of 'b'"),
+        (spur(distance=0.0595), "asks for the sum -0.2418942 of shifts"),
+        (spur(distance=0.07), "do not reach each other"),
+        (spur(distance=0.05), "expected 0.06"),
+        (
+            [*spur(helix=0.1)[:1], mg.Gear("b", "two", 40, (0.0603, 0, 0), Z, module=0.002, helix_angle=0.1)],
+            "-0.1 meshes",
+        ),
+        ([*spur()[:1], mg.Gear("b", "two", 40, (0.06, 0, 0), (0, 0.01, 1), module=0.002)], "rad off parallel"),
+        ([*spur()[:1], mg.Gear("b", "two", 40, (0, 0.06, 0), X, module=0.002)], "would need the helix angle"),
+        ([*spur()[:1], mg.Worm("b", "two", 2, (0.06, 0, 0), X, radius=0.01)], "expected a gear or a rack"),
+        (spur(mark=(X, X)), "of a tooth off the gaps"),
+    ],
+)
+def test_what_cannot_mesh_is_refused_with_what_would_fit(gears, told):
+    with pytest.raises(mg.DeclarationError, match=told):
+        stage(gears)
+
+
+def test_marks_of_teeth_that_stand_in_gaps():
+    """A tooth of a on the line of centers, and a gap of b: half a pitch beside its mark."""
+    half = np.pi / 40
+    stage(spur(mark=(X, (-np.cos(half), np.sin(half), 0.0))))
+
+
+# --- relation and force ----------------------------------------------------------------------------------------------------
+
+
+def place(point, axis, mark):
+    return Places(*(np.asarray(v, dtype=float)[:, None, None] for v in (point, axis, mark)))
+
+
+def moved(p, w, v, h):
+    """A place on a body after a small motion ``h``: turned by w about the origin, displaced by v."""
+    angle = np.linalg.norm(w) * h
+    k = np.asarray(w) / np.linalg.norm(w)
+    K = np.array([[0, -k[2], k[1]], [k[2], 0, -k[0]], [-k[1], k[0], 0]])
+    R = np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+    turned = lambda x: (R @ x[:, 0, 0])[:, None, None]
+    return Places(turned(p.point) + h * np.asarray(v)[:, None, None], turned(p.axis), turned(p.mark))
+
+
+@pytest.mark.parametrize("forward", [True, False])
+@pytest.mark.parametrize("inner", ["none", "a", "b", "rack", "rack first"])
+def test_the_gradient_of_the_relation_is_the_line_of_action(inner, forward):
+    """Any motion of both gears in the plane and along their axes: d phi = n . (v_b - v_a) at the pitch point."""
+    rng = np.random.default_rng(5)
+    teeth, helix = ((60, 20) if inner == "a" else (20, 60)), 0.3
+    one = mg.Gear("a", "a", teeth[0], (0, 0, 0), Z, module=2.0, helix_angle=helix, internal=inner == "a")
+    if "rack" in inner:
+        two = mg.GearRack("b", "b", (0, 0, 0), X, Y, module=2.0, helix_angle=-helix)
+        met = kinds.WithRack, [one, two], [place((1, 2, 0.3), Z, X), place((4, 2 - 22.0, 0.1), X, Y)]
+        order = slice(None, None, -1 if "first" in inner else 1)
+        made = met[0](*met[1][order], *met[2][order])
+    else:
+        two = mg.Gear(
+            "b",
+            "b",
+            teeth[1],
+            (0, 0, 0),
+            Z,
+            module=2.0,
+            helix_angle=helix if inner != "none" else -helix,
+            internal=inner == "b",
+        )
+        d = abs(one.base_radius + two.base_radius) / np.cos(0.45)
+        made = kinds.Parallel(one, two, place((1, 2, 0.3), Z, X), place((1 + 0.6 * d, 2 + 0.8 * d, 1), -Z, Y))
+    relation, numbers = made.flanks(forward)[0], np.array(made.numbers)[:, None, None]
+    line = relation(made.a, made.b, numbers)
+    P, n = line.point[:, 0, 0], line.along[:, 0, 0]
+    assert np.linalg.norm(n) == pytest.approx(1.0, abs=1e-14)
+    for _ in range(4):
+        (wa, va), (wb, vb) = ((Z * rng.normal(), rng.normal(size=3)) for _ in range(2))
+        h = 1e-5
+        ends = [relation(moved(made.a, wa, va, s * h), moved(made.b, wb, vb, s * h), numbers).value for s in (1, -1)]
+        rate = (ends[0] - ends[1])[0, 0] / (2 * h)
+        assert rate == pytest.approx(n @ (vb + np.cross(wb, P) - va - np.cross(wa, P)), abs=1e-6)
+
+
+@pytest.mark.parametrize("torque", [-3.0, 3.0])
+@pytest.mark.parametrize("helix", [0.0, 0.3])
+def test_bearings_of_any_kind_feel_the_same_force(torque, helix):
+    """A ball, and a ball in a groove: levers along the shaft by hand; the ball takes all thrust, F_t tan b."""
+    gears = spur(distance=0.06 / np.cos(helix), helix=helix)
+    plain, a, _ = stage(gears, torque=torque)
+    real, q, turn = stage(gears, "S", torque)
+    known, s = mg.solve(plain, {a: np.linspace(0, 2, 3)}), mg.solve(real, {q: np.linspace(0, 2, 3)})
+    F = s.coupling("m").force
+    np.testing.assert_allclose(F, known.coupling("m").force, rtol=1e-10)
+    np.testing.assert_allclose(s["B"].position[:, -1], [0, -0.5, -1.0], atol=1e-12)
+    tangential = -torque / gears[1].radius
+    np.testing.assert_allclose(
+        F[0], [abs(tangential) * np.tan(FULL) / np.cos(helix), -tangential, tangential * np.tan(helix)], atol=1e-9
+    )
+    np.testing.assert_allclose(s["BS"].force[:, 2], -F[:, 2], atol=1e-9)
+    # at the groove: moments about the ball, 0.04 to the gear, 0.1 to the groove
+    np.testing.assert_allclose(s["BG"].force[0, 1], -0.4 * F[0, 1], rtol=1e-10)
+    for method in ("newton_euler", "printed"):
+        other = mg.solve(real, {q: np.linspace(0, 2, 3)}, method=method)
+        np.testing.assert_allclose(other["BS"].force, s["BS"].force, atol=1e-9)
+    sparse = mg.solve(real, {q: np.linspace(0, 2, 3)}, engine="sparse")
+    np.testing.assert_allclose(sparse["AG"].force, s["AG"].force, atol=1e-9)
+    assert np.abs(s.checks.power).max() < 1e-10
+    assert np.abs(s.checks.equilibrium).max() < 1e-9
+    assert turn == "B.Rz"
+    assert not s.warnings
+
+
+def test_a_mesh_is_a_sphere_on_a_plane_along_its_line_of_action():
+    """At one position, two helical stages, every shaft on a ball, a ball in a groove and a free pair."""
+    r = 0.02 / np.cos(0.2)
+    gears = [
+        mg.Gear("a", "one", 20, (0, 0, 0), Z, module=0.002, helix_angle=0.2),
+        mg.Gear("b", "two", 40, (3 * r, 0, 0), Z, module=0.002, helix_angle=-0.2),
+        mg.Gear("c", "two", 20, (3 * r, 0, 0.02), Z, module=0.002, helix_angle=0.2),
+        mg.Gear("d", "three", 40, (3 * r, 3 * r, 0.02), Z, module=0.002, helix_angle=-0.2),
+    ]
+    shafts = [
+        on_bearings(n, g.link, g.point, Z, "S") for n, g in zip("ABD", (gears[0], gears[1], gears[3]), strict=True)
+    ]
+    pairs = [pair for some, _ in shafts for pair in some]
+    m = mg.Mechanism("two stages", pairs=pairs, gears=gears, couplings=[mg.Mesh("m1", "a", "b"), mg.Mesh("m2", "c", "d")],
+                     drives=["A.Rz"], loads=[mg.Effort("D.Rz", 7.0)])  # fmt: skip
+    s = mg.solve(m, {"A.Rz": 0.0})
+    lines = [(s.coupling(name).point, s.coupling(name).force) for name in ("m1", "m2")]
+    planes = [
+        mg.Pair(f"K{i}", "Sp", a, b, point=P, axis=F)
+        for i, ((P, F), a, b) in enumerate(zip(lines, ("one", "two"), ("two", "three"), strict=True))
+    ]
+    alone = mg.solve(m.replace(gears=[], couplings=[], pairs=[*pairs, *planes]), {"A.Rz": 0.0})
+    for pair in pairs:
+        if pair.type.symbol != "Fr":
+            np.testing.assert_allclose(alone[pair.name].force, s[pair.name].force, atol=1e-9)
+    assert "Determinate" in mg.check(m).verdict
+    np.testing.assert_allclose(alone["A"].effort, s["A"].effort, atol=1e-12)
+
+
+def involutes(d, w):
+    """Forward flanks of both gears through the pitch point, as curves, base radii 0.02 and 0.03 times cos 20 deg."""
+    ra, rb = 0.02 * np.cos(FULL), 0.03 * np.cos(FULL)
+    direction = lambda angle: (np.cos(angle), np.sin(angle), 0.0)
+    return [
+        mg.Curve.involute(center=(0, 0, 0), radius=ra, axis=-Z, second=direction(inv(w)), angles=(0.05, 1.5)),
+        mg.Curve.involute(center=(d, 0, 0), radius=rb, axis=-Z, second=direction(np.pi + inv(w)), angles=(0.05, 1.5)),
+    ]
+
+
+def test_two_involutes_are_a_mesh_with_moving_centers():
+    """The center of the second gear slides away along x while the first turns: positions, rates and forces of both descriptions."""
+    d, w = 0.0502, np.arccos(0.05 * np.cos(FULL) / 0.0502)
+    at = np.array([0.02 * np.cos(FULL) / np.cos(w), 0, 0])
+    pairs = [
+        mg.Pair("A", "R", "frame", "one", point=(0, 0, 0), axis=Z),
+        mg.Pair("P", "P", "frame", "slide", point=(d, 0, 0), axis=X),
+        mg.Pair("B", "R", "slide", "two", point=(d, 0, 0), axis=Z),
+    ]
+    gears = [mg.Gear("a", "one", 20, (0, 0, 0), Z, module=0.002), mg.Gear("b", "two", 30, (d, 0, 0), Z, module=0.002)]
+    links = [
+        mg.Link("frame"),
+        mg.Link("one"),
+        mg.Link("slide", 0.2, (d, 0, 0)),
+        mg.Link("two", 0.5, (d, 0, 0), np.eye(3) * 1e-4),
+    ]
+    more = {"drives": ["A", "P"], "loads": [mg.Effort("B", 2.0)]}
+    mesh = mg.Mechanism("mesh", links, pairs, gears=gears, couplings=[mg.Mesh("m", "a", "b")], **more)
+    one, two = involutes(d, w)
+    flanks = mg.Mechanism(
+        "flanks",
+        links,
+        [*pairs, mg.Pair("K", "Kc", "one", "two", curve=one, curve_b=two, point=at, closed="form")],
+        **more,
+    )
+    t = np.linspace(0, 0.1, 9)
+    given = {"A": mg.Motion(0.1 * np.sin(t / 0.1), t=t), "P": mg.Motion(0.0008 * (t / 0.1) ** 2, t=t)}
+    s, k = mg.solve(mesh, given), mg.solve(flanks, given)
+    for name in ("position", "velocity", "acceleration"):
+        np.testing.assert_allclose(getattr(s["B"], name), getattr(k["B"], name), rtol=1e-7, atol=1e-9)
+    np.testing.assert_allclose(s["P"].effort, k["P"].effort, rtol=1e-7, atol=1e-8)
+    np.testing.assert_allclose(s["A"].force[:, :2], k["A"].force[:, :2], rtol=1e-7, atol=1e-8)
+    np.testing.assert_allclose(np.abs(s.coupling("m").effort), np.abs(k.contact("K").normal_force), rtol=1e-7)
+
+
+def test_energy_of_a_planet_on_a_swinging_arm_and_a_sun_on_springs():
+    """Kinetic energy, springs and weight from poses and twists alone; both centers move, so that the flank is one row."""
+    k, I = 1e5, 1e-3
+    pairs = [
+        mg.Pair("S", "E", "frame", "sun", point=(0, 0, 0), axis=Z),
+        mg.Pair("A", "R", "frame", "arm", point=(0.002, 0, 0), axis=Z),
+        mg.Pair("P", "R", "arm", "planet", point=(0.0415, 0, 0), axis=Z),
+    ]
+    bodies = {"sun": (0.5, (0, 0, 0)), "arm": (0.2, (0.02, 0, 0)), "planet": (0.3, (0.0415, 0, 0))}
+    links = [mg.Link("frame"), *(mg.Link(n, mass, c, np.eye(3) * I) for n, (mass, c) in bodies.items())]
+    m = mg.Mechanism(
+        "floating sun", links, pairs,
+        gears=[mg.Gear("s", "sun", 20, (0, 0, 0), Z, module=0.002), mg.Gear("p", "planet", 20, (0.0415, 0, 0), Z, module=0.002)],
+        couplings=[mg.Mesh("m", "s", "p")],
+        loads=[mg.Gravity((0, -9.81, 0)), *(mg.Spring(freedom=f"S.{q}", stiffness=k) for q in ("Tx", "Ty"))],
+    )  # fmt: skip
+    with pytest.warns(mg.MechgraphWarning, match="would have to pull"):  # it swings against both flanks
+        s = mg.respond(m, np.linspace(0, 0.02, 6), rates={"S.Rz": 8.0, "A.Rz": -1.0})
+    E = k / 2 * (s["S"].position[:, :2] ** 2).sum(axis=1)
+    for name, (mass, center) in bodies.items():
+        p, w = s.link(name).point(center), s.link(name).angular_velocity
+        E = E + mass / 2 * (p.velocity**2).sum(axis=1) + I / 2 * (w**2).sum(axis=1) + mass * 9.81 * p.position[:, 1]
+    assert np.ptp(s["S"].position[:, 0]) > 1e-5  # the sun does float
+    assert np.ptp(E) < 2e-6 * abs(E).max()
+    F, v = s.coupling("m").force, s.coupling("m").sliding
+    assert np.abs((F * v).sum(axis=1)).max() < 1e-12 * np.abs(F).max()
+
+
+def test_a_flank_that_would_pull_is_a_warning():
+    """One flank where centers move, the one that was asked for: forces of the wrong sense are told, with their range."""
+    pairs = [
+        mg.Pair("A", "R", "frame", "one", point=(0, 0, 0), axis=Z),
+        mg.Pair("P", "P", "frame", "slide", point=(0.0605, 0, 0), axis=X),
+        mg.Pair("B", "R", "slide", "two", point=(0.0605, 0, 0), axis=Z),
+    ]
+    gears = [g.replace(point=(x, 0, 0)) for g, x in zip(spur(), (0, 0.0605), strict=True)]
+    given = {"A": np.zeros(3), "P": [0.0, 1e-4, 2e-4]}
+    for flank, torque, pulls in (
+        ("auto", 3.0, False),
+        ("auto", -3.0, True),
+        ("backward", -3.0, False),
+        ("backward", 3.0, True),
+    ):
+        m = mg.Mechanism(
+            "m",
+            pairs=pairs,
+            gears=gears,
+            couplings=[mg.Mesh("m", "a", "b", flank=flank)],
+            drives=["A", "P"],
+            loads=[mg.Effort("B", torque)],
+        )
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            found = [str(w) for w in mg.solve(m, given).warnings]
+        assert any("would have to pull" in one for one in found) is pulls
+
+
+# --- planets -----------------------------------------------------------------------------------------------------------------
+
+
+def planetary(angles, sun="E", teeth=(24, 30, 84), m=0.002):
+    zs, zp, zr = teeth
+    a = m * (zs + zp) / 2
+    pairs = [
+        mg.Pair("C", "R", "frame", "carrier", point=(0, 0, 0), axis=Z),
+        mg.Pair("S", sun, "frame", "sun", point=(0, 0, 0), axis=Z),
+    ]
+    gears = [
+        mg.Gear("s", "sun", zs, (0, 0, 0), Z, module=m),
+        mg.Gear("r", "frame", zr, (0, 0, 0), Z, module=m, internal=True),
+    ]
+    couplings = []
+    for i, t in enumerate(angles):
+        at = (a * np.cos(t), a * np.sin(t), 0)
+        pairs.append(mg.Pair(f"P{i}", "R", "carrier", f"planet{i}", point=at, axis=Z))
+        gears.append(mg.Gear(f"p{i}", f"planet{i}", zp, at, Z, module=m))
+        couplings += [mg.Mesh(f"s{i}", "s", f"p{i}"), mg.Mesh(f"r{i}", f"p{i}", "r")]
+    return mg.Mechanism(
+        "planetary", pairs=pairs, gears=gears, couplings=couplings, drives=["C"], loads=[mg.Effort("S.Rz", -7.0)]
+    )
+
+
+@pytest.mark.parametrize("degrees", [(0, 120, 240), (0, 100, 240)])
+def test_a_floating_sun_shares_its_load_by_statics(degrees):
+    """Three forces T / r_b in balance: shares go with the sines of the opposite angles; Willis turns the sun."""
+    angles = RAD(degrees)
+    m = planetary(angles)
+    r = mg.check(m)
+    assert (r.mobility, r.redundancy) == (1, 0)
+    s = mg.solve(m, {"C": np.linspace(0, 1, 3)})
+    np.testing.assert_allclose(s["S"].position[:, 2], s["C"].position[:, 0] * (1 + 84 / 24), rtol=1e-12)
+    opposite = np.array([np.sin(angles[(i + 2) % 3] - angles[(i + 1) % 3]) for i in range(3)])
+    shares = np.array([s.coupling(f"s{i}").effort for i in range(3)]) * 0.024 * np.cos(FULL) / 7.0
+    np.testing.assert_allclose(np.abs(shares), np.repeat(opposite[:, None] / opposite.sum(), 3, axis=1), rtol=1e-9)
+    if degrees[1] == 100:
+        np.testing.assert_allclose(opposite / opposite.sum(), [0.2578, 0.3473, 0.3949], atol=5e-5)
+    np.testing.assert_allclose(s["C"].effort[:, 0], 7.0 * (1 + 84 / 24), rtol=1e-10)
+
+
+def test_a_sun_in_a_bearing_is_redundant_twice():
+    m = planetary(RAD([0, 120, 240]), "R")
+    r = mg.check(m)
+    assert (r.mobility, r.redundancy) == (1, 2)
+    assert r.ratios["S.Rz"]["C.Rz"] == pytest.approx(1 + 84 / 24, rel=1e-12)
+
+
+def test_places_of_planets():
+    """(20 + 54) / 3 is not whole: places are multiples of 2 pi / 74; six of 30 teeth about 24 overlap, 54 sin 30 = 27 < 32."""
+    np.testing.assert_allclose(np.rad2deg(mg.planet_places(20, 54, 3)), [0, 121.6216, 238.3784], atol=5e-5)
+    with pytest.raises(mg.DeclarationError, match="27; expected more than 32"):
+        mg.planet_places(24, 84, 6)
+    with pytest.warns(mg.MechgraphWarning, match="cannot both be put in"):
+        planetary(RAD([0, 120, 240]), teeth=(20, 17, 54))
+    planetary(mg.planet_places(20, 54, 3), teeth=(20, 17, 54))
+
+
+# --- thrust, screws, bevels, worms, racks --------------------------------------------------------------------------------------
+
+
+def test_a_middle_shaft_without_thrust():
+    """Both gears of one hand: thrust 2 T tan b / d of each; none is left where tan b2 / tan b1 = d2 / d1."""
+    b1 = RAD(20.0)
+    # wheel 100, pinion 40 across at their pitch circles
+    b2 = np.arctan(np.tan(b1) * 40 / 100)
+    assert np.rad2deg(b2) == pytest.approx(8.2834, abs=5e-5)
+    mb, mc = 0.002 * np.cos(b1), 0.002 * np.cos(b2)
+    wheel, pinion = 50, 20
+    gears = [
+        mg.Gear("a", "one", 25, (0, 0, 0), Z, module=mb, helix_angle=-b1),
+        mg.Gear("b", "two", wheel, (0.075, 0, 0), Z, module=mb, helix_angle=b1),
+        mg.Gear("c", "two", pinion, (0.075, 0, 0.03), Z, module=mc, helix_angle=b2),
+        mg.Gear("d", "three", 40, (0.135, 0, 0.03), Z, module=mc, helix_angle=-b2),
+    ]
+    pairs = [
+        p
+        for n, g in zip("ABD", (gears[0], gears[1], gears[3]), strict=True)
+        for p in on_bearings(n, g.link, g.point, Z, "S")[0]
+    ]
+    m = mg.Mechanism(
+        "shaft",
+        pairs=pairs,
+        gears=gears,
+        couplings=[mg.Mesh("m1", "a", "b"), mg.Mesh("m2", "c", "d")],
+        drives=["A.Rz"],
+        loads=[mg.Effort("D.Rz", 5.0)],
+    )
+    s = mg.solve(m, {"A.Rz": [0.0, 0.5]})
+    assert np.abs(s["BS"].force[:, 2]).max() < 1e-9
+    assert s["DS"].force[0, 2] == pytest.approx(-s.coupling("m2").force[0, 2], rel=1e-9)
+    assert abs(s["DS"].force[0, 2]) == pytest.approx(2 * 5.0 * np.tan(b2) / 0.08, rel=1e-9)
+
+
+KINDS = {
+    "screw": (
+        [
+            mg.Gear("a", "one", 20, (0, 0, 0), Z, module=0.002, helix_angle=RAD(45)),
+            mg.Gear("b", "two", 20, (0, 0.04 / np.cos(RAD(45)), 0), X, module=0.002, helix_angle=RAD(45)),
+        ],
+        None,
+    ),
+    "bevel": (
+        [
+            mg.BevelGear("a", "one", 20, (0.1, 0, 0), X, module=0.002, spiral_angle=0.3),
+            mg.BevelGear("b", "two", 40, (0, 0.1, 0), Y, module=0.002, spiral_angle=-0.3),
+        ],
+        mg.BevelGears("m", "A", "B", teeth=(20, 40), module=0.002, spiral_angle=0.3),
+    ),
+    "worm": (
+        [mg.Worm("a", "one", 2, (0, 0, 0), X, radius=0.01), mg.WormWheel("b", "two", 40, (0, 0.05, 0), Z)],
+        mg.WormGear("m", "A", "B", teeth=(2, 40), radius=0.01),
+    ),
+}
+
+
+@pytest.mark.parametrize("torque", [2.0, -2.0])
+@pytest.mark.parametrize("kind", KINDS)
+def test_gears_on_other_axes(kind, torque):
+    """On pairs R, and on balls: the same forces; those of the short forms where there are any."""
+    gears, short = KINDS[kind]
+    plain, a, _ = stage(gears, torque=torque)
+    real, q, _ = stage(gears, "S", torque)
+    turn = mg.Motion(np.linspace(0, 0.3, 4), 100.0)
+    known, s = (mg.solve(m, {q: turn}, engine="dense") for m in (plain, real))
+    np.testing.assert_allclose(s.coupling("m").force, known.coupling("m").force, rtol=1e-9)
+    np.testing.assert_allclose(s["B"].position[:, -1], known["B"].position[:, 0], atol=1e-12)
+    if short is not None:
+        old = mg.solve(plain.replace(gears=[], couplings=[short]), {a: turn}, engine="dense")
+        np.testing.assert_allclose(known.coupling("m").force, old.coupling("m").force, rtol=1e-12)
+        np.testing.assert_allclose(known["B"].position, old["B"].position, atol=1e-14)
+    if kind == "screw":
+        # w1 m z1 / 2 (tan b1 + tan b2), along the teeth
+        np.testing.assert_allclose(np.linalg.norm(s.coupling("m").sliding, axis=1), 100 * 0.02 * 2, rtol=1e-10)
+        assert gears[1].point[1] == pytest.approx(0.0565685, abs=1e-6)
+
+
+def test_shafts_that_leave_their_places():
+    gears = KINDS["bevel"][0]
+    pairs = [
+        mg.Pair("A", "C", "frame", "one", point=(0.1, 0, 0), axis=X),
+        mg.Pair("B", "R", "frame", "two", point=(0, 0.1, 0), axis=Y),
+    ]
+    m = mg.Mechanism("m", pairs=pairs, gears=gears, couplings=[mg.Mesh("m", "a", "b")], drives=["A.Rz", "A.Tz"])
+    with pytest.raises(mg.DeclarationError, match="need axes that keep their places"):
+        mg.solve(m, {"A.Rz": [0.0, 0.5], "A.Tz": [0.0, 0.01]})
+
+
+def rack(order=("a", "b"), force=5.0, helix=0.2, wheel=None):
+    """A pinion and a rack below it, or a wheel so large that it is one; the pinion driven."""
+    r = 0.02 / np.cos(helix)
+    pinion = mg.Gear("a", "one", 20, (0, 0, 0), Z, module=0.002, helix_angle=helix)
+    pairs = [mg.Pair("A", "R", "frame", "one", point=(0, 0, 0), axis=Z)]
+    if wheel is None:
+        gears = [pinion, mg.GearRack("b", "two", (0, -r, 0), X, Y, module=0.002, helix_angle=-helix)]
+        pairs.append(mg.Pair("B", "P", "frame", "two", point=(0, -r, 0), axis=X))
+        loads = [mg.Effort("B", force)]
+    else:
+        R = 0.002 * wheel / (2 * np.cos(helix))
+        gears = [pinion, mg.Gear("b", "two", wheel, (0, -r - R, 0), Z, module=0.002, helix_angle=-helix)]
+        pairs.append(mg.Pair("B", "R", "frame", "two", point=(0, -r - R, 0), axis=Z))
+        loads = [mg.Effort("B", -force * R)]
+    return mg.Mechanism("rack", pairs=pairs, gears=gears, couplings=[mg.Mesh("m", *order)], drives=["A"], loads=loads)
+
+
+@pytest.mark.parametrize("force", [5.0, -5.0])
+def test_a_rack_is_a_wheel_without_end(force):
+    s, wheel = (mg.solve(m, {"A": [0.0, 0.7]}) for m in (rack(force=force), rack(force=force, wheel=10**9)))
+    np.testing.assert_allclose(s.coupling("m").force, wheel.coupling("m").force, rtol=1e-6)
+    other = mg.solve(rack(("b", "a"), force), {"A": [0.0, 0.7]})
+    np.testing.assert_allclose(other.coupling("m").force, -s.coupling("m").force, rtol=1e-12)
+    np.testing.assert_allclose(s["B"].position[:, 0], [0.0, 0.7 * 0.02 / np.cos(0.2)], rtol=1e-12)
+
+
+def test_spur_gears_are_helical_ones_of_no_helix():
+    forces = [
+        mg.solve(stage(spur(distance=0.06 / np.cos(b), helix=b), "S")[0], {"A.Rz": 0.4}).coupling("m").force
+        for b in (0.0, 1e-7)
+    ]
+    np.testing.assert_allclose(forces[1], forces[0], atol=1e-4)
+    assert np.abs(forces[1] - forces[0])[2] > 1e-7
+
+
+# --- declaration -----------------------------------------------------------------------------------------------------------------
+
+
+def test_gears_go_through_files_units_and_motions(tmp_path):
+    m = rack().replace(units={"length": "m", "mass": "kg", "time": "s"})
+    mg.save(m, tmp_path / "rack.toml")
+    assert mg.load(tmp_path / "rack.toml") == m
+    small = m.to_units(length="mm")
+    assert small.gear("b").module == pytest.approx(2.0)
+    np.testing.assert_allclose(mg.solve(small, {"A": 0.3})["B"].position, 1e3 * mg.solve(m, {"A": 0.3})["B"].position)
+    turned = np.eye(4)
+    turned[:3, :3], turned[:3, 3] = [[0, 0, 1], [1, 0, 0], [0, 1, 0]], (1, 2, 3)
+    F = mg.solve(m.moved(turned), {"A": 0.3}).coupling("m").force
+    np.testing.assert_allclose(F, turned[:3, :3] @ mg.solve(m, {"A": 0.3}).coupling("m").force, atol=1e-12)
+
+
+def test_the_kernel_serves_gears_on_pairs_r_and_refuses_rows_along_lines_by_name():
+    a, b = stage(spur())[0], stage(spur(), "S")[0]
+    assert a.couplings[0].linear
+    assert not b.couplings[0].linear
+    with pytest.raises(mg.DeclarationError, match="the row of the coupling 'm' is evaluated from poses"):
+        mg.compile(b.replace(loads=[]))
+    with pytest.raises(mg.DeclarationError, match="'m' is no polynomial"):
+        mg.assemblies(b, {"A.Rz": 0.0})
+    s = mg.solve(a, {"A": np.linspace(0, 1, 30)}, engine="dense")
+    np.testing.assert_allclose(
+        mg.kinematics(a, {"A": np.linspace(0, 1, 30)})["B"].position, s["B"].position, atol=1e-13
+    )
+
+
+def test_a_thousand_gears_are_declared_in_linear_time():
+    def seconds(n):
+        at = [(0.04 * i, 0, 0) for i in range(n)]
+        given = {
+            "pairs": [mg.Pair(f"P{i}", "R", "frame", f"w{i}", point=p, axis=Z) for i, p in enumerate(at)],
+            "gears": [mg.Gear(f"g{i}", f"w{i}", 20, p, Z, module=0.002) for i, p in enumerate(at)],
+            "couplings": [mg.Mesh(f"m{i}", f"g{i}", f"g{i + 1}") for i in range(n - 1)],
+        }
+        begin = time.process_time()
+        mg.Mechanism("train", **given, drives=["P0"])
+        return time.process_time() - begin
+
+    seconds(10)
+    few, many = min(seconds(250) for _ in range(2)), min(seconds(500) for _ in range(2))
+    assert many < 2.5 * few + 0.05
