@@ -51,7 +51,7 @@ from mechgraph.model import parts
 from mechgraph.model.belts import BeltDrive, Pulley
 from mechgraph.model.couplings import Belt, BevelGears, Coupling, Rack, SpurGears, WormGear
 from mechgraph.model.friction import Friction
-from mechgraph.model.gear_facts import MeshFacts, mesh_facts
+from mechgraph.model.gear_facts import mesh_facts
 from mechgraph.model.gears import BevelGear, Gear, GearRack, Mesh, Worm, WormWheel
 from mechgraph.model.loads import Damper, Effort, ForceLaw, ForceTable, Gravity, Spring, TorsionSpring, Wrench
 from mechgraph.model.mechanism import Mechanism, chain
@@ -90,7 +90,7 @@ __all__ = [
     "DeadPointError", "DeclarationError", "Decomposition", "DeterminacyReport", "Drive", "Effort", "Event",
     "Families", "FileError", "ForceLaw", "ForceTable", "Formulation", "FreeBody", "Freedom", "Friction",
     "FrictionError", "Gear", "GearRack", "Gravity", "Group", "Hertz", "Identity", "IndeterminateError", "Journal",
-    "Link", "Marker", "Mechanism", "MechgraphError", "MechgraphWarning", "Mesh", "MeshFacts", "Misfit",
+    "Link", "Marker", "Mechanism", "MechgraphError", "MechgraphWarning", "Mesh", "Misfit",
     "MissingExtraError", "Motion", "MultipleJoint", "OverTime", "Pair", "PairType", "Pulley", "Rack", "ReachError",
     "Response", "ResponseError", "ResponseSetup", "Segment", "ShapeError", "Solution", "Spring", "SpurGears",
     "Stiffness", "Stop", "Structure", "Study", "StudyError", "Surface", "SystemGroup", "Tolerances", "TorsionSpring",

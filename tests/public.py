@@ -537,6 +537,15 @@ def further_doors(folder: Path) -> list[Door]:
             couplings=[mg.BeltDrive(**more)],
         )
 
+    flanks = {"pressure_angle": 0.3}
+
+    def toothed(kind: Callable) -> Callable:
+        return lambda *args, **more: mg.Mechanism("g", None, [hinge, spur], gears=[kind(*args, **more)])
+
+    def meshed(*args: Any, **more: Any) -> mg.Mechanism:
+        wheels = [mg.Gear("p", "p", 10, (0, 0, 0), Z, 0.1), mg.Gear("w", "w", 20, (1.5, 0, 0), Z, 0.1)]
+        return mg.Mechanism("g", None, [hinge, spur], gears=wheels, couplings=[mg.Mesh(*args, **more)])
+
     def placed(*args: Any, **more: Any) -> object:
         return mg.Mechanism("b", None, [hinge, spur], gears=[mg.Pulley(*args, **more)])
 
@@ -549,6 +558,24 @@ def further_doors(folder: Path) -> list[Door]:
         ),
         ("Mechanism.gear", placed("p", "w", (1.5, 0, 0), Z, 0.1).gear, ("p",), {}),
         ("Pulley", placed, ("p", "w", (1.5, 0, 0), Z), {"teeth": 20, "pitch": 0.1}),
+        (
+            "Gear",
+            toothed(mg.Gear),
+            ("p", "p", 10, (0, 0, 0), Z, 0.1),
+            {**flanks, "helix_angle": 0.0, "shift": 0.0, "width": 0.1},
+        ),
+        ("GearRack", toothed(mg.GearRack), ("p", "p", (0, 0, 0), (1, 0, 0), (0, 1, 0), 0.1), {**flanks, "width": 0.1}),
+        (
+            "BevelGear",
+            toothed(mg.BevelGear),
+            ("p", "p", 10, (0.1, 0, 0), Z, 0.1),
+            {**flanks, "spiral_angle": 0.0, "cone": 0.3},
+        ),
+        ("Worm", toothed(mg.Worm), ("p", "p", 2, (0, 0, 0), Z, 0.1), {**flanks, "left_hand": False, "mark": (1, 0, 0)}),
+        ("WormWheel", toothed(mg.WormWheel), ("p", "p", 20, (0, 0, 0), Z), {"mark": (1, 0, 0)}),
+        ("Mesh", meshed, ("g", "p", "w"), {"backlash": 0.01, "flank": "forward"}),
+        ("mesh_facts", mg.mesh_facts, (meshed("g", "p", "w"),), {}),
+        ("planet_places", mg.planet_places, (20, 54, 3), {}),
         ("Belt", geared(mg.Belt, spur), ("g", "A", "B", (0.3, 0.2)), {"crossed": False}),
         (
             "BevelGears",
