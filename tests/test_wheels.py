@@ -338,3 +338,20 @@ def test_a_roller_touches_the_profile_of_its_cam_wherever_it_stands() -> None:
     x, y = profile.shape.vertices[:, :2].T
     assert area == pytest.approx(abs(x @ np.roll(y, 1) - y @ np.roll(x, 1)) / 2)
     assert not [p for p in parts(found, "link") if p.owner == "cam"]
+
+
+def test_a_roller_runs_between_the_walls_of_its_groove() -> None:
+    """On a barrel: both walls are a radius away from the middle of the roller, wherever it stands."""
+    law = mg.CamLaw([mg.Segment("cycloidal", 20.0, np.pi), mg.Segment("cycloidal", -20.0, np.pi)])
+    groove = mg.Curve.barrel(law=law, radius=50.0, roller_radius=6.0, second=(1, 0, 0))
+    m = mg.Mechanism("barrel", pairs=[
+        mg.Pair("A", "R", "frame", "barrel", point=(0, 0, 0), axis=Z), mg.Pair("B", "P", "frame", "rod", point=(50, 0, 0), axis=Z),
+        mg.Pair("K", "Rg", "barrel", "rod", curve=groove, point=(50, 0, 0)),
+    ], drives=["A"])  # fmt: skip
+    found = scene(mg.kinematics(m, {"A": np.linspace(0.1, 3.0, 4)}))
+    walls = parts(found, "wheel", "K")
+    assert len(walls) == 2
+    for t in range(4):
+        center = found.points["K", "rod"][t]
+        for wall in walls:
+            assert away(center[None], found.vertices(wall, t))[0] == pytest.approx(6.0, rel=0.01)

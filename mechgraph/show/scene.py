@@ -228,9 +228,9 @@ def cams(stage: DrawnPose) -> Iterator[DrawnPart]:
             if wide and travel.is_plane and not curve.is_closed:
                 yield DrawnPart("wheel", pair.name, link, f"link:{link}", _slot(here.x.T, here.y.T, wide))
             elif wide:
-                walls = (
-                    [shapes.polyline((here.x + side * here.y).T) for side in (-wide, wide)] if travel.is_plane else []
-                )
+                # a groove in space has its walls where it holds a roller, across its y; one that holds a ball is round
+                two = travel.is_plane or pair.type.component_names == ("Fy",)
+                walls = [shapes.polyline((here.x + side * here.y).T) for side in (-wide, wide)] if two else []
                 yield from (DrawnPart("wheel", pair.name, link, f"link:{link}", wall) for wall in walls)
             else:
                 x = (here.x - (outside(curve) * curve.roller * here.y if curve.roller else 0.0)).T
