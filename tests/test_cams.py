@@ -468,3 +468,17 @@ def test_least_preload_of_a_harmonic_follower(stiffness, expected):
     # with that spring the contact holds, but not with less
     spring = mg.ForceLaw(freedom="B", law=lambda x, v, t: -(found + stiffness * x))
     assert mg.solve(m.replace(loads=[spring]), {"A": turn}).contact("K").normal_force.min() > -1e-7
+
+
+def test_the_discs_of_a_conjugate_cam_keep_their_rollers_apart():
+    """The second disc has the law downwards: both rollers of one follower touch at all angles, here on opposite sides, and on one arm."""
+    u = np.linspace(0, 2 * np.pi, 201)
+    first = mg.Curve.cam(law=LAW, base_radius=0.04, roller_radius=0.01, second=(0, 1, 0))
+    second = mg.Curve.cam(law=-LAW, base_radius=0.06, roller_radius=0.01, second=(0, -1, 0))
+    apart = np.linalg.norm(first.at(u)[0] - second.at(u)[0], axis=0)
+    np.testing.assert_allclose(apart, 0.12, rtol=1e-13)
+    swing, arm = double_dwell(rise=0.3), {"arm": 0.09, "pivot": 0.12}
+    one = mg.Curve.arm_cam(law=swing, base_radius=0.04, **arm)
+    other = mg.Curve.arm_cam(law=-swing, base_radius=0.06, mirrored=True, **arm)
+    apart = np.linalg.norm(one.at(u)[0] - other.at(u)[0], axis=0)
+    np.testing.assert_allclose(apart, apart[0], rtol=1e-13)
