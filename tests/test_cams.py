@@ -447,7 +447,7 @@ def test_a_table_of_a_cam_has_its_facts(tmp_path):
     )
     np.testing.assert_allclose(profile, cut, atol=1e-16)
     np.testing.assert_allclose(np.linalg.norm(pitch - profile, axis=1), 0.01, rtol=1e-12)
-    with pytest.raises(mg.FileError, match="unknown file extension '.step'"):
+    with pytest.raises(mg.FileError, match=r"unknown file extension '\.step'"):
         cam.write(tmp_path / "cam.step", error=1e-5)
 
 

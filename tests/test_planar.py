@@ -674,3 +674,25 @@ def test_friction_of_pins_and_guides_in_the_plane() -> None:
     s, twin = (mg.solve(one, motion, loads=loads) for one in (m, m.to_spatial()))
     assert np.allclose(s["A"].effort, twin["A"].effort, rtol=1e-10)
     assert not np.allclose(s["A"].effort, mg.solve(m, motion)["A"].effort, rtol=1e-2)
+
+
+def test_loads_in_the_frames_of_turned_links_come_along() -> None:
+    """The arm's frame is turned about x against the frame's; the end of a spring and a wrench that turns with it stand in that."""
+    pin = mg.Pair(
+        "A",
+        "R",
+        "frame",
+        "arm",
+        on_a=mg.Marker((0, 0, 0), (0, 0, 1), (1, 0, 0)),
+        on_b=mg.Marker((0, 0, 0), (0, 1, 0), (1, 0, 0)),
+    )
+    loads = [
+        mg.Spring("frame", "arm", (0, 2.0, 0), (1.0, 0, -0.3), 50.0, 0.5),
+        mg.Wrench("arm", force=(0, 0, -3.0), point=(1.0, 0, -0.2), frame="link"),
+    ]  # fmt: skip
+    for tilt in (np.eye(3), [[0, 0, 1], [1, 0, 0], [0, 1, 0]]):
+        pose = np.column_stack([tilt, [0.1, 0.2, 0.3]])
+        m = mg.Mechanism("arm", [mg.Link("frame"), mg.Link("arm", 1.0, (0.5, 0, 0))], [pin], ["A"], loads).moved(pose)
+        given = {"A": mg.Motion([0.1, 0.5], velocity=2.0)}
+        space, plane = mg.solve(m, given), mg.solve(m.to_planar(), given)
+        assert np.allclose(plane["A"].effort, space["A"].effort, rtol=1e-12)

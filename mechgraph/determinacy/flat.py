@@ -21,6 +21,7 @@ from mechgraph.force.loads import user_poses
 from mechgraph.kinematics.assembly import assembled
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Array
+from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.plane import dropped, lifted
@@ -114,7 +115,8 @@ class _Flat:
             for i, link in enumerate(turned.links)
         ]
         pairs = [self._pair(pair, (ends[place[pair.a]], ends[place[pair.b]])) for pair in turned.pairs]
-        loads = [self._dropped(load) for load in turned.loads]
+        turns = {link.name: end.turn for link, end in zip(turned.links, ends, strict=True)}
+        loads = [self._dropped(_in_turned_frames(load, turns)) for load in turned.loads]
         gears = [
             self._dropped(gear.moved(np.column_stack([ends[place[gear.link]].turn, np.zeros(3)])))
             for gear in turned.gears
@@ -214,6 +216,24 @@ class _Flat:
         else:
             axis, second = np.array([0.0, 0.0, end.side]), end.first
         return {"point": (*point[:2].tolist(), 0.0), "axis": tuple(axis.tolist()), "second": tuple(second.tolist())}
+
+
+def _in_turned_frames(load: Load, turns: Mapping[str, Array]) -> Load:
+    """A load whose points and directions in frames of links stand in the turned ones."""
+    of = {"p": "a", "q": "b", "along": "a", "point": "link"}
+    of |= {"force": "link", "moment": "link"} if getattr(load, "frame", "") == "link" else {}
+    changes = {}
+    for name, field_of_link in of.items():
+        about, value = load.formats.get(name), getattr(load, name, None)
+        link = getattr(load, field_of_link, None)
+        if (
+            about is not None
+            and about.kind.moved is not None
+            and isinstance(link, str)
+            and not isinstance(value, str | None)
+        ):
+            changes[name] = about.kind.moved(value, np.column_stack([turns[link], np.zeros(3)]))
+    return load.replace(**changes) if changes else load
 
 
 def _directed(part: Component, axes: Array) -> Array:

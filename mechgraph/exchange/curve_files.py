@@ -34,7 +34,7 @@ def _within(points: Any, u: Array, error: float, spline: bool, closed: bool) -> 
         if closed:
             x[-1] = x[0]
         # ends with the true tangents, so that a closed curve closes smoothly and its knots are those of the ends
-        ends = ([(1, points(u[:1], 1)[0])], [(1, points(u[-1:], 1)[0])]) if spline else None
+        ends: Any = ([(1, points(u[:1], 1)[0])], [(1, points(u[-1:], 1)[0])]) if spline else None
         through: Any = scipy.interpolate.make_interp_spline(u, x, 3 if spline else 1, bc_type=ends)
         inner = u[:-1, None] + np.diff(u)[:, None] * np.array([0.25, 0.5, 0.75])
         true = points(inner.ravel())

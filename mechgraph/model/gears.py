@@ -172,7 +172,7 @@ class _Toothed(Described):
     def value_faults(self, where: str) -> list[str]:
         """See ``Described``."""
         found = super().value_faults(where)
-        if self.axis is None:  # type: ignore[attr-defined]
+        if self.axis is None:
             found.append(f"{where}axis: is missing; give a direction, e.g. (0, 0, 1) (planar=True needs none)")
         for name in ("pressure_angle", "helix_angle", "spiral_angle"):
             value = getattr(self, name, 0.0)
