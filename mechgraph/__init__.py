@@ -52,9 +52,10 @@ from mechgraph.model.belts import BeltDrive, Pulley
 from mechgraph.model.couplings import Belt, BevelGears, Coupling, Rack, SpurGears, WormGear
 from mechgraph.model.friction import Friction
 from mechgraph.model.gear_facts import mesh_facts
-from mechgraph.model.gears import BevelGear, Gear, GearRack, Mesh, Worm, WormWheel
+from mechgraph.model.gears import BevelGear, Gear, GearRack, Worm, WormWheel
 from mechgraph.model.loads import Damper, Effort, ForceLaw, ForceTable, Gravity, Spring, TorsionSpring, Wrench
 from mechgraph.model.mechanism import Mechanism, chain
+from mechgraph.model.meshes import Mesh
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.model.planets import planet_places

@@ -19,8 +19,9 @@ from mechgraph.kinematics.motion_path import BLOCK, DriverPath, Positions, Statu
 from mechgraph.kinematics.prescribed import DriverMotion
 from mechgraph.kinematics.rates import PassiveMotion, Rates, Velocities, accuracy, at_dead_points, disagreement, rates
 from mechgraph.kinematics.solver import closure_solver
-from mechgraph.kinematics.state import ClosureSolver, Configuration, FactoredClosure, strayed
+from mechgraph.kinematics.state import ClosureSolver, Configuration, FactoredClosure
 from mechgraph.kinematics.system import System
+from mechgraph.kinematics.touching import strayed
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.singular_point import passed
 from mechgraph.maths.tracker import Follower

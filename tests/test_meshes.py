@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
-from mechgraph.model import gears as kinds
+from mechgraph.model import meshes as kinds
 from mechgraph.model.lines import Places
 
 X, Y, Z = np.eye(3)

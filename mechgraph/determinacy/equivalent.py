@@ -27,7 +27,8 @@ from mechgraph.errors import DeclarationError
 from mechgraph.force.loads import user_poses
 from mechgraph.graph.atlas import MultipleJoint
 from mechgraph.kinematics.assembly import assembled, assembled_at, at_position
-from mechgraph.kinematics.state import Configuration, ContactLines
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.touching import ContactLines
 from mechgraph.maths.se3 import Array
 from mechgraph.model.couplings import Contact
 from mechgraph.model.mechanism import Mechanism

@@ -33,7 +33,8 @@ from mechgraph.force.reactions import (
     split_stress,
 )
 from mechgraph.kinematics.rates import PassiveMotion, PassiveMotions, Rates, Velocities
-from mechgraph.kinematics.state import Configuration, ContactLines, FactoredClosure
+from mechgraph.kinematics.state import Configuration, FactoredClosure
+from mechgraph.kinematics.touching import ContactLines
 from mechgraph.maths.linear import add_at
 from mechgraph.maths.se3 import Array, Index, cross, rotate_back
 from mechgraph.maths.tolerances import MOTIONS

@@ -28,7 +28,8 @@ from mechgraph.equations.terms import MovingState, State
 from mechgraph.errors import DeclarationError
 from mechgraph.force.loads import inertia_wrenches, user_poses, user_twists
 from mechgraph.kinematics.rates import Rates
-from mechgraph.kinematics.state import Configuration, ContactLines, FactoredClosure
+from mechgraph.kinematics.state import Configuration, FactoredClosure
+from mechgraph.kinematics.touching import ContactLines
 from mechgraph.maths.linear import Choice, ChosenSystem, add_at, choose, least_solution
 from mechgraph.maths.se3 import Array, Index, batch_last, cross, shift_wrench
 from mechgraph.maths.tolerances import STRESSES

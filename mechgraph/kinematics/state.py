@@ -4,17 +4,6 @@ Everything here is internal: lengths over L, positions about the internal origin
 first and positions last. ``S`` are the twists of all freedoms about the internal origin, one column a freedom. Results have the
 type of the numbers that come in, real or complex.
 
-Forces of gears and belts in a configuration: couplings that act along lines of their own, not as efforts in freedoms.
-
-A coupling with the multiplier m exerts the effort ``c_j m`` in freedom j, as if through that pair. Gears touch each other instead: the
-wrench ``F = G m`` acts on gear b, ``-F`` on gear a, and the pairs j on the way between them, passed in the sense ``s_j``, are relieved of
-``s_j F`` and of the effort that they would carry:
-
-    wrench of the pair = wrench that closes the equilibrium - (s_j G - E_j c_j) m.
-
-``s_j G . S_j = c_j`` (see ``model.contact``), so that what is taken off does no work in any freedom: motion and efforts are those of the
-linear relation, reactions are those of the contact.
-
 The rows of the closure equations by loops: entries, the measure of every loop, and the rows of a loop reduced to independent ones.
 
 The rows of a loop (six, in a plane three), about its own middle, are taken over its own length, columns of unit size, and turned by a
@@ -38,13 +27,11 @@ import scipy
 
 from mechgraph.graph.linkgraph import LinkGraph
 from mechgraph.kinematics.layout import ScrewTable, entries_of, run_sums
-from mechgraph.kinematics.lines import LineRows
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import LeastNorm
 from mechgraph.maths.se3 import Array, Index, Mask, compose, cross, cross_twist, finite_twist, move_twist, multiplied
 from mechgraph.maths.tolerances import PATH, RANKS
-from mechgraph.model.couplings import Axes, BaseCoupling, Contact, Lines, fitting_of
-from mechgraph.model.lines import LineCoupling, moving_lines
+from mechgraph.model.lines import moving_lines
 from mechgraph.pairs import pair_type as evaluation
 
 ROUNDINGS = 20
@@ -502,165 +489,6 @@ class ClosureSolver(Protocol):
 
     def corrigible(self, dq: Array, which: Index) -> Array:
         """Increments ``(F, T)`` without the motions that are held: no correction can remove what a prediction adds to them."""
-
-
-def strayed(here: Configuration) -> str | None:
-    """Which shafts of gears leave the places that their relations are about; None for none."""
-    m = here.system.m
-    if not m.once(moving_lines) or not here.T:
-        return None
-    which = np.array([g for g, c in enumerate(m.couplings) if c.name in m.once(moving_lines)])
-    return LineRows(here.system, which).strayed(here, max(fitting_of(m), 1e-7))
-
-
-class ContactLines:
-    """Lines of all contacts at the positions of a configuration, internal units about the internal origin."""
-
-    def __init__(self, here: Configuration) -> None:
-        self.here = here
-        self.contacts = [(g, c) for g, c in enumerate(here.system.m.couplings) if c.steps]
-        self.settled: dict[int, Mask] = {}
-
-    def __bool__(self) -> bool:
-        return bool(self.contacts)
-
-    def _columns(self, contact: BaseCoupling) -> Index:
-        return np.array([self.here.system.first_column[step.pair] for step in contact.steps], dtype=np.intp)
-
-    @cached_property
-    def wrenches(self) -> list[tuple[Array, Array]]:
-        """For every contact the wrench on gear b for a unit multiplier ``(6, 2, T)``, of a positive and of a negative one, and the points
-        ``(3, 2, T)`` at which it acts.
-        """
-        return [self._of(g, contact) for g, contact in self.contacts]
-
-    def _of(self, g: int, contact: BaseCoupling) -> tuple[Array, Array]:
-        if not isinstance(contact, Contact):
-            return self._of_line(g)
-        here, columns = self.here, self._columns(contact)
-        first, last = contact.steps[0].pair, contact.steps[-1].pair
-        S = [here.S[:, columns[i]] for i in (0, -1)]
-        along = S[1][3:] if contact.slides else S[1][:3]
-        axes = Axes(here.pair_points[:, first], S[0][:3], here.pair_points[:, last], along, here.system.par.L)
-        P, n = self._lines(g, axes)
-        line = np.concatenate([cross(P, n), n])
-        if here.system.m.planar:  # of gears with a helix the axial force leaves the plane
-            line[np.delete(np.arange(6), here.system.graph.span)] = 0.0
-        power = contact.steps[0].sense * (line * S[0][:, None]).sum(axis=0)
-        size = here.system.coupling_matrix[g, columns[0]] / power
-        # the first line serves the multipliers that make its force push, the second the others
-        turned = size[0] < 0.0
-        pick = np.where(turned, [[1], [0]], [[0], [1]])
-        places = np.arange(here.T)
-        G = np.stack([(line * size)[:, pick[i], places] for i in range(2)], axis=1)
-        return G, np.stack([P[:, pick[i], places] for i in range(2)], axis=1)
-
-    def _of_line(self, g: int) -> tuple[Array, Array]:
-        """The same of a coupling along a line that the poses tell."""
-        here, row = self.here, self.here.system.graph.loop_rows + g
-        rows, coupling = LineRows(here.system, np.array([g])), here.system.m.couplings[g]
-        at = rows.lines(here.poses)
-        P, n = (np.repeat(part, 2, axis=1) for part in (at.point, at.along))
-        if isinstance(coupling, LineCoupling) and coupling.other is not None:
-            n[:, 1] = rows.lines(here.poses, other=True).along[:, 0]
-        G = np.concatenate([cross(P, n), n]) * here.system.row_scale[row] * here.system.par.L
-        if here.system.m.planar:
-            G[np.delete(np.arange(6), here.system.graph.span)] = 0.0
-        return G, P
-
-    @cached_property
-    def moving(self) -> dict[int, Array]:
-        """For every row evaluated from poses that has another flank: the row of that flank in place of its own in J, less it ``(F, T)``."""
-        here, found = self.here, {}
-        for g, c in enumerate(here.system.m.couplings):
-            if isinstance(c, LineCoupling) and not c.linear and c.other is not None and c.other is not c.relation:
-                rows = LineRows(here.system, np.array([g]))
-                found[g] = (rows.jacobian(here, other=True) - rows.jacobian(here))[0]
-        return found
-
-    def flipped(self, t: int, flips: Sequence[int], multipliers: Array) -> Array | None:
-        """What is added to multipliers of all rows ``(rows, k)`` at a position where some rows stand on their other flanks; None where
-        the motion does not keep their centers.
-
-        With the rows ``J'`` of these flanks the same efforts need ``J'^T y = sum_g (J'_g - J_g) m_g``, which has a solution in all columns
-        where both rows hold the same motions; ``multipliers (n, k)`` of the couplings.
-        """
-        base = self.here.system.graph.loop_rows
-        A = self.here.J[..., t].copy()
-        change = np.stack([self.moving[g][:, t] for g in flips], axis=1)
-        A[[base + g for g in flips]] += change.T
-        y = np.linalg.lstsq(A.T, change, rcond=1e-11)[0]
-        left = np.abs(A.T @ y - change).max(initial=0.0)
-        # of rows of size one: rounding where the centers stand still
-        return None if left > 1e-9 else np.asarray(y @ multipliers[list(flips)])
-
-    def settle(self, flank: Array) -> None:
-        """Say which flanks act, by signs ``(n, T)`` of multipliers that were found on them."""
-        n, T = len(self.here.system.m.couplings), self.here.T
-        signs, nothing = np.broadcast_to(flank, (n, T)), np.zeros((n, 1))
-        self.settled = {g: np.zeros(T, dtype=bool) for g in self.moving}
-        for t in range(T if self.moving else 0):
-            flips = [g for g in self.moving if signs[g, t] < 0.0]
-            if flips and self.flipped(t, flips, nothing) is not None:
-                for g in flips:
-                    self.settled[g][t] = True
-
-    def _lines(self, g: int, axes: Axes) -> Lines:
-        """Points and directions of the force; of variants with gears of their own those of each."""
-        own = self.here.system.par.items[g]
-        if len(own) == 1:
-            return own[0].lines(axes)
-        P, n = np.empty((3, 2, self.here.T)), np.empty((3, 2, self.here.T))
-        first, same = np.unique([id(gears) for gears in own], return_index=True, return_inverse=True)[1:]
-        for i, gears in enumerate(own[first]):
-            at = np.flatnonzero(same == i)
-            P[..., at], n[..., at] = gears.lines(axes.at(at))
-        return P, n
-
-    def on_gear(self, multipliers: Array, flank: Array) -> list[Array]:
-        """For every contact the wrench on gear b ``(6, ..., T)`` for multipliers ``(n, ..., T)`` of all couplings.
-
-        ``flank (n, T)``: the sign of the multiplier that says which line acts.
-        """
-        out = []
-        for (g, _), (G, _) in zip(self.contacts, self.wrenches, strict=True):
-            there = (flank[g] < 0.0) & self.settled.get(g, np.array(g not in self.moving))
-            acting = np.where(there, G[:, 1], G[:, 0])
-            value = multipliers[g]
-            out.append(acting.reshape(6, *(1,) * (value.ndim - 1), self.here.T) * value)
-        return out
-
-    def through(self, multipliers: Array, flank: Array) -> Array:
-        """What would pass through the pairs on the way between gears that do not touch each other, ``s_j F``, ``(6, P, ..., T)``."""
-        out = np.zeros((6, len(self.here.system.m.pairs), *multipliers.shape[1:]))
-        for (_, contact), F in zip(self.contacts, self.on_gear(multipliers, flank), strict=True):
-            for step in contact.steps:
-                out[:, step.pair] += step.sense * F
-        return out
-
-    def relief(self, multipliers: Array, flank: Array) -> Array:
-        """What is taken off the wrenches of all pairs ``(6, P, ..., T)`` for multipliers ``(n, ..., T)`` of all couplings."""
-        here, out = self.here, self.through(multipliers, flank)
-        first, coefficients = here.system.first_column, here.coupling_coefficients
-        steps = [
-            (g, step, column)
-            for g, contact in self.contacts
-            for step in contact.steps
-            for column in range(first[step.pair], first[step.pair + 1])
-        ]
-        if steps:
-            for g, step, column in steps:
-                E = here.E[:, column] * coefficients[g, column]
-                out[:, step.pair] -= E.reshape(6, *(1,) * (multipliers.ndim - 2), here.T) * multipliers[g]
-        return out
-
-    def unit(self, flank: Array) -> list[Array]:
-        """For every coupling the wrench on gear b for a unit multiplier, ``(6, 1, T)``; none for one that acts in freedoms."""
-        n = len(self.here.system.m.couplings)
-        out = [np.zeros((6, 0, self.here.T))] * n
-        for (g, _), F in zip(self.contacts, self.on_gear(np.ones((n, self.here.T)), flank), strict=True):
-            out[g] = F[:, None]
-        return out
 
 
 def lengths_of(graph: LinkGraph, pair_points: Array, middles: Array) -> Array:

@@ -17,9 +17,10 @@ from mechgraph.fields import FLAG, INTEGER, NUMBERS, OTHER, SIX, TABLE, TABLES, 
 from mechgraph.model.belts import BeltDrive
 from mechgraph.model.couplings import COUPLINGS
 from mechgraph.model.friction import LOADS
-from mechgraph.model.gears import GEARS, Mesh
+from mechgraph.model.gears import GEARS
 from mechgraph.model.loads import ForceTable
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.meshes import Mesh
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.model.response_setup import Event, ResponseSetup, Stop

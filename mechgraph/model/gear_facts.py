@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from mechgraph.errors import DeclarationError
-from mechgraph.model.gears import Gear, Mesh, Parallel, WithRack, tip_radius
+from mechgraph.model.gears import Gear, tip_radius
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.meshes import Mesh, Parallel, WithRack
 from mechgraph.quantities import door
 
 NAN2 = (float("nan"), float("nan"))

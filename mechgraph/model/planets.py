@@ -15,7 +15,8 @@ import numpy as np
 from mechgraph.errors import DeclarationError
 from mechgraph.maths.se3 import Array
 from mechgraph.model.couplings import fitting_of
-from mechgraph.model.gears import Gear, Mesh, Parallel, tip_radius
+from mechgraph.model.gears import Gear, tip_radius
+from mechgraph.model.meshes import Mesh, Parallel
 from mechgraph.quantities import door, shown
 
 

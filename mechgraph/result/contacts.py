@@ -24,7 +24,7 @@ from mechgraph.errors import DeclarationError
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import SHAPES
 from mechgraph.model.belts import BeltDrive
-from mechgraph.model.gears import Mesh
+from mechgraph.model.meshes import Mesh
 from mechgraph.model.pair import Pair
 from mechgraph.pairs.contact_types import (
     Pressed,

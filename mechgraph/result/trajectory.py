@@ -23,8 +23,9 @@ from mechgraph.force.loads import Site, inertia_wrenches, kinetic_energy, user_p
 from mechgraph.force.reactions import PairFrames, given_effort_loads, user_state, user_wrench
 from mechgraph.kinematics.motion_path import Status, in_blocks
 from mechgraph.kinematics.rates import PassiveMotion, Rates, Velocities
-from mechgraph.kinematics.state import Configuration, ContactLines
+from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
+from mechgraph.kinematics.touching import ContactLines
 from mechgraph.maths.linear import EVERY, Place
 from mechgraph.maths.newton import Work
 from mechgraph.maths.se3 import Array, Index, cross, rotate, rotate_back, shift_wrench
@@ -775,13 +776,8 @@ class Trajectory:
         if self._system.m.couplings[coupling].name not in self._system.m.once(moving_lines):
             return np.ones(self._count, dtype=bool)
         m = self._force("multipliers")
-
-        def settled(block: BlockMotion) -> Array:
-            lines = ContactLines(block.here)
-            lines.settle(m[:, block.places])
-            return lines.settled.get(coupling, np.zeros(block.here.T))[None].astype(float)
-
-        return np.asarray(self._evaluated(settled)[0] > 0.5)
+        found = self._evaluated(lambda at: ContactLines(at.here).settle(m[:, at.places])[coupling][None].astype(float))
+        return np.asarray(found[0] > 0.5)
 
     def contact(self, coupling: int) -> tuple[Array, Array]:
         """Force of gears on the second one, and the point where it acts, ``(..., 3)``."""

@@ -19,8 +19,9 @@ import numpy as np
 from mechgraph.maths.se3 import Array
 from mechgraph.model.belts import BeltDrive, Pulley, course, place_of
 from mechgraph.model.couplings import Axes, Belt, BevelGears, Contact, Rack, SpurGears, WormGear
-from mechgraph.model.gears import Gear, GearRack, Mesh, Worm
+from mechgraph.model.gears import Gear, GearRack, Worm
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.meshes import Mesh
 from mechgraph.show.shapes import Shape, polyline
 
 TIP, ROOT, RIM = 1.0, 1.25, 1.6
