@@ -543,7 +543,7 @@ def further_doors(folder: Path) -> list[Door]:
         return lambda *args, **more: mg.Mechanism("g", None, [hinge, spur], gears=[kind(*args, **more)])
 
     def meshed(*args: Any, **more: Any) -> mg.Mechanism:
-        wheels = [mg.Gear("p", "p", 10, (0, 0, 0), Z, 0.1), mg.Gear("w", "w", 20, (1.5, 0, 0), Z, 0.1)]
+        wheels = [mg.Gear("p", "p", 10, (0, 0, 0), Z, module=0.1), mg.Gear("w", "w", 20, (1.5, 0, 0), Z, module=0.1)]
         return mg.Mechanism("g", None, [hinge, spur], gears=wheels, couplings=[mg.Mesh(*args, **more)])
 
     def placed(*args: Any, **more: Any) -> object:
@@ -561,8 +561,8 @@ def further_doors(folder: Path) -> list[Door]:
         (
             "Gear",
             toothed(mg.Gear),
-            ("p", "p", 10, (0, 0, 0), Z, 0.1),
-            {**flanks, "helix_angle": 0.0, "shift": 0.0, "width": 0.1},
+            ("p", "p", 10, (0, 0, 0), Z),
+            {"module": 0.1, **flanks, "helix_angle": 0.0, "shift": 0.0, "width": 0.1},
         ),
         ("GearRack", toothed(mg.GearRack), ("p", "p", (0, 0, 0), (1, 0, 0), (0, 1, 0), 0.1), {**flanks, "width": 0.1}),
         (
