@@ -5,7 +5,7 @@
 A *form* is what is decided once and serves many positions: which rows are independent and which columns are held (dense), or the
 borders that make the matrix square (sparse). Positions name their form by its number.
 
-Rank, motions and self-stresses at one position. Both engines start from the reduced rows ``K`` of all loops (``kinematics.state``), so
+Rank, motions and self-stresses at one position. Both engines start from the reduced rows ``K`` of all loops (``kinematics.loop_rows``), so
 that a self-stress of a single loop is the same in both:
 
     rank J = rank K,   J q = 0  <=>  K (q / scale) = 0,   J^T x = 0  <=>  x = local self-stresses + those with K^T y = 0.
@@ -314,8 +314,7 @@ class DenseSolver:
 
     def _fitting(self, here: Configuration, t: int) -> int:
         """The number of a form for one position: one of the last where that fits as well, or one made there."""
-        J = here.J[:, :, t]
-        made = form_at(J, self.fixed, self.keep, own_scale(here, t))
+        made = form_at(J := here.J[:, :, t], self.fixed, self.keep, own_scale(here, t))
         for i in reversed(range(max(0, len(self.forms) - 8), len(self.forms))):
             known = self.forms[i]
             if known.choice.same(made.choice) and (known.turn is None or _fits(known, J)):
