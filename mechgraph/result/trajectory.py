@@ -526,11 +526,10 @@ class Trajectory:
     def _through_contacts(self, name: str, columns: slice) -> Array:
         """Efforts ``(f, ..., T)`` of multipliers that act where gears touch each other, not through the pairs of these freedoms."""
         touching = [g for g, c in enumerate(self._system.m.couplings) if c.steps]
-        if self._system.m.once(moving_lines):
-            rows = self._evaluated(lambda block: block.here.coupling_coefficients[touching, columns])
-            return np.asarray(np.einsum("gft,g...t->f...t", rows, self._of(name)[touching]))
-        coefficients = self._system.coupling_matrix[touching, columns, 0]
-        return np.asarray(np.einsum("gf,g...->f...", coefficients, self._of(name)[touching]))
+        rows = self._evaluated(
+            lambda block: block.here.coupling_coefficients[touching, columns] + np.zeros(block.here.T)
+        )
+        return np.asarray(np.einsum("gft,g...t->f...t", rows, self._of(name)[touching]))
 
     def on_link(self, pair: int, link: int) -> tuple[Array, Mask, Array]:
         """What a pair transmits to one of its links, (M, F) in its frame about the marker there, and whether unique, ``(..., 6)``;
