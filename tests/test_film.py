@@ -159,6 +159,14 @@ def test_what_is_no_cycle_starts_in_the_middle() -> None:
     assert "starts in the middle" in str(film)
 
 
+def test_a_load_that_does_not_return_is_no_cycle() -> None:
+    angle = np.linspace(0, 2 * np.pi, 49)
+    push = mg.Wrench("shaft", force=np.stack([1000 + 500 * angle, 0 * angle, 0 * angle], axis=-1), point=(0, 0, 0))
+    s = mg.solve(rotor(), {"A": mg.Motion(angle, velocity=SPEED)}, loads=[push])
+    with pytest.warns(mg.MechgraphWarning, match="does not return"):
+        assert not s.film("A", FILM).closed
+
+
 def test_a_long_bearing_warns() -> None:
     with pytest.warns(mg.MechgraphWarning, match=re.escape("length / diameter = 0.75")):
         turning(rotor()).film("A", FILM.replace(length=0.03))

@@ -310,6 +310,48 @@ def test_at_rest_any_effort_between_holds() -> None:
     assert (low, high) == (pytest.approx(W / (1 + 1.2), rel=1e-11), np.inf)
 
 
+@pytest.mark.parametrize("engine", ["dense", "auto"])
+def test_friction_may_turn_the_force_between_teeth_round(engine: str) -> None:
+    """The wheel is held back by friction more than its load drives it: the teeth touch on the other flank."""
+    pins = [
+        mg.Pair(k, "R", "frame", link, point=(x, 0, 0), axis=Z)
+        for k, link, x in (("A", "pinion", 0.0), ("B", "wheel", 0.06))
+    ]
+    loads = [
+        mg.Effort("B", -0.1),
+        mg.Wrench("wheel", force=(300, 0, 0), point=(0.06, 0, 0)),
+        mg.Friction("B", mu=0.1, radius=0.02),
+    ]
+    gears = mg.SpurGears("t", "A", "B", teeth=(20, 40), module=0.002)
+    s = moved(mg.Mechanism("gears", pairs=pins, couplings=[gears], drives=["A"], loads=loads), engine=engine)
+    # the couple on the wheel: friction rho |F| against its turn (the other way than the pinion's), the load, the tooth force at 0.04
+    rho, turn, F = (
+        0.02 * np.sin(np.arctan(0.1)),
+        np.array([np.sin(np.deg2rad(20)), np.cos(np.deg2rad(20))]),
+        np.zeros(2),
+    )
+    for _ in range(100):
+        tooth = (rho * np.hypot(*F) - 0.1) / 0.04
+        F = -np.array([300.0, 0.0]) - np.array([abs(tooth) * turn[0] / turn[1], tooth])
+    assert s["A"].effort[0] == pytest.approx(0.02 * tooth, rel=1e-9)
+    assert np.allclose(s["B"].force[:2], F, rtol=1e-9)
+    assert np.abs(mg.free_body(s, "wheel").sum).max() < 1e-9
+
+
+def test_feet_that_lift_are_not_solved_with_friction() -> None:
+    plate = [
+        mg.Pair(f"f{i}", "Sp", "ground", "plate", point=(x, y, 0), axis=Z, closed="force", stiffness={"Fz": 1e6})
+        for i, (x, y) in enumerate([(1, 1), (-1, 1), (-1, -1), (1, -1)])
+    ]
+    guide = mg.Pair("G", "Fr", "ground", "plate", point=(0, 0, 0), axis=Z)
+    push = mg.Wrench("plate", force=(0, 0, -W), point=(0.1, 0.2, 0))
+    m = mg.Mechanism(
+        "plate", pairs=[*plate, guide], drives=["G.Tx", "G.Ty", "G.Rz"], loads=[push, mg.Friction("f0", mu=0.3)]
+    )
+    with pytest.raises(mg.DeclarationError, match="not solved together with friction"):
+        mg.solve(m, {"G.Tx": mg.Motion(0.0, velocity=1.0), "G.Ty": 0.0, "G.Rz": 0.0}, redundant="elastic")
+
+
 def test_preload_and_viscous() -> None:
     s = moved(shaft(force(0, -W, (0, 0, 0)), preload=50.0, viscous=0.7), 2.0)
     assert s["A"].effort[0] == pytest.approx(RHO * (W + 50.0) + 1.4, rel=1e-12)

@@ -10,8 +10,8 @@ import numpy as np
 import scipy
 
 from mechgraph.errors import DeclarationError
-from mechgraph.force.elastic import elastic_split
-from mechgraph.force.friction import OUTCOMES, Rubbed, places_of, rubbed
+from mechgraph.force.elastic import elastic_split, seats_of
+from mechgraph.force.friction import OUTCOMES, STILL, Rubbed, places_of, rubbed
 from mechgraph.force.loads import Site, inertia_wrenches, kinetic_power
 from mechgraph.force.reactions import (
     METHODS,
@@ -36,7 +36,7 @@ from mechgraph.kinematics.rates import PassiveMotion, PassiveMotions, Rates, Vel
 from mechgraph.kinematics.state import Configuration, FactoredClosure
 from mechgraph.kinematics.touching import ContactLines
 from mechgraph.maths.linear import add_at
-from mechgraph.maths.se3 import Array, Index, cross, rotate_back
+from mechgraph.maths.se3 import Array, Index, Mask, cross, rotate_back
 from mechgraph.maths.tolerances import MOTIONS
 from mechgraph.model.belts import pretensions
 from mechgraph.model.loads import Load
@@ -188,10 +188,10 @@ def forces_of_block(
     wrenches = on_their_flanks(here, wrenches, lines)
     found, flank = _least_on_flanks(here, wrenches, f, task, lines)
     dry = [load for load in task.loads if load.follows_reactions]
-    rubs = ranges = None
+    rubs: Rubbed | None = None
+    ranges: Array | None = None
     if dry:
-        solve = _FrictionProblem(here, task, f, found, lines, flank, dry)
-        found, rubs = solve.moving(rates.dq)
+        solve, found, rubs, flank = _rough(here, task, f, wrenches, found, (lines, flank), dry, rates.dq)
         ranges = solve.at_rest(rates.dq, given)
         given = given + rubs.efforts
     own = np.zeros_like(found.efforts)
@@ -325,6 +325,40 @@ def _least(
     )
 
 
+def _rough(
+    here: Configuration,
+    task: ForceTask,
+    f: FactoredClosure,
+    wrenches: Wrenches,
+    smooth: _FreeForces,
+    contacts: tuple[ContactLines, Array],
+    dry: Sequence[Any],
+    dq: Array,
+) -> tuple[_FrictionProblem, _FreeForces, Rubbed, Array]:
+    """Forces with friction, on the flanks on which teeth then touch: friction may turn the force between them round."""
+    lines, flank = contacts
+    # how often flanks are changed
+    for _ in range(5):
+        solve = _FrictionProblem(here, task, f, smooth, lines, flank, dry)
+        found, rubs = solve.moving(dq)
+        turned = ((found.multipliers < 0.0) != (flank < 0.0)).any(axis=0) & (rubs.outcome == 0)
+        if not (lines and turned.any()):
+            return solve, found, rubs, flank
+        flank = np.where(turned, found.multipliers, flank)
+        smooth = _least(here, _relieved(wrenches, lines, flank), f, task, lines, flank)
+    rubs.outcome[turned] = OUTCOMES.index("friction not determined")
+    return solve, _without(found, turned), rubs, flank
+
+
+def _without(found: _FreeForces, places: Mask) -> _FreeForces:
+    """The same with no value at some positions."""
+    parts = (
+        np.where(places, np.nan, part) for part in (found.reactions, found.efforts, found.multipliers, found.coupled)
+    )
+    reactions, efforts, multipliers, coupled = parts
+    return replace(found, reactions=reactions, efforts=efforts, multipliers=multipliers, coupled=coupled)
+
+
 class _FrictionProblem:
     """Reactions with friction beside those without it, for any directions of motion."""
 
@@ -347,6 +381,11 @@ class _FrictionProblem:
             flank,
             dry,
         )
+        if task.redundant == "elastic" and seats_of(here).push.any():
+            why = "reactions split by stiffness, with pairs that only push, are not solved together with friction"
+            raise DeclarationError(
+                f"solve {here.system.m.name!r}", [f"{why}; declare these pairs closed='form', or leave friction out"]
+            )
         self.unit: dict[int, dict[str, Array]] = {}
         s, nothing = here.system, np.zeros_like(found.efforts)
         still = self._answer(nothing) if found.locked is not None else None
@@ -387,13 +426,12 @@ class _FrictionProblem:
             if not (moved.any() and any(place.follows for place in places)):
                 return replace(found, **sums), rubs
         rubs.outcome[moved & (rubs.outcome == 0)] = OUTCOMES.index("friction not determined")
-        sums = {name: np.where(rubs.outcome > 0, np.nan, values) for name, values in sums.items()}
-        return replace(found, **sums), rubs
+        return _without(replace(found, **sums), rubs.outcome > 0), rubs
 
     def at_rest(self, dq: Array, given: Array) -> Array:
         """Efforts of drives ``(F, 2, T)`` on the verge of motion to - and to +, the others held; infinite where it jams, NaN in motion."""
         out = np.full((len(dq), 2, self.here.T), np.nan)
-        rest = ~dq.any(axis=0)
+        rest = (np.abs(dq) <= STILL * np.abs(dq).max(initial=0.0)).all(axis=0)
         if not rest.any():
             return out
         moved = self.f.sensitivity()

@@ -25,8 +25,8 @@ from mechgraph.maths.se3 import Array, Index, cross, skew
 from mechgraph.maths.tolerances import STRESSES
 from mechgraph.model.friction import Friction, rubs_as_ball, rubs_as_journal, rubs_as_plane, rubs_as_slide
 
-STILL = 1e-12
-"""Part of the largest rate of a mechanism below which a freedom is at rest, where friction has no direction."""
+STILL = 1e-8
+"""Part of the largest rate of a mechanism below which a freedom is at rest, as where it reverses: friction has no direction there."""
 OUTCOMES = ("ok", "jams", "no finite force", "friction not determined")
 """What becomes of a position, by number."""
 

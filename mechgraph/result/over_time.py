@@ -522,6 +522,10 @@ def film_of(s: Solution, pair: str, journal: Journal | None) -> FilmResult:
         raise DeclarationError(about, found)
     (cycle,) = cycles_of(s)
     turn = [f.twist for f in p.type.freedoms].index(TURN)
+    returns = cycle.closed and _returns(load, bool(cycle.gap))
+    if cycle.closed and not returns:
+        text = f"{about}: the load does not return to its value at the beginning, so that the positions are no cycle of it;"
+        warnings.warn(f"{text} the orbit starts in the middle of the bearing", MechgraphWarning, stacklevel=3)
     if not journal.is_short:
         warnings.warn(
             f"{about}: length / diameter = {journal.length / (2 * journal.radius):.3g}; from 0.7 on a film carries less than the short "
@@ -530,12 +534,22 @@ def film_of(s: Solution, pair: str, journal: Journal | None) -> FilmResult:
             stacklevel=3,
         )
     out = FilmResult(
-        s._values, p.name, journal, Loaded(cycle.t, cycle.gap, cycle.closed, load, result.velocity[:, turn])
+        s._values,
+        p.name,
+        journal,
+        Loaded(cycle.t, cycle.gap if returns else 0.0, returns, load, result.velocity[:, turn]),
     )
-    if cycle.closed and not out.closed:
+    if returns and not out.closed:
         warnings.warn(
             f"{about}: no closed orbit was found; the one returned starts in the middle of the bearing",
             MechgraphWarning,
             stacklevel=3,
         )
     return out
+
+
+def _returns(load: Array, open_end: bool) -> bool:
+    """Whether a load ``(T, 2)`` over a cycle comes back to its beginning; with an open end to within two of its largest steps."""
+    gap, size = float(np.abs(load[-1] - load[0]).max()), float(np.abs(load).max())
+    # a millionth of the load is what a spline through a cycle does not see
+    return gap <= 1e-6 * size + (2.0 * float(np.abs(np.diff(load, axis=0)).max()) if open_end else 0.0)

@@ -626,8 +626,9 @@ class Trajectory:
             block = next(iter(self._motions), None) or self._motion(np.flatnonzero(self._solved)[:1])
             return len(places_of(block.here, block.rates.dq, np.zeros((6, len(self.whole.pairs), block.here.T)), loads))
 
-        first = count(dry[: dry.index(mine[0])])
-        return self._out(self._L * self._kept["normals"][first : first + count(mine)])
+        found = [(count(dry[:i]), count([load])) for i, load in enumerate(dry) if load in mine]
+        parts = [self._kept["normals"][first : first + n] for first, n in found]
+        return self._out(self._L * np.concatenate(parts))
 
     def losses(self) -> dict[str, Array]:
         """Power lost in pairs with friction, by name, ``(...)``."""
