@@ -23,6 +23,7 @@ INSIDE = {
     "Mechanism": "freedom freedom_fault full_name has_graph_of in_own_units once period place_of_link place_of_pair "
     "take_graph_of turns ends_of",
     "Ledger": "table",
+    "CamLaw": "faults in_units moved once replace take_graph_of value_faults without_quantities",
 }
 """Methods with public names that modules of the package call, not programs."""
 
@@ -87,6 +88,9 @@ def methods(cls: type) -> dict[str, Callable]:
     return found
 
 
+RISE_AND_FALL = [mg.Segment("cycloidal", 0.01, 1.0), mg.Segment("cycloidal", -0.01, 1.0)]
+
+
 @functools.cache
 def made() -> tuple[tuple[Any, dict[str, Any]], ...]:
     """One of every kind of result, with what its methods take, by the names of their parameters."""
@@ -131,6 +135,7 @@ def made() -> tuple[tuple[Any, dict[str, Any]], ...]:
         (mg.assemblies(m, {"A": 0.1}), {"i": 0}),
         (mg.assemblies(m, {"A": [0.1, 0.2]}), {"i": 0}),
         (study, {"name": "A.effort", "i": 0}),
+        (mg.CamLaw(RISE_AND_FALL, turn=2.0), {"angle": 0.1}),
     )
 
 
@@ -148,6 +153,7 @@ GIVEN: dict[str, Any] = {
     "position": 0,
     "matrix": "Q",
     "right": "C",
+    "out": "A",
     "q": 0.5,
 }
 
@@ -353,6 +359,21 @@ def declared_doors() -> list[tuple[str, Callable, tuple, dict]]:
         ("Mechanism.moved", m.moved, (np.eye(4),), {}),
         ("Mechanism.with_tolerances", m.with_tolerances, (mg.Tolerances(),), {}),
         ("Tolerances", mg.Tolerances, (), {"rank": {"loop": 1e-6}, "path": {"iterations": 12}}),
+        ("Mechanism.to_planar", m.to_planar, (), {"normal": Z}),
+        ("Mechanism.to_spatial", m.to_planar().to_spatial, (), {"z": {"crank": 0.1}}),
+        (
+            "Segment",
+            lambda *a, **k: mg.CamLaw([mg.Segment(*a, **k), RISE_AND_FALL[1]], turn=2.0),
+            ("cycloidal",),
+            {"rise": 0.01, "over": 1.0},
+        ),
+        (
+            "least_base_radius",
+            mg.least_base_radius,
+            (mg.CamLaw([one.replace(over=np.pi) for one in RISE_AND_FALL]),),
+            {"follower": "roller", "roller_radius": 0.01, "offset": 0.0, "max_pressure": 0.5, "least_radius": 0.0},
+        ),
+        ("least_preload", mg.least_preload, (made()[2][0], "K"), {"stiffness": 1.0, "freedom": None}),
         ("Mechanism.link", m.link, ("crank",), {}),
         ("Mechanism.pair", m.pair, ("A",), {}),
         ("Mechanism.coupling", gears.coupling, ("g",), {}),

@@ -17,9 +17,9 @@ import generate  # noqa: E402
 def test_every_public_name_stands_in_one_group() -> None:
     listed = [name for _, _, names in generate.GROUPS.values() for name in names]
     assert len(listed) == len(set(listed))
-    inertia = {name for name in listed if name.startswith("inertia.")}
-    assert inertia
-    assert set(listed) - inertia == (set(mg.__all__) - {"inertia"}) | {f"show.{name}" for name in show.__all__}
+    parts = {name for name in listed if name.startswith(("inertia.", "parts."))}
+    assert {name.partition(".")[0] for name in parts} == {"inertia", "parts"}
+    assert set(listed) - parts == (set(mg.__all__) - {"inertia", "parts"}) | {f"show.{name}" for name in show.__all__}
 
 
 def test_a_page_differs_from_others_in_more_than_capitals() -> None:

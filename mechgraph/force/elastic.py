@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechgraph.errors import DeclarationError
 from mechgraph.force.reactions import PairFrames, Stress, least_above
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Array, Index
@@ -84,6 +85,12 @@ def seats_of(here: Configuration) -> Seats:
 def elastic_split(here: Configuration, reactions: Array, efforts: Array, stress: Stress) -> ElasticSplit:
     """The multiples of all self-stresses that come about in reactions ``(6, P, T)`` beside ``efforts (F, T)``, at every position."""
     seats, T = seats_of(here), here.T
+    if not (seats.compliance.any() or seats.loose.any()):
+        m = here.system.m
+        raise DeclarationError(
+            f"solve {m.name!r}",
+            ["redundant='elastic': no pair has a stiffness; give those that share a load stiffness="],
+        )
     N = np.moveaxis(component_values(here, stress.wrenches), -1, 0)
     own = component_values(here, reactions).T
     s, K = N.shape[2], N.shape[1]

@@ -125,6 +125,9 @@ class Friction(Load):
     def _misplaced(self, pair: Any) -> list[str]:
         """Numbers without meaning for the pair, and those that are missing."""
         row = pair.type
+        steep = [f"flank = {self.flank:g}: expected an angle below pi/2 [rad]"] if self.flank >= 0.5 * np.pi else []
+        if steep:
+            return steep
         rows = {
             "journal": rubs_as_journal(row),
             "slide": rubs_as_slide(row),

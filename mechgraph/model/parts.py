@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Any, ParamSpec
 
@@ -180,7 +180,7 @@ def _part(make: Callable[P, Parts]) -> Callable[P, Parts]:
         given = bound.arguments
         known = {what: value for what, value in given.items() if has_quantity(value)}
         if not known:
-            return make(*args, **named)
+            return _with_links(make(*args, **named), given["name"])
         numbers = {what: _in_si(value) for what, value in known.items()}
         faults = [
             wrong(given[what], what, "a quantity with its unit, as others of the part are")
@@ -199,9 +199,17 @@ def _part(make: Callable[P, Parts]) -> Callable[P, Parts]:
             raise DeclarationError(f"parts.{make.__name__} {shown(given['name'])}", faults)
         given.update(numbers)
         one = _a_quantity(next(iter(known.values())))
-        return _with_units(make(*bound.args, **bound.kwargs), one._REGISTRY)
+        return _with_units(_with_links(make(*bound.args, **bound.kwargs), given["name"]), one._REGISTRY)
 
     return made
+
+
+def _with_links(parts: Parts, name: str) -> Parts:
+    """The part with massless links for those of its own ``name.`` that its pairs join and that have no mass."""
+    known = {link.name for link in parts.links}
+    ends = dict.fromkeys(end for pair in parts.pairs for end in (pair.a, pair.b))
+    own = [Link(end) for end in ends if end not in known and end.startswith(f"{name}.")]
+    return replace(parts, links=(*parts.links, *own))
 
 
 def _in_si(value: Any) -> Any:

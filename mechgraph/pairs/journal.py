@@ -108,7 +108,8 @@ class Journal(Described):
         DeclarationError
             Neither or both of eccentricity and load; values out of range.
         """
-        found = [] if (eccentricity is None) != (load is None) else ["give either eccentricity= or load="]
+        found = self.value_faults("")
+        found += [] if (eccentricity is None) != (load is None) else ["give either eccentricity= or load="]
         for name, value, fits, expected in (
             ("speed", speed, lambda v: v != 0, "finite numbers other than 0"),
             ("eccentricity", eccentricity, lambda v: (v >= 0) & (v < 1), "numbers from 0 to below 1"),
@@ -169,7 +170,8 @@ class Journal(Described):
         >>> [float(part.round(6)) for part in b.mobility(0.0, 0.0)]
         [1.27324, 0.0]
         """
-        found = [wrong(v, name, "numbers") for name, v in (("xi", xi), ("eta", eta)) if not _numbers(v, np.isfinite)]
+        found = self.value_faults("")
+        found += [wrong(v, name, "numbers") for name, v in (("xi", xi), ("eta", eta)) if not _numbers(v, np.isfinite)]
         e = (
             np.array(np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (xi, eta))))
             if not found

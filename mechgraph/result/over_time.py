@@ -501,6 +501,7 @@ def film_of(s: Solution, pair: str, journal: Journal | None) -> FilmResult:
     found = (
         [] if isinstance(journal, Journal) else [wrong(journal, "film", "mg.Journal(...), here or as the pair's film=")]
     )
+    found += journal.value_faults("") if isinstance(journal, Journal) else []
     found += film_faults(p, "")
     if not s.has_forces:
         found.append("the solution has no forces; use mechgraph.solve")

@@ -125,7 +125,7 @@ def place_of(s: Solution) -> tuple[Any, DrawnPlace]:
         raise DeclarationError(f"picture of {m.name!r}", ["the solution has no solved position"])
     return good, DrawnPlace(
         {name: s.link(name).pose.reshape(-1, 4, 4)[good] for name in m.link_names()},
-        {p.name: s[p.name].position.reshape(-1, p.type.f)[good].T for p in m.pairs},
+        {p.name: s[p.name].position.reshape(np.size(s.status), p.type.f)[good].T for p in m.pairs},
     )
 
 

@@ -177,7 +177,9 @@ class ShownCycle:
     def at(self, values: Any) -> Array:
         """Values at the positions of the scene, the batch flat."""
         array = np.asarray(values, dtype=float)
-        return np.asarray(array.reshape(-1, *array.shape[len(self.s.batch) :])[self.scene.positions])
+        return np.asarray(
+            array.reshape(np.size(self.s.status), *array.shape[len(self.s.batch) :])[self.scene.positions]
+        )
 
     def of_freedom(self, name: str, what: str) -> Array:
         """A quantity of one freedom, ``(T,)``."""
