@@ -568,6 +568,7 @@ INSIDE = {
     "Basis",
     "Parameters",
     "Course",
+    "BeltCourse",
     "Trajectory",
     "Source",
     "Part",

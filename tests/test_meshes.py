@@ -8,7 +8,7 @@ import pytest
 
 import mechgraph as mg
 from mechgraph.model import meshes as kinds
-from mechgraph.model.lines import Places
+from mechgraph.model.lines import LinePlaces
 
 X, Y, Z = np.eye(3)
 RAD = np.deg2rad
@@ -138,7 +138,7 @@ def test_marks_of_teeth_that_stand_in_gaps():
 
 
 def place(point, axis, mark):
-    return Places(*(np.asarray(v, dtype=float)[:, None, None] for v in (point, axis, mark)))
+    return LinePlaces(*(np.asarray(v, dtype=float)[:, None, None] for v in (point, axis, mark)))
 
 
 def moved(p, w, v, h):
@@ -148,7 +148,7 @@ def moved(p, w, v, h):
     K = np.array([[0, -k[2], k[1]], [k[2], 0, -k[0]], [-k[1], k[0], 0]])
     R = np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
     turned = lambda x: (R @ x[:, 0, 0])[:, None, None]
-    return Places(turned(p.point) + h * np.asarray(v)[:, None, None], turned(p.axis), turned(p.mark))
+    return LinePlaces(turned(p.point) + h * np.asarray(v)[:, None, None], turned(p.axis), turned(p.mark))
 
 
 @pytest.mark.parametrize("forward", [True, False])

@@ -18,7 +18,7 @@ import numpy as np
 import scipy
 
 from mechgraph.maths.se3 import Array, Index, cross, rotate
-from mechgraph.model.lines import LineCoupling, LinesAt, Places, Relation
+from mechgraph.model.lines import LineCoupling, LinePlaces, LinesAt, Relation
 
 STEP = 1e-30
 """Complex step of a derivative: its square is no number beside one."""
@@ -63,12 +63,12 @@ class LineRows:
             out.append((local[..., None], axis[..., None], mark[..., None]))
         return out
 
-    def _places(self, poses: Array, side: int, rows: Index) -> Places:
+    def _places(self, poses: Array, side: int, rows: Index) -> LinePlaces:
         """The places on links a (side 0) or b of some rows, where all links have the poses ``(3, 4, N, T)``."""
         X = poses[:, :, self.links[side, rows]]
         local, axis, mark = (part[:, rows] for part in self._local[side])
         R = X[:, :3]
-        return Places(rotate(R, local) + X[:, 3], rotate(R, axis), rotate(R, mark))
+        return LinePlaces(rotate(R, local) + X[:, 3], rotate(R, axis), rotate(R, mark))
 
     def lines(self, poses: Array, other: bool = False) -> LinesAt:
         """Values and lines of all rows, or of their other flanks, where all links have the poses ``(3, 4, N, T)``."""
@@ -119,7 +119,7 @@ class LineRows:
         ends = [self._places(here.poses, side, rows) for side in (0, 1)]
         turned = lambda name: self._gained(here.x, x0, name)
         for i, c in enumerate(self.couplings):
-            own = [Places(*(part[:, i : i + 1] for part in end)) for end in ends]
+            own = [LinePlaces(*(part[:, i : i + 1] for part in end)) for end in ends]
             more = c.whole_turns(at.along[:, i : i + 1], own[0], own[1], turned)
             period = c.period / self.system.par.L
             if more is not None:
@@ -142,7 +142,7 @@ class LineRows:
         rows = np.arange(len(self.couplings))
         now, then = ([self._places(X, side, rows) for side in (0, 1)] for X in (here.poses, self._start_poses))
         for i, c in enumerate(self.couplings):
-            own = [Places(*(part[:, i : i + 1] for part in end)) for end in (*now, *then)]
+            own = [LinePlaces(*(part[:, i : i + 1] for part in end)) for end in (*now, *then)]
             off = c.strayed(*own)
             worst = 0.0 if off is None else float(np.abs(off).max(initial=0.0))
             if worst > tolerance:

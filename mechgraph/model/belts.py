@@ -42,7 +42,7 @@ from mechgraph.fields import (
 )
 from mechgraph.maths.se3 import Array, cross, identity
 from mechgraph.model.couplings import MeshStep, are_placed, fitting_of, motion_of
-from mechgraph.model.lines import LineCoupling, LinesAt, LinkPlace, Places, Relation, meeting, pose_along, way
+from mechgraph.model.lines import LineCoupling, LinePlaces, LinesAt, LinkPlace, Relation, meeting, pose_along, way
 from mechgraph.quantities import FORCE, LENGTH, shown, unknown, wrong
 
 
@@ -83,7 +83,7 @@ def angle(u: Array, m: Array, z: Array) -> Array:
     return np.asarray(out + 1j * (x.real * y.imag - y.real * x.imag) / (x.real**2 + y.real**2))
 
 
-class Course(NamedTuple):
+class BeltCourse(NamedTuple):
     """A whole belt: its spans ``(n, T)``, span k from pulley k to the next one; angles of wrap ``(n, T)``; length and turns ``(T,)``.
 
     ``turns`` of the direction along the belt: 1 for one that does not cross itself, 0 for a crossed one.
@@ -95,7 +95,7 @@ class Course(NamedTuple):
     turns: Array
 
 
-def course(centers: Array, z: Array, w: Array) -> Course:
+def course(centers: Array, z: Array, w: Array) -> BeltCourse:
     """The belt about centers ``(3, n, T)`` with signed radii ``w (n,)`` or ``(n, T)``; ``z (3, 1, T)``."""
     w = np.asarray(w, dtype=float).reshape(len(w), -1)
     following = np.roll(np.arange(len(w)), -1)
@@ -104,7 +104,7 @@ def course(centers: Array, z: Array, w: Array) -> Course:
     bend = sense * angle(np.roll(spans.along, 1, axis=1), spans.along, z)
     # a wrap of nothing is one of 0, not of a whole turn less rounding
     wrap = np.where(bend < -1e-9, bend + 2 * np.pi, np.maximum(bend, 0.0))
-    return Course(
+    return BeltCourse(
         spans, wrap, spans.length.sum(axis=0) + (np.abs(w) * wrap).sum(axis=0), (sense * wrap).sum(axis=0) / (2 * np.pi)
     )
 
@@ -174,7 +174,7 @@ class Laid(NamedTuple):
     w: Array
 
     @property
-    def course(self) -> Course:
+    def course(self) -> BeltCourse:
         """The belt about them."""
         return course(self.centers, self.axes[:, :1], self.w)
 
@@ -443,7 +443,7 @@ class BeltDrive(LineCoupling):
         """By what the value of a row grows from one way to put the belt on to the next: of teeth their pitch, or some of them."""
         return float("inf") if a.teeth is None or b.teeth is None else gcd(a.teeth, b.teeth) * float(a.pitch or 0.0)
 
-    def whole_turns(self, along: Array, a: Places, b: Places, turned: Callable[[str], Array]) -> Array | None:
+    def whole_turns(self, along: Array, a: LinePlaces, b: LinePlaces, turned: Callable[[str], Array]) -> Array | None:
         """What whole turns of both pulleys add to the value ``(T,)`` of a row that is not linear.
 
         By how much freedoms have grown since the start, ``turned(name) (T,)``, tells by how many turns the angle of a pulley against the
@@ -467,7 +467,7 @@ class BeltDrive(LineCoupling):
         """See ``BaseCoupling``."""
         return self.in_units(base)
 
-    def course_of(self, m: Any, poses: Sequence[Array]) -> Course:
+    def course_of(self, m: Any, poses: Sequence[Array]) -> BeltCourse:
         """The belt where the links of its pulleys have the poses ``(3 or 4, 4, T)``, in the user's units."""
         pulleys = self.pulleys(m)
         centers = [np.einsum("ijt,j->it", X[:3, :3], p.point) + X[:3, 3] for p, X in zip(pulleys, poses, strict=True)]
@@ -495,7 +495,7 @@ def place_of(p: Pulley) -> LinkPlace:
     return LinkPlace(p.link, p.point, p.axis, second_direction(p.axis))
 
 
-def tangent(a: Places, b: Places, numbers: Array) -> LinesAt:
+def tangent(a: LinePlaces, b: LinePlaces, numbers: Array) -> LinesAt:
     """Value and line of a span between pulleys with the signed radii ``numbers (2, n, T)``: ``l + w_b alpha_b - w_a alpha_a``, with the
     angles alpha of their marks against the span in (-pi, pi].
     """
@@ -505,7 +505,7 @@ def tangent(a: Places, b: Places, numbers: Array) -> LinesAt:
     return LinesAt(value, made.end, made.along)
 
 
-def chordal(a: Places, b: Places, numbers: Array, *, pitches: tuple[float, float]) -> LinesAt:
+def chordal(a: LinePlaces, b: LinePlaces, numbers: Array, *, pitches: tuple[float, float]) -> LinesAt:
     """The same of a chain: its span runs from the last roller that sits on a to the first on b, which turn with them on circles of radius
     ``R = pitch / (2 sin(pi / teeth))``.
 

@@ -57,7 +57,7 @@ START = {
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class Parts(Formatted, Once):
+class DeclaredParts(Formatted, Once):
     """The fields of a mechanism (see ``Mechanism``), and its links, pairs, couplings and freedoms by name.
 
     Nothing is checked here: what is looked up may still be what a user declared wrongly.
@@ -287,7 +287,7 @@ def _repeated(names: Sequence[Any], what: str) -> list[str]:
     return [f"{what} {n!r} is declared {c} times; names must differ" for n, c in Counter(names).items() if c > 1]
 
 
-def _kind_faults(m: Parts) -> list[str]:
+def _kind_faults(m: DeclaredParts) -> list[str]:
     """Items that are no links, pairs, couplings, drives or loads at all."""
     faults = []
     for what, items, kind in (
@@ -312,7 +312,7 @@ def _maker(what: str) -> str:
     return " or ".join(f"mg.{name}(...)" for name in names)
 
 
-def declaration_faults(m: Parts) -> list[str]:
+def declaration_faults(m: DeclaredParts) -> list[str]:
     """All that is wrong with a mechanism, one line each."""
     faults = _kind_faults(m)
     if not isinstance(m.name, str) or not m.name:
@@ -358,7 +358,7 @@ def mapping_faults(**given: Any) -> list[str]:
     ]
 
 
-def _end_faults(m: Parts, names: Sequence[str]) -> list[str]:
+def _end_faults(m: DeclaredParts, names: Sequence[str]) -> list[str]:
     """Ends of pairs and the frame that are no links; links that no pairs connect to the frame."""
     known = m.link_index
     faults = []
@@ -381,7 +381,7 @@ def _types(pairs: Sequence[Pair]) -> list[Any]:
     return list({id(pair.type): pair.type for pair in pairs}.values())
 
 
-def _symbol_faults(m: Parts) -> list[str]:
+def _symbol_faults(m: DeclaredParts) -> list[str]:
     """Pair types that share a symbol and differ."""
     by_symbol: dict[str, PairType] = {}
     rows = [row for row in _types(m.pairs) if isinstance(row, PairType) and not travels(row)]
@@ -462,13 +462,13 @@ def _markers_are_sound(markers: Sequence[Any], most: Array) -> bool:
     return not (cosine > most).any()
 
 
-def item_faults(m: Parts) -> list[str]:
+def item_faults(m: DeclaredParts) -> list[str]:
     """Faults of drives and loads alone, for links, pairs and couplings that were checked before."""
     return _kind_faults(m) or (plane_faults((), (), m.loads) if m.planar else []) + _reference_faults(m)
 
 
 @of_graph
-def _connection_faults(m: Parts) -> list[str]:
+def _connection_faults(m: DeclaredParts) -> list[str]:
     place, n = m.link_index, len(m.links)
     graph = scipy.sparse.coo_array((np.ones(len(m.pairs), dtype=bool), m.pair_ends), shape=(n, n))
     _, part = scipy.sparse.csgraph.connected_components(graph, directed=False)
@@ -480,7 +480,7 @@ def _connection_faults(m: Parts) -> list[str]:
     ]
 
 
-def _reference_faults(m: Parts) -> list[str]:
+def _reference_faults(m: DeclaredParts) -> list[str]:
     faults = []
     drives = []
     for drive in m.drives:
@@ -500,7 +500,7 @@ def _reference_faults(m: Parts) -> list[str]:
     return faults
 
 
-def _gear_faults(m: Parts) -> list[str]:
+def _gear_faults(m: DeclaredParts) -> list[str]:
     faults = []
     for gear in m.gears:
         where = f"{gear.kind} {shown(gear.name)}: "
@@ -510,7 +510,7 @@ def _gear_faults(m: Parts) -> list[str]:
     return faults + _repeated(_texts([gear.name for gear in m.gears]), "gear")
 
 
-def _coupling_faults(m: Parts) -> list[str]:
+def _coupling_faults(m: DeclaredParts) -> list[str]:
     if _gear_faults(m):
         return []
     own = [coupling.faults(m) for coupling in m.couplings]
@@ -522,7 +522,7 @@ def _coupling_faults(m: Parts) -> list[str]:
     return faults + _repeated(names, "coupling")
 
 
-def flat_start(m: Parts, start: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:
+def flat_start(m: DeclaredParts, start: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:
     """Start values by full freedom name; a pair's name may carry one value for each of its freedoms."""
     flat: dict[str, float] = {}
     faults = []

@@ -40,7 +40,7 @@ from mechgraph.fields import (
 from mechgraph.maths.se3 import Array, cross
 from mechgraph.model.belts import GEARS as PULLEYS
 from mechgraph.model.belts import angle
-from mechgraph.model.lines import LinesAt, LinkPlace, Places
+from mechgraph.model.lines import LinePlaces, LinesAt, LinkPlace
 from mechgraph.quantities import LENGTH, PURE, wrong
 
 _FULL = float(np.deg2rad(20.0))
@@ -66,7 +66,7 @@ def _middle(h: Array, half_a: Array, half_b: Array) -> Array:
     return np.asarray((low + high) / 2)
 
 
-def cylindrical(side: float, a: Places, b: Places, numbers: Array) -> LinesAt:
+def cylindrical(side: float, a: LinePlaces, b: LinePlaces, numbers: Array) -> LinesAt:
     """See the head; ``numbers``: k_a, k_b, k_a tan b, half the widths of both."""
     ka, kb, rise, half_a, half_b = numbers
     k, z, d = ka + kb, a.axis, b.point - a.point
@@ -86,7 +86,7 @@ def cylindrical(side: float, a: Places, b: Places, numbers: Array) -> LinesAt:
     return LinesAt(value, P, n)
 
 
-def racked(side: float, sign: float, a: Places, b: Places, numbers: Array) -> LinesAt:
+def racked(side: float, sign: float, a: LinePlaces, b: LinePlaces, numbers: Array) -> LinesAt:
     """A pinion and a rack, of which the axis is the direction of its teeth in a row and the mark the normal out of these.
 
     ``numbers``: base radius, pitch radius, base radius times tan b, half the widths of both. ``sign``: -1 where the rack comes first.
@@ -105,7 +105,7 @@ def racked(side: float, sign: float, a: Places, b: Places, numbers: Array) -> Li
     return LinesAt(value, P, sign * n)
 
 
-def between_axes(side: float, a: Places, b: Places, numbers: Array) -> LinesAt:
+def between_axes(side: float, a: LinePlaces, b: LinePlaces, numbers: Array) -> LinesAt:
     """Axes that cross or intersect: the line stands still in the frame of a's axis, the common perpendicular and what is across both.
 
     ``numbers``: a length u, the point from the foot of the perpendicular on axis a, u times the direction of side 1, and of side -1.

@@ -20,8 +20,8 @@ from mechgraph.model.couplings import BaseCoupling, MeshStep
 from mechgraph.pairs import pair_type as evaluation
 
 
-class Places(NamedTuple):
-    """Places on links: points, unit axes, and unit directions at right angles to these, ``(3, n, T)`` each."""
+class LinePlaces(NamedTuple):
+    """LinePlaces on links: points, unit axes, and unit directions at right angles to these, ``(3, n, T)`` each."""
 
     point: Array
     axis: Array
@@ -36,7 +36,7 @@ class LinesAt(NamedTuple):
     along: Array
 
 
-Relation = Callable[[Places, Places, Array], LinesAt]
+Relation = Callable[[LinePlaces, LinePlaces, Array], LinesAt]
 """What places on links a and b and lengths ``(k, n, T)`` of the coupling make: analytic in the places."""
 
 
@@ -48,11 +48,11 @@ class LinkPlace(NamedTuple):
     axis: tuple[float, ...]
     mark: tuple[float, ...]
 
-    def seen(self, pose: Array) -> Places:
+    def seen(self, pose: Array) -> LinePlaces:
         """The place on a link with that pose ``(3, 4)``, as ``(3, 1, 1)`` each."""
         R, vectors = pose[:, :3], (np.asarray(self.point), np.asarray(self.axis), np.asarray(self.mark))
         point, axis, mark = ((R @ v)[:, None, None] for v in vectors)
-        return Places(point + pose[:, 3][:, None, None], axis, mark)
+        return LinePlaces(point + pose[:, 3][:, None, None], axis, mark)
 
 
 class LineCoupling(BaseCoupling):
@@ -78,13 +78,13 @@ class LineCoupling(BaseCoupling):
         """The linear relation, or what stands for it."""
         return super().text if self.linear else "n . (v_b - v_a) = 0 along its line"
 
-    def whole_turns(self, along: Array, a: Places, b: Places, turned: Callable[[str], Array]) -> Array | None:
+    def whole_turns(self, along: Array, a: LinePlaces, b: LinePlaces, turned: Callable[[str], Array]) -> Array | None:
         """What whole turns add to the value ``(T,)`` of a row with the direction ``along (3, 1, T)`` between two places, by how much
         freedoms have grown since the start, ``turned(name) (T,)``; None where its residue modulo ``period`` tells as much.
         """
         return None
 
-    def strayed(self, a: Places, b: Places, a0: Places, b0: Places) -> Array | None:
+    def strayed(self, a: LinePlaces, b: LinePlaces, a0: LinePlaces, b0: LinePlaces) -> Array | None:
         """By how much ``(n, T)`` the places are out of those that its relation is about, radians and lengths, where they were ``a0, b0``
         ``(3, n, 1)`` at the start; None where it holds wherever they are.
         """

@@ -27,11 +27,11 @@ from mechgraph.maths.se3 import Array, identity, inverse
 from mechgraph.maths.tolerances import Tolerances
 from mechgraph.memo import carried, under
 from mechgraph.model.couplings import BaseCoupling
-from mechgraph.model.declaration import Parts, declaration_faults, flat_start, item_faults, mapping_faults
+from mechgraph.model.declaration import DeclaredParts, declaration_faults, flat_start, item_faults, mapping_faults
 from mechgraph.model.loads import Gravity, Load
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Pair
-from mechgraph.model.parts import Parts as Catalogued
+from mechgraph.model.parts import Parts
 from mechgraph.model.plane import in_space, is_flat, pair_in_plane, pair_in_space, spatial_row
 from mechgraph.model.planets import planet_faults
 from mechgraph.model.response_setup import ResponseSetup
@@ -60,7 +60,7 @@ LISTED = 20
 """Most rows of one table."""
 
 
-def mechanism_document(m: Parts) -> Document:
+def mechanism_document(m: DeclaredParts) -> Document:
     """The mechanism as a document; what is long is cut, with the number of what is left out."""
     blocks: list[Block] = [Paragraph(m.description), Paragraph(f"Source: {m.source}" if m.source else "")]
     blocks.append(Paragraph(_counts(m)))
@@ -69,7 +69,7 @@ def mechanism_document(m: Parts) -> Document:
     return Document(f"Mechanism {m.name}", tuple(blocks))
 
 
-def _counts(m: Parts) -> str:
+def _counts(m: DeclaredParts) -> str:
     units = ", ".join(f"{base} in {unit}" for base, unit in m.units.items())
     counts = ((m.links, "link"), (m.pairs, "pair"), (m.couplings, "coupling"), (m.drives, "driver"), (m.loads, "load"))
     plane = "; planar, in x and y" * m.planar
@@ -90,7 +90,7 @@ def _rows(head: Sequence[str], rows: Iterator[tuple[str, ...]], count: int, alig
         yield Paragraph(f"... and {count - LISTED:,} more.")
 
 
-def _links(m: Parts) -> Iterator[Block]:
+def _links(m: DeclaredParts) -> Iterator[Block]:
     mass, length = (f" [{u}]" if (u := unit_of(m.units, dimension)) else "" for dimension in (MASS, LENGTH))
     rows = (
         (
@@ -107,7 +107,7 @@ def _links(m: Parts) -> Iterator[Block]:
     yield from _rows(head, rows, len(m.links), "llrlll")
 
 
-def _pairs(m: Parts) -> Iterator[Block]:
+def _pairs(m: DeclaredParts) -> Iterator[Block]:
     length = f" [{u}]" if (u := unit_of(m.units, LENGTH)) else ""
     rows = (
         (
@@ -131,7 +131,7 @@ def _pitch(pair: Pair) -> str:
     return "" if pair.lead is None else _number(pair.lead / (2 * np.pi))
 
 
-def _drives(m: Parts) -> Iterator[Block]:
+def _drives(m: DeclaredParts) -> Iterator[Block]:
     rows = ((m.full_name(d.freedom), _motion(d.motion)) for d in m.drives)
     yield from _rows(("driven freedom", "stored motion"), rows, len(m.drives), "ll")
 
@@ -140,23 +140,23 @@ def _motion(motion: Motion | None) -> str:
     return "" if motion is None else repr(motion).removeprefix("Motion(").removesuffix(")")
 
 
-def _couplings(m: Parts) -> Iterator[Block]:
+def _couplings(m: DeclaredParts) -> Iterator[Block]:
     yield from _listed(f"{c.name}: {c.text}" for c in m.couplings)
 
 
-def _gears(m: Parts) -> Iterator[Block]:
+def _gears(m: DeclaredParts) -> Iterator[Block]:
     yield from _listed(map(repr, m.gears))
 
 
-def _loads(m: Parts) -> Iterator[Block]:
+def _loads(m: DeclaredParts) -> Iterator[Block]:
     yield from _listed(map(repr, m.loads))
 
 
-def _response(m: Parts) -> Iterator[Block]:
+def _response(m: DeclaredParts) -> Iterator[Block]:
     yield from _listed([] if m.response is None else [repr(m.response)])
 
 
-def _start(m: Parts) -> Iterator[Block]:
+def _start(m: DeclaredParts) -> Iterator[Block]:
     yield from _listed(f"{name} = {value:.6g}" for name, value in m.start.items() if value)
 
 
@@ -183,7 +183,7 @@ def _vector(value: Any, axes: str) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Mechanism(Parts, Shown):
+class Mechanism(DeclaredParts, Shown):
     """Declare a mechanism: a graph with links as nodes and kinematic pairs as edges.
 
     Parameters
@@ -255,7 +255,7 @@ class Mechanism(Parts, Shown):
         *,
         couplings: Iterable[BaseCoupling] = (),
         gears: Iterable[Any] = (),
-        parts: Iterable[Catalogued] = (),
+        parts: Iterable[Parts] = (),
         frame: str | None = None,
         start: Mapping[str, Any] | None = None,
         units: Mapping[str, str] | None = None,
@@ -267,7 +267,7 @@ class Mechanism(Parts, Shown):
         expected: Mapping[str, Any] | None = None,
     ) -> None:
         faults: list[str] = []
-        more = Catalogued.joined(parts, faults)
+        more = Parts.joined(parts, faults)
         pair_tuple = (*items_of(pairs, "pairs", faults), *more.pairs)
         link_tuple = more.links_with(pair_tuple) if links is None else (*items_of(links, "links", faults), *more.links)
         first = next((link.name for link in link_tuple if isinstance(link, Link)), "")
@@ -388,7 +388,7 @@ class Mechanism(Parts, Shown):
 
     def freedom_names(self) -> tuple[str, ...]:
         """Full names of all freedoms, ``"B.Tz"``, in the order of the pairs."""
-        return self.once(Parts.freedom_names)
+        return self.once(DeclaredParts.freedom_names)
 
     @property
     def bound_freedoms(self) -> set[str]:

@@ -35,7 +35,7 @@ from mechgraph.model.gears import (
     involute,
     tip_radius,
 )
-from mechgraph.model.lines import LineCoupling, LinesAt, LinkPlace, Places, Relation, meeting, pose_along, way
+from mechgraph.model.lines import LineCoupling, LinePlaces, LinesAt, LinkPlace, Relation, meeting, pose_along, way
 from mechgraph.model.pair import Pair
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.quantities import LENGTH, shown, unknown
@@ -180,7 +180,7 @@ class Mesh(LineCoupling):
             for step, (sign, power) in zip(steps, signs, strict=True)
         }
 
-    def strayed(self, a: Places, b: Places, a0: Places, b0: Places) -> Array:
+    def strayed(self, a: LinePlaces, b: LinePlaces, a0: LinePlaces, b0: LinePlaces) -> Array:
         """See ``LineCoupling``: the angle between the axes, and of those that cross their distance and where they are along them."""
         if self.relation not in CROSSING.values():
             lean = cross(a.axis, b.axis) if self.relation in CYLINDRICAL.values() else 0.0 * a.axis
@@ -266,7 +266,7 @@ class Meeting:
     period: float = np.inf
     held: tuple[bool, bool] = (False, False)
 
-    def __init__(self, one: Any, two: Any, a: Places, b: Places) -> None:
+    def __init__(self, one: Any, two: Any, a: LinePlaces, b: LinePlaces) -> None:
         self.one, self.two, self.a, self.b = one, two, a, b
         self.faults = list(self._unlike())
 
@@ -313,7 +313,7 @@ def _apart(one: Any, two: Any, h: float) -> Iterator[str]:
 class Parallel(Meeting):
     """Cylindrical gears on parallel axes."""
 
-    def __init__(self, one: Any, two: Any, a: Places, b: Places) -> None:
+    def __init__(self, one: Any, two: Any, a: LinePlaces, b: LinePlaces) -> None:
         super().__init__(one, two, a, b)
         self.k = one.base_radius + two.base_radius
         d = b.point - a.point
@@ -424,7 +424,7 @@ class Parallel(Meeting):
 class WithRack(Meeting):
     """A gear and a rack."""
 
-    def __init__(self, one: Any, two: Any, a: Places, b: Places) -> None:
+    def __init__(self, one: Any, two: Any, a: LinePlaces, b: LinePlaces) -> None:
         super().__init__(one, two, a, b)
         self.sign = -1.0 if isinstance(one, GearRack) else 1.0
         self.pinion, self.rack = (one, two) if self.sign > 0 else (two, one)
@@ -471,7 +471,7 @@ class WithRack(Meeting):
 class Still(Meeting):
     """Axes that keep their places: the line stands still between them."""
 
-    def __init__(self, one: Any, two: Any, a: Places, b: Places) -> None:
+    def __init__(self, one: Any, two: Any, a: LinePlaces, b: LinePlaces) -> None:
         super().__init__(one, two, a, b)
         self.axes = Axes(a.point[:, 0], a.axis[:, 0], b.point[:, 0], b.axis[:, 0])
         if not self.faults and not self.misfits(1e-3):
@@ -543,7 +543,7 @@ class Crossed(Still):
         return teeth_lines(P[:, None], away[:, None], trace[:, None], self.one.pressure_angle)
 
 
-def _cylinders(one: Any, two: Any, a: Places, b: Places) -> Meeting:
+def _cylinders(one: Any, two: Any, a: LinePlaces, b: LinePlaces) -> Meeting:
     """Two cylindrical gears, by their axes."""
     off = float(np.abs(cross(a.axis, b.axis)).max())
     # a few degrees: axes that were meant to be parallel

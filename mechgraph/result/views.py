@@ -12,7 +12,7 @@ from mechgraph.document import Block, Document, Paragraph, Shown
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import vector_fault
 from mechgraph.maths.se3 import Array
-from mechgraph.model.belts import BeltDrive, Course
+from mechgraph.model.belts import BeltCourse, BeltDrive
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.pairs.pair_type import PairType
@@ -400,7 +400,7 @@ class BeltResult(Shown):
         return Document(f"Belt {self._name} of {m.name}", blocks)
 
     @cached_property
-    def _course(self) -> Course:
+    def _course(self) -> BeltCourse:
         m = self._values.whole
         links = [m.place_of_link(p.link) for p in self._belt.pulleys(m)]
         return self._belt.course_of(m, [np.moveaxis(self._values.link(k)[0].reshape(-1, 4, 4), 0, 2) for k in links])

@@ -314,7 +314,7 @@ class DrawnBelt(NamedTuple):
     spans: tuple[str, ...] = ()
 
 
-class Seat(NamedTuple):
+class WheelSeat(NamedTuple):
     """Where a gear sits: its link, the pose ``(3, 4)`` of that, a point of its axis and its axes as columns, global."""
 
     link: str
@@ -378,21 +378,21 @@ def gears_of(m: Mechanism, poses: Mapping[str, Array]) -> tuple[list[Wheel], lis
     return interleaved(wheels, meshes, poses), meshes, belts
 
 
-def _mesh(a: int, b: int, P: Array, seat: Seat) -> DrawnMesh:
+def _mesh(a: int, b: int, P: Array, seat: WheelSeat) -> DrawnMesh:
     """Two wheels by number that mesh at a point, one of them sitting there."""
     along = np.cross(seat.axes[:, 2], P - seat.point)
     return DrawnMesh(a, b, P, along / np.linalg.norm(along))
 
 
-def _placed_seat(gear: Any, poses: Mapping[str, Array]) -> Seat:
+def _placed_seat(gear: Any, poses: Mapping[str, Array]) -> WheelSeat:
     place = place_of(gear) if isinstance(gear, Pulley) else gear.place
     pose, z, x = poses[place.link], np.asarray(place.axis), np.asarray(place.mark)
     z = z / np.linalg.norm(z)
     axes = np.column_stack([x, np.cross(z, x), z])
-    return Seat(place.link, pose, pose[:, :3] @ np.asarray(place.point) + pose[:, 3], pose[:, :3] @ axes)
+    return WheelSeat(place.link, pose, pose[:, :3] @ np.asarray(place.point) + pose[:, 3], pose[:, :3] @ axes)
 
 
-def _cylindrical(g: Any, seat: Seat) -> Wheel:
+def _cylindrical(g: Any, seat: WheelSeat) -> Wheel:
     angles = {"pressure": g.pressure_angle, "helix": g.helix_angle, "shift": g.shift, "internal": g.internal}
     return seat.wheel(
         g.name,
@@ -407,7 +407,7 @@ def _cylindrical(g: Any, seat: Seat) -> Wheel:
     )
 
 
-def _in_a_row(g: Any, seat: Seat) -> Wheel:
+def _in_a_row(g: Any, seat: WheelSeat) -> Wheel:
     x, y = seat.axes[:, 2], seat.axes[:, 0]
     angles = {"pressure": g.pressure_angle, "helix": g.helix_angle, "width": g.width or 0.0}
     axes = np.column_stack([x, y, np.cross(x, y)])
@@ -423,15 +423,15 @@ def _in_a_row(g: Any, seat: Seat) -> Wheel:
     )
 
 
-def _pulley(g: Any, seat: Seat) -> Wheel:
+def _pulley(g: Any, seat: WheelSeat) -> Wheel:
     return seat.wheel(g.name, seat.point, seat.axes, 0, g.pitch_radius, 0.05 * g.pitch_radius)
 
 
-PLACED: dict[type[Any], Callable[[Any, Seat], Wheel]] = {Gear: _cylindrical, GearRack: _in_a_row, Pulley: _pulley}
+PLACED: dict[type[Any], Callable[[Any, WheelSeat], Wheel]] = {Gear: _cylindrical, GearRack: _in_a_row, Pulley: _pulley}
 """Wheels of gears that say all of themselves."""
 
 
-def _bevels(one: Any, two: Any, P: Array, seats: Mapping[str, Seat]) -> tuple[tuple[Any, Any], Iterator[Wheel]]:
+def _bevels(one: Any, two: Any, P: Array, seats: Mapping[str, WheelSeat]) -> tuple[tuple[Any, Any], Iterator[Wheel]]:
     said = SimpleNamespace(
         name="",
         teeth=(one.teeth, two.teeth),
@@ -442,7 +442,7 @@ def _bevels(one: Any, two: Any, P: Array, seats: Mapping[str, Seat]) -> tuple[tu
     return (one, two), _bevel(said, P, seats[one.name], seats[two.name])
 
 
-def _worms(one: Any, two: Any, P: Array, seats: Mapping[str, Seat]) -> tuple[tuple[Any, Any], Iterator[Wheel]]:
+def _worms(one: Any, two: Any, P: Array, seats: Mapping[str, WheelSeat]) -> tuple[tuple[Any, Any], Iterator[Wheel]]:
     worm, wheel = (one, two) if isinstance(one, Worm) else (two, one)
     said = SimpleNamespace(
         name="",
@@ -460,20 +460,20 @@ MET: dict[tuple[str, str], Callable[..., tuple[tuple[Any, Any], Iterator[Wheel]]
 """Wheels of gears of which the size follows from the other one."""
 
 
-def _seat(m: Mechanism, poses: Mapping[str, Array], freedom: str, link: str) -> Seat:
+def _seat(m: Mechanism, poses: Mapping[str, Array], freedom: str, link: str) -> WheelSeat:
     pair = m.pairs[m.freedom(freedom)[0]]
     X, pose = pair.markers[int(pair.b == link)].pose(), poses[link]
-    return Seat(link, pose, pose[:, :3] @ X[:, 3] + pose[:, 3], pose[:, :3] @ X[:, :3])
+    return WheelSeat(link, pose, pose[:, :3] @ X[:, 3] + pose[:, 3], pose[:, :3] @ X[:, :3])
 
 
-def _foot(seat: Seat, P: Array) -> tuple[Array, float]:
+def _foot(seat: WheelSeat, P: Array) -> tuple[Array, float]:
     """The middle of the wheel that has a pitch point, and its radius."""
     z = seat.axes[:, 2]
     at = seat.point + ((P - seat.point) @ z) * z
     return at, float(np.linalg.norm(P - at))
 
 
-def _spur(c: Any, P: Array, *seats: Seat) -> Iterator[Wheel]:
+def _spur(c: Any, P: Array, *seats: WheelSeat) -> Iterator[Wheel]:
     for k, seat in enumerate(seats):
         at, r = _foot(seat, P)
         teeth, helix = c.teeth[k], c.rims[k][2]
@@ -481,7 +481,7 @@ def _spur(c: Any, P: Array, *seats: Seat) -> Iterator[Wheel]:
         yield seat.wheel(f"{c.name}.{'ab'[k]}", at, seat.axes, teeth, r, 2 * r * np.cos(helix) / teeth, **more)
 
 
-def _bevel(c: Any, P: Array, *seats: Seat) -> Iterator[Wheel]:
+def _bevel(c: Any, P: Array, *seats: WheelSeat) -> Iterator[Wheel]:
     (p, z), (q, w) = ((seat.point, seat.axes[:, 2]) for seat in seats)
     apex = p + np.linalg.lstsq(np.stack([z, -w], axis=1), q - p)[0][0] * z
     for k, seat in enumerate(seats):
@@ -494,7 +494,7 @@ def _bevel(c: Any, P: Array, *seats: Seat) -> Iterator[Wheel]:
         )
 
 
-def _worm(c: Any, P: Array, worm: Seat, wheel: Seat) -> Iterator[Wheel]:
+def _worm(c: Any, P: Array, worm: WheelSeat, wheel: WheelSeat) -> Iterator[Wheel]:
     at, r = _foot(wheel, P)
     axial, hand = 2 * r / c.teeth[1], -1.0 if c.left_hand else 1.0
     lead = np.arctan2(axial * c.teeth[0], 2 * c.radius)
@@ -517,7 +517,7 @@ def _worm(c: Any, P: Array, worm: Seat, wheel: Seat) -> Iterator[Wheel]:
     )
 
 
-def _rack(c: Any, P: Array, pinion: Seat, rack: Seat) -> Iterator[Wheel]:
+def _rack(c: Any, P: Array, pinion: WheelSeat, rack: WheelSeat) -> Iterator[Wheel]:
     at, x = _foot(pinion, P)[0], rack.axes[:, 2]
     y = (at - P) / np.linalg.norm(at - P)
     yield pinion.wheel(f"{c.name}.a", at, pinion.axes, 0, c.radius, 0.1 * c.radius)
@@ -526,7 +526,7 @@ def _rack(c: Any, P: Array, pinion: Seat, rack: Seat) -> Iterator[Wheel]:
     )
 
 
-def _pulleys(c: Any, P: Array, *seats: Seat) -> Iterator[Wheel]:
+def _pulleys(c: Any, P: Array, *seats: WheelSeat) -> Iterator[Wheel]:
     for k, seat in enumerate(seats):
         z = seat.axes[:, 2]
         yield seat.wheel(
