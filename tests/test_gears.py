@@ -593,3 +593,17 @@ def test_a_wrong_pair_beside_gears_is_named():
     ]
     with pytest.raises(mg.DeclarationError, match=r"unknown type 'ZZ'(.|\n)*b = \[3\](.|\n)*no link in common"):
         mg.Mechanism("x", pairs=pairs, couplings=[mg.SpurGears("g", "A", "B", teeth=(20, 20))])
+
+
+@pytest.mark.parametrize("ratio", [0.01, 0.05, 20.0, 300.0])
+def test_far_ratios_are_solved_by_every_engine(ratio: float) -> None:
+    """Relations without loops, their coefficients far apart: the kernel had no numbers for some positions, and called them solved."""
+    pins = [mg.Pair(k, "R", "frame", k.lower(), point=(x, 0, 0), axis=(0, 0, 1)) for k, x in (("A", 0.0), ("B", 0.05))]
+    m = mg.Mechanism(
+        "ratio", pairs=pins, couplings=[mg.Coupling({"A": ratio, "B": 1.0})], drives=["A"], loads=[mg.Effort("B", 2.0)]
+    )
+    angle = np.linspace(0, 3, 9)
+    for engine in ("dense", "auto"):
+        s = mg.solve(m, {"A": angle}, engine=engine)
+        assert np.allclose(s["B"].position[:, 0], -ratio * angle, rtol=1e-12)
+        assert np.allclose(s["A"].effort, 2.0 * ratio, rtol=1e-10)
