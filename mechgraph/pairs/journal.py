@@ -147,7 +147,7 @@ class Journal(Described):
     def mobility(self, xi: Any, eta: Any) -> Array:
         """Return Booker's mobility ``(2, ...)``: along the load and across it, of a journal at ``xi`` along the load and ``eta`` across.
 
-            de/dt = W (c / R)^2 / (viscosity L 2R) M,   |M| = (D / L)^2 / (2 |I|)
+            de/dt = W (c / R)^2 / (viscosity L D) M,   M = (D / L)^2 / (2 I) along the squeeze, I the force of a unit squeeze
 
         Parameters
         ----------
