@@ -167,8 +167,8 @@ size_t mgk_state_size(const int *I) {
 
 /* --- vectors, poses, twists -------------------------------------------------------------------------------------------------------- */
 
-/* As fmax where `most` is a number, without a call of the library. */
-static magnitude raised(magnitude most, magnitude value) { return value > most ? value : most; }
+/* The larger one; what is no number stays, so that it passes no limit. */
+static magnitude raised(magnitude most, magnitude value) { return value <= most || most != most ? most : value; }
 
 static magnitude size_of(const double *v, int n) {
   magnitude out = 0.0;
@@ -1574,8 +1574,9 @@ static int follow(const Model *m, Work *w, Asked *asked, const double *begin, co
     swapped(&w->before, &w->a);
     swapped(&w->a, &w->b);
     set_border(m, w, &w->a);
-    /* where steps have to become shorter they go on to, by as much as over the last one */
-    h = grown * step;
+    /* where steps have to become shorter they go on to, by as much as over the last one; a step that needed no correction does not say
+       how long the next may be, and without a bound the ratio of the two would be nothing */
+    h = fmin(grown * step, 2.0 * LONGEST);
     const double next = h < furthest ? h * h / furthest : h;
     known = 1, furthest = h, h = fmin(fmin(LONGEST, 2.0 * step), next);
   }

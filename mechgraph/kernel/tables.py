@@ -362,10 +362,7 @@ class Kernel:
             ctypes.c_int(each), ctypes.c_int(ends.shape[1]), *map(pointer, (ends, order, q, v, a)), ctypes.c_int(forces),
             *map(pointer, (values, whole, largest, work)),
         )  # fmt: skip
-        records = Records(self.layout, values, largest, (int(work[0]), int(work[1]), int(work[2])))
-        # a state that is no number is none that was decided, whatever the certificate says: a variant with one is left to numpy
-        sound = np.isfinite(records["x"]).all(axis=0).reshape(count, each).all(axis=1)
-        return records, (whole > 0) & sound
+        return Records(self.layout, values, largest, (int(work[0]), int(work[1]), int(work[2]))), whole > 0
 
     def lead(self, x: Array, middle: Array, end: Array) -> Mask:
         """One certified step each of ``n`` mechanisms from ``P`` (of one, or one each) by tables ``middle`` at that part of it to ``end
