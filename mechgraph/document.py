@@ -31,6 +31,8 @@ from mechgraph.errors import visible
 from mechgraph.memo import Remembers
 from mechgraph.quantities import with_doors, with_memory
 
+LISTED, NAMED = 20, 8
+"""Most rows of a table and names of a sentence; all are in the JSON."""
 ALIGNMENTS = {"l": "left", "r": "right", "c": "center"}
 
 

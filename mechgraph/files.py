@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from mechgraph.errors import DeclarationError, FileError, MissingExtraError, visible
-from mechgraph.quantities import shown
+from mechgraph.quantities import DEEPEST, shown
 
 Json = dict[str, Any]
 VERSION = 1
@@ -152,8 +152,6 @@ def _first_sentence(text: str | None) -> str:
 
 LARGEST_FILE = 64 * 2**20
 """Bytes of the largest file that is read: some 200,000 links."""
-DEEPEST = 32
-"""Tables and lists of a file may stand in each other so deeply; a mechanism needs six."""
 
 
 LONG_KEY = re.compile(rf"""(?<![\w"'-])[\w"'-]++(?:[ \t]*+\.[ \t]*+[\w"'-]++){{{DEEPEST}}}""")

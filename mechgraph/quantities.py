@@ -190,7 +190,7 @@ def factor_of(dimension: Dimension, base: Sequence[float]) -> float:
 LARGEST = 1e100
 """Numbers from here on are refused: their squares would overflow."""
 DEEPEST = 32
-"""Sequences nested more deeply are no arrays (numpy knows 64 axes)."""
+"""Sequences nested more deeply are no arrays (numpy knows 64 axes), tables and lists of a file no mechanism (it needs six)."""
 
 _FLOATS, _PLAIN = {float}, {float, int}
 _is_finite = LARGEST.__gt__

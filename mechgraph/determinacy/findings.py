@@ -29,6 +29,7 @@ from mechgraph.determinacy.pair_changes import (
     with_spline,
 )
 from mechgraph.determinacy.snapping import EXACT, SnappedMechanism, candidates, snapped
+from mechgraph.document import NAMED
 from mechgraph.errors import Budget, MechgraphError, SearchEnded
 from mechgraph.files import patch
 from mechgraph.force.block import hold_at_rest, hold_names, is_idle
@@ -46,9 +47,6 @@ from mechgraph.model.toml import to_data
 from mechgraph.pairs.factors import Component
 from mechgraph.pairs.pair_type import TABLE, PairType
 from mechgraph.quantities import unit_of
-
-NAMED = 8
-"""Most names that a sentence lists."""
 
 LINES = {
     "R": "pin", "P": "slide", "H": "screw", "C": "shaft", "U": "first pin", "E": "normal of the plane",

@@ -23,7 +23,7 @@ from mechgraph.determinacy.mobility import FreeMotion, free_motion
 from mechgraph.determinacy.pair_changes import LARGEST_FOR_SETS
 from mechgraph.determinacy.sentences import assumed, here_only, kind_line, loop_names, mobility_line, reasons, verdict
 from mechgraph.determinacy.snapping import EXACT, meant
-from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table, to_markdown, to_text
+from mechgraph.document import LISTED, Block, Bullets, Document, Heading, Paragraph, Shown, Table, to_markdown, to_text
 from mechgraph.errors import (
     AssemblyError,
     Budget,
@@ -45,8 +45,6 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.pairs.pair_type import TABLE
 from mechgraph.quantities import Limit, door, wrong
 
-LISTED = 20
-"""Most items of one kind that are printed; all are in the JSON."""
 NOT_UNIQUE = (
     "Unique: determined by equilibrium. Not unique: it also depends on fits, stiffness and temperature; a rigid-body model cannot "
     "determine it."

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from mechgraph.determinacy.facts import Facts
 from mechgraph.determinacy.families import MotionKind
-from mechgraph.determinacy.findings import KINDS, NAMED, alternatives, component_words, joined, plural, vector
+from mechgraph.determinacy.findings import KINDS, alternatives, component_words, joined, plural, vector
 from mechgraph.determinacy.uniqueness import Uniqueness
-from mechgraph.document import Block, Bullets, Document, Paragraph, to_text
+from mechgraph.document import NAMED, Block, Bullets, Document, Paragraph, to_text
 from mechgraph.errors import listed
 from mechgraph.maths.se3 import Index
 from mechgraph.maths.tolerances import RANKS

@@ -28,10 +28,6 @@ import scipy
 
 from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import ContentError, DeclarationError, FileError, MechgraphWarning, visible
-from mechgraph.exchange.asmt import AsmtReader, Assembly, Connection, Results, results_of
-from mechgraph.exchange.asmt_mechanism import mechanism_of
-from mechgraph.exchange.mjcf import read_mjcf, save_mjcf
-from mechgraph.exchange.urdf import read_urdf
 from mechgraph.files import Format, format_of, text_of, write_whole
 from mechgraph.graph.linkgraph import link_graph
 from mechgraph.kinetostatics import solve
@@ -44,6 +40,8 @@ from mechgraph.result.solution import Solution
 
 if TYPE_CHECKING:
     import networkx as nx
+
+    from mechgraph.exchange.asmt import Assembly, Connection, Results
 
 
 def save_graphml(m: Mechanism, path: str | os.PathLike[str]) -> None:
@@ -103,18 +101,43 @@ Notes = tuple[str, ...]
 
 def assembly_of(path: Path) -> Assembly:
     """A FreeCAD assembly as its file holds it."""
+    from mechgraph.exchange.asmt import AsmtReader
+
     return AsmtReader(path, text_of(path, "FreeCAD assembly")).read()
 
 
+# files of other programs are rare: what reads and writes them is loaded where it is asked for
+
+
 def _from_asmt(path: Path) -> tuple[Mechanism, Notes]:
+    from mechgraph.exchange.asmt_mechanism import mechanism_of
+
     return mechanism_of(assembly_of(path))
+
+
+def _from_mjcf(path: Path) -> tuple[Mechanism, Notes]:
+    from mechgraph.exchange.mjcf import read_mjcf
+
+    return read_mjcf(path)
+
+
+def _to_mjcf(m: Mechanism, path: str | os.PathLike[str]) -> None:
+    from mechgraph.exchange.mjcf import save_mjcf
+
+    save_mjcf(m, path)
+
+
+def _from_urdf(path: Path) -> tuple[Mechanism, Notes]:
+    from mechgraph.exchange.urdf import read_urdf
+
+    return read_urdf(path)
 
 
 READERS: dict[str, Callable[[Path], tuple[Mechanism, Notes]]] = {
     ".asmt": _from_asmt,
-    ".xml": read_mjcf,
-    ".mjcf": read_mjcf,
-    ".urdf": read_urdf,
+    ".xml": _from_mjcf,
+    ".mjcf": _from_mjcf,
+    ".urdf": _from_urdf,
 }
 """Readers by suffix: the mechanism of a file, and what was taken otherwise than it stands there."""
 
@@ -167,7 +190,7 @@ def load(name: str | os.PathLike[str]) -> Mechanism:
 
 WRITERS = (
     Format("TOML", (".toml",), toml.save),
-    Format("MJCF", (".xml", ".mjcf"), save_mjcf),
+    Format("MJCF", (".xml", ".mjcf"), _to_mjcf),
     Format("GraphML", (".graphml",), save_graphml),
     Format("node-link JSON", (".json",), save_node_link),
 )
@@ -365,6 +388,9 @@ def compare(path: str | os.PathLike[str]) -> Comparison:
     FileError
         where the file holds no results, or no motions that prescribe the movement.
     """
+    from mechgraph.exchange.asmt import results_of
+    from mechgraph.exchange.asmt_mechanism import mechanism_of
+
     path = Path(path)
     assembly = assembly_of(path)
     results = results_of(assembly, path)

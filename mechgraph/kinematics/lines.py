@@ -17,11 +17,9 @@ from typing import Any
 import numpy as np
 import scipy
 
+from mechgraph.maths.linear import COMPLEX_STEP
 from mechgraph.maths.se3 import Array, Index, cross, rotate
 from mechgraph.model.lines import LineCoupling, LinePlaces, LinesAt, Relation
-
-STEP = 1e-30
-"""Complex step of a derivative: its square is no number beside one."""
 
 
 class LineRows:
@@ -189,7 +187,7 @@ class LineRows:
         X, G = here.poses, self.wrenches(here.poses)
         change = np.stack([cross(V[:3], X[:, k]) for k in range(4)], axis=1)
         change[:, 3] += V[3:]
-        dG = self.wrenches(X + 1j * STEP * change).imag / STEP
+        dG = self.wrenches(X + 1j * COMPLEX_STEP * change).imag / COMPLEX_STEP
         a, b = self.links
         own = sense[:, None] * (G[:, rows] * pairs[:, pair]).sum(axis=0)
         return _summed(rows, own, len(self.couplings)) + (dG * (V[:, b] - V[:, a])).sum(axis=0)

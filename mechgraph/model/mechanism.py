@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mechgraph import methods
-from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table
+from mechgraph.document import LISTED, Block, Bullets, Document, Heading, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, MechgraphWarning, counted
 from mechgraph.fields import Described, plain, same_fields
 from mechgraph.maths.se3 import Array, identity, inverse
@@ -55,9 +55,6 @@ from mechgraph.quantities import (
     without_units,
     wrong,
 )
-
-LISTED = 20
-"""Most rows of one table."""
 
 
 def mechanism_document(m: DeclaredParts) -> Document:

@@ -41,6 +41,7 @@ from mechgraph.fields import (
     parallel_faults,
     second_direction,
 )
+from mechgraph.maths.linear import COMPLEX_STEP
 from mechgraph.maths.se3 import Array, cross
 from mechgraph.maths.tolerances import SHAPES
 from mechgraph.memo import Once
@@ -526,8 +527,6 @@ class Involute(Centred):
         return found
 
 
-COMPLEX_STEP = 1e-30
-"""Imaginary step of a derivative."""
 GAUSS_NODES, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(6)
 """Rule of an integral over an interval that is short enough for a polynomial of degree 7."""
 

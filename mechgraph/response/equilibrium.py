@@ -24,7 +24,7 @@ import numpy as np
 import scipy
 
 from mechgraph.determinacy.mobility import free_motion
-from mechgraph.document import Document, Paragraph, Shown, Table
+from mechgraph.document import NAMED, Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, MechgraphWarning, ResponseError, counted, listed
 from mechgraph.kinematics.assembly import assembled_at, named_columns
 from mechgraph.kinematics.rates import Velocities
@@ -206,8 +206,6 @@ EndKind = Literal["stable", "nearest"]
 
 STABLE = {True: "stable", False: "unstable", None: "neither stable nor unstable to second order"}
 """How a position of equilibrium is called."""
-NAMED = 8
-"""Most coordinates that are shown."""
 
 
 class Equilibrium(Mechanism):
@@ -408,10 +406,6 @@ def _stability(d: Derivatives, kept: Array) -> bool | None:
     return False if (s.real > slow).any() else True if (s.real < -slow).all() and not d.bent else None
 
 
-SHOWN = 8
-"""Most motions, or coordinates, that are shown."""
-
-
 @dataclass(frozen=True, repr=False)
 class Linearized(Shown):
     """Small motions about a position of equilibrium.
@@ -437,7 +431,7 @@ class Linearized(Shown):
         time = self.mechanism.units.get("time", "")
         per = unit_of(self.mechanism.units, (0, 0, -1))
         rows = []
-        for w, ratio, shape in zip(self.frequencies[:SHOWN], self.damping[:SHOWN], self.modes[:SHOWN], strict=False):
+        for w, ratio, shape in zip(self.frequencies[:NAMED], self.damping[:NAMED], self.modes[:NAMED], strict=False):
             swings = (number(w), number(w / (2 * np.pi))) if np.isfinite(w) else ("none", "")
             told = (number(ratio),) if w != 0.0 else ("free",)
             rows.append((*swings, *told, " ".join(f"{name} {abs(shape[name]):.3g}" for name in self._told(shape))))

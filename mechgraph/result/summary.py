@@ -11,7 +11,7 @@ import numpy as np
 
 from mechgraph.determinacy.snapping import SnappedMechanism
 from mechgraph.determinacy.uniqueness import labels_of
-from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Table
+from mechgraph.document import LISTED, Block, Bullets, Document, Heading, Paragraph, Table
 from mechgraph.errors import counted
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.model.mechanism import Mechanism
@@ -29,7 +29,7 @@ from mechgraph.result.values import (
     number,
     with_unit,
 )
-from mechgraph.result.views import PositionLabels
+from mechgraph.result.views import UNASKED, PositionLabels
 
 
 class Greatest:
@@ -352,11 +352,6 @@ def _reactions(places: PositionLabels) -> tuple[ReactionData, ...]:
     return tuple(out)
 
 
-LISTED = 20
-"""Most rows of one table."""
-UNASKED, RATE = 1_000_000, 1e6
-"""Reactions (pairs times positions) up to which the extremes are found without being asked for; looked through in a second, about."""
-
 LEAST_NORM = "Statically indeterminate; minimum-norm values (equal pair stiffness, rigid links, no preload)."
 NO_VALUE = (
     "Statically indeterminate components are NaN. The table above shows unique components; where some are missing, brackets name "
@@ -465,7 +460,7 @@ class _SummaryText(PositionLabels):
         """What is said in place of the extremes of ``size`` reactions."""
         return (
             f"The extremes of efforts and reactions ({len(self.m.pairs):,} pairs at {self.status.size:,} positions) were not computed; "
-            f"s.summary() computes them, in about {max(1, round(size / RATE))} s."
+            f"s.summary() computes them, in about {max(1, round(size / UNASKED))} s."
         )
 
     def forces(self) -> Iterator[Block]:

@@ -87,7 +87,7 @@ class PositionLabels:
 
 
 UNASKED = 1_000_000
-"""Links times positions up to which motions are evaluated again without being asked for."""
+"""Links, or pairs, times positions up to which they are looked through without being asked for: a second, about."""
 
 Row = tuple[str, Any]
 """A quantity and its values, one a position."""
