@@ -174,15 +174,21 @@ def test_a_ball_rubs_against_its_angular_velocity() -> None:
     assert abs(rough.checks.power) < 1e-12
 
 
-def test_slider_crank_rough_everywhere() -> None:
-    """What the crank brings is what the load takes and what is lost; dT/dmu at 0 = sum of the normal forces times their speeds, over w."""
-    r, l, w = 0.05, 0.15, 20.0
+def slider_crank() -> mg.Mechanism:
+    """Crank 0.05, rod 0.15, stretched at the start, pushed back and down at the piston."""
+    r, l = 0.05, 0.15
     pairs = [
         mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=Z), mg.Pair("B", "R", "crank", "rod", point=(r, 0, 0), axis=Z),
         mg.Pair("C", "R", "rod", "piston", point=(r + l, 0, 0), axis=Z), mg.Pair("D", "P", "frame", "piston", point=(r + l, 0, 0), axis=X),
     ]  # fmt: skip
-    push = mg.Wrench("piston", force=(-1000.0, 0, 0), point=(r + l, 0, 0))
-    m = mg.Mechanism("slider-crank", pairs=pairs, drives=["A"], loads=[push])
+    push = mg.Wrench("piston", force=(-1000.0, -50.0, 0), point=(r + l, 0, 0))
+    return mg.Mechanism("slider-crank", pairs=pairs, drives=["A"], loads=[push])
+
+
+def test_slider_crank_rough_everywhere() -> None:
+    """What the crank brings is what the load takes and what is lost; dT/dmu at 0 = sum of the normal forces times their speeds, over w."""
+    w, m = 20.0, slider_crank()
+    push = m.loads[0]
     given = {"A": mg.Motion(np.linspace(0.2, 6.0, 40), velocity=w)}
 
     def rough(mu: float) -> mg.Solution:
@@ -383,3 +389,17 @@ def test_faults_and_files(tmp_path) -> None:
     weld = mg.Pair("A", "W", "frame", "b", point=(0, 0, 0))
     with pytest.raises(mg.DeclarationError, match="nothing of it rubs"):
         mg.Mechanism("w", pairs=[weld], loads=[mg.Friction("A", mu=0.1)])
+
+
+def test_a_slow_position_does_not_depend_on_a_fast_one_beside_it() -> None:
+    """Nor does a position at rest; where one freedom reverses it alone is at rest."""
+    m = shaft(force(0, -W, (0, 0, 0)))
+    s = mg.solve(m, {"A": mg.Motion([0.0, 0.0, 0.0], velocity=[1e-9, 1e3, 0.0])})
+    assert s["A"].effort[:2, 0] == pytest.approx(RHO * W, rel=1e-12)
+    assert s["A"].effort_range[2, 0] == pytest.approx([-RHO * W, RHO * W], rel=1e-12)
+    crank = slider_crank()
+    dry = [mg.Friction("D", mu=0.2), mg.Friction("A", mu=0.1, radius=0.01)]
+    turn = mg.solve(crank, {"A": mg.Motion([0.0, 1e-6, 1.0], velocity=5.0)}, loads=[*crank.loads, *dry])
+    assert turn["D"].friction[0, 0] == 0.0
+    assert abs(turn["D"].friction[1, 0]) > 1.0
+    assert (turn["A"].friction[:, 0] < 0).all()

@@ -11,7 +11,7 @@ import scipy
 
 from mechgraph.errors import DeclarationError
 from mechgraph.force.elastic import elastic_split, seats_of
-from mechgraph.force.friction import OUTCOMES, STILL, Rubbed, places_of, rubbed
+from mechgraph.force.friction import OUTCOMES, Rubbed, moving_rates, places_of, rubbed
 from mechgraph.force.loads import Site, inertia_wrenches, kinetic_power
 from mechgraph.force.reactions import (
     METHODS,
@@ -191,8 +191,9 @@ def forces_of_block(
     rubs: Rubbed | None = None
     ranges: Array | None = None
     if dry:
-        solve, found, rubs, flank = _rough(here, task, f, wrenches, found, (lines, flank), dry, rates.dq)
-        ranges = solve.at_rest(rates.dq, given)
+        dq = moving_rates(rates.dq, rates.ddq)
+        solve, found, rubs, flank = _rough(here, task, f, wrenches, found, (lines, flank), dry, dq)
+        ranges = solve.at_rest(dq, given)
         given = given + rubs.efforts
     own = np.zeros_like(found.efforts)
     own[task.driven] = (found.efforts - given - found.coupled)[task.driven]
@@ -431,13 +432,13 @@ class _FrictionProblem:
     def at_rest(self, dq: Array, given: Array) -> Array:
         """Efforts of drives ``(F, 2, T)`` on the verge of motion to - and to +, the others held; infinite where it jams, NaN in motion."""
         out = np.full((len(dq), 2, self.here.T), np.nan)
-        rest = (np.abs(dq) <= STILL * np.abs(dq).max(initial=0.0)).all(axis=0)
+        rest = ~dq.any(axis=0)
         if not rest.any():
             return out
         moved = self.f.sensitivity()
         for j, column in enumerate(self.task.driven):
             for side, sense in enumerate((-1.0, 1.0)):
-                found, rubs = self.moving(sense * moved[:, j], at_rest=True)
+                found, rubs = self.moving(sense * moving_rates(moved[:, j]), at_rest=True)
                 effort = (found.efforts - given - rubs.efforts - found.coupled)[column]
                 effort = np.where((rubs.outcome == 1) | (rubs.outcome == 2), sense * np.inf, effort)
                 out[column, side, rest] = effort[rest]

@@ -22,11 +22,9 @@ import numpy as np
 
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Array, Index, cross, skew
-from mechgraph.maths.tolerances import STRESSES
+from mechgraph.maths.tolerances import MOTIONS, STRESSES
 from mechgraph.model.friction import Friction, rubs_as_ball, rubs_as_journal, rubs_as_plane, rubs_as_slide
 
-STILL = 1e-8
-"""Part of the largest rate of a mechanism below which a freedom is at rest, as where it reverses: friction has no direction there."""
 OUTCOMES = ("ok", "jams", "no finite force", "friction not determined")
 """What becomes of a position, by number."""
 
@@ -58,10 +56,19 @@ def _force_at(p: Array, f: Array) -> Array:
     return np.concatenate([cross(p, f), f])
 
 
+def moving_rates(dq: Array, ddq: Array | float = 0.0) -> Array:
+    """Rates ``(F, T)`` without those of freedoms at rest, where friction has no direction: rounding beside the largest rate of the
+    position, or a reversal within rounding of the coordinate, ``q'^2 / q''``.
+    """
+    size = np.abs(dq)
+    rests = (size <= MOTIONS.rounding * size.max(axis=0, initial=0.0)) | (size <= MOTIONS.still * np.sqrt(np.abs(ddq)))
+    return np.where(rests, 0.0, dq)
+
+
 def places_of(
     here: Configuration, dq: Array, normal: Array, loads: Sequence[Friction], at_rest: bool = False
 ) -> list[Place]:
-    """All places that rub in a motion ``dq (F, T)``; ``normal (6, P, T)`` are reactions that tell on which side a ball touches."""
+    """All places that rub in a motion ``dq (F, T)`` of ``moving_rates``; ``normal (6, P, T)``: reactions that tell where bodies touch."""
     return [
         place
         for load in loads
@@ -77,7 +84,6 @@ def _places(here: Configuration, dq: Array, normal: Array, load: Friction, mu: f
     row, first = pair.type, int(s.first_column[k])
     S = here.S[:, first : first + row.f]
     rate = dq[first : first + row.f]
-    rate = np.where(np.abs(rate) > STILL * np.abs(dq).max(initial=0.0), rate, 0.0)
     twist = np.einsum("cft,ft->ct", S, rate)
     preload = load.preload / L
     force = _rows(np.zeros((3, 3, T)), np.broadcast_to(np.eye(3)[:, :, None], (3, 3, T)))
@@ -90,7 +96,7 @@ def _places(here: Configuration, dq: Array, normal: Array, load: Friction, mu: f
         n = normal[3:, k] / np.where(size > 0, size, 1.0)
         slip = twist[3:] + cross(twist[:3], c - r * n)
         speed = np.sqrt((slip * slip).sum(axis=0))
-        u = slip / np.where(speed > STILL * np.abs(twist).max(initial=1e-300), speed, np.inf)
+        u = slip / np.where(speed > MOTIONS.rounding * np.abs(twist).max(axis=0), speed, np.inf)
         yield Place(
             k, force, -mu * _force_at(c, u), np.concatenate([-mu * r * skew(u), np.zeros((3, 3, T))]), preload, True
         )
@@ -106,7 +112,7 @@ def _places(here: Configuration, dq: Array, normal: Array, load: Friction, mu: f
         v = twist[3:] + cross(twist[:3], at)
         v = v - z * (v * z).sum(axis=0)
         speed = np.sqrt((v * v).sum(axis=0) + (r * turn) ** 2)
-        share = np.where(speed > STILL * np.abs(twist).max(initial=1e-300), speed, np.inf)
+        share = np.where(speed > MOTIONS.rounding * np.abs(twist).max(axis=0), speed, np.inf)
         D = -mu * (_force_at(at, v / share) + r * _couple(r * turn / share * z))
         yield Place(k, _rows(np.zeros((1, 3, T)), z[None]), D, np.zeros((6, 1, T)), preload, True)
         return
