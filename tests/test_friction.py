@@ -245,10 +245,7 @@ def test_friction_given_as_efforts_brings_the_same_forces(name: str) -> None:
     s = mg.solve(m, loads=[*m.loads, *dry], on_reach="flag")
     good = s.status == "ok"
     assert good.sum() > 20
-    given = [
-        mg.Effort(q, np.nan_to_num(s[p.name].friction[:, j])) for p in m.pairs for j, q in enumerate(p.freedom_names)
-    ]
-    t = mg.solve(m, loads=[*m.loads, *given], on_reach="flag")
+    t = mg.solve(m, loads=[*m.loads, *given_back(m, s)], on_reach="flag")
     name = m.drives[0].freedom.partition(".")[0]
     assert np.allclose(
         t[name].effort[good], s[name].effort[good], rtol=1e-11, atol=1e-12 * np.nanmax(np.abs(s[name].effort))
@@ -316,9 +313,8 @@ def test_at_rest_any_effort_between_holds() -> None:
     assert (low, high) == (pytest.approx(W / (1 + 1.2), rel=1e-11), np.inf)
 
 
-@pytest.mark.parametrize("engine", ["dense", "auto"])
-def test_friction_may_turn_the_force_between_teeth_round(engine: str) -> None:
-    """The wheel is held back by friction more than its load drives it: the teeth touch on the other flank."""
+def geared() -> mg.Mechanism:
+    """A wheel that friction holds back more than its load drives it."""
     pins = [
         mg.Pair(k, "R", "frame", link, point=(x, 0, 0), axis=Z)
         for k, link, x in (("A", "pinion", 0.0), ("B", "wheel", 0.06))
@@ -329,7 +325,13 @@ def test_friction_may_turn_the_force_between_teeth_round(engine: str) -> None:
         mg.Friction("B", mu=0.1, radius=0.02),
     ]
     gears = mg.SpurGears("t", "A", "B", teeth=(20, 40), module=0.002)
-    s = moved(mg.Mechanism("gears", pairs=pins, couplings=[gears], drives=["A"], loads=loads), engine=engine)
+    return mg.Mechanism("gears", pairs=pins, couplings=[gears], drives=["A"], loads=loads)
+
+
+@pytest.mark.parametrize("engine", ["dense", "auto"])
+def test_friction_may_turn_the_force_between_teeth_round(engine: str) -> None:
+    """The teeth touch on the other flank."""
+    s = moved(geared(), engine=engine)
     # the couple on the wheel: friction rho |F| against its turn (the other way than the pinion's), the load, the tooth force at 0.04
     rho, turn, F = (
         0.02 * np.sin(np.arctan(0.1)),
@@ -342,6 +344,54 @@ def test_friction_may_turn_the_force_between_teeth_round(engine: str) -> None:
     assert s["A"].effort[0] == pytest.approx(0.02 * tooth, rel=1e-9)
     assert np.allclose(s["B"].force[:2], F, rtol=1e-9)
     assert np.abs(mg.free_body(s, "wheel").sum).max() < 1e-9
+
+
+def test_ends_at_rest_are_the_efforts_of_both_motions_on_the_flanks_of_each() -> None:
+    ends = [moved(geared(), rate)["A"].effort[0] for rate in (-1.0, 1.0)]
+    assert mg.solve(geared(), {"A": 0.0})["A"].effort_range[0] == pytest.approx(ends, rel=1e-12)
+    assert ends[0] < 0 < ends[1]
+
+
+def given_back(m: mg.Mechanism, s: mg.Solution) -> list[mg.Effort]:
+    """The friction of a solution as given efforts."""
+    efforts = [(q, s[p.name].friction[..., j]) for p in m.pairs for j, q in enumerate(p.freedom_names)]
+    return [mg.Effort(q, np.nan_to_num(of)) for q, of in efforts if np.nan_to_num(of).any()]
+
+
+@pytest.mark.parametrize("torque", [3.0, -3.0])
+def test_gears_on_balls_touch_on_either_flank(torque: float) -> None:
+    """Shafts in a ball and a ball in a groove: relations from the poses, of which the load chooses the flank."""
+    pairs, gears = [], []
+    for x, name, teeth in ((0.0, "a", 20), (0.06, "b", 40)):
+        pairs += [
+            mg.Pair(f"{name}S", "S", "frame", name, point=(x, 0, -0.04)),
+            mg.Pair(f"{name}G", "Sg", "frame", name, point=(x, 0, 0.06), axis=Z),
+            mg.Pair(f"{name}F", "Fr", "frame", name, point=(x, 0, 0), axis=Z),
+        ]
+        gears.append(mg.Gear(name, name, teeth, (x, 0, 0), Z, module=0.002))
+    dry = [mg.Friction(f"{k}S", mu=0.2, radius=0.01) for k in "ab"]
+    m = mg.Mechanism("balls", pairs=pairs, gears=gears, couplings=[mg.Mesh("t", "a", "b")], drives=["aF.Rz"])
+    given = {"aF.Rz": mg.Motion([0.0, 0.7], velocity=2.0)}
+    s = mg.solve(m, given, loads=[mg.Effort("bF.Rz", torque), *dry])
+    t = mg.solve(m, given, loads=[mg.Effort("bF.Rz", torque), *given_back(m, s)])
+    for k in "ab":
+        assert np.linalg.norm(s[f"{k}S"].force - t[f"{k}S"].force, axis=1).max() < 1e-10
+        assert (s.losses[f"{k}S"] > 0.01).all()
+    assert s["aF"].effort[:, -1] == pytest.approx(t["aF"].effort[:, -1], rel=1e-11)
+    assert np.abs(s.checks.power).max() < 1e-12
+
+
+def test_belts_with_pretension_rub_in_their_bearings() -> None:
+    """The tensions keep their mean, so that the bearings carry the pretension and the friction that follows from it."""
+    pairs = [mg.Pair(k, "R", "frame", k, point=(x, 0, 0), axis=Z) for k, x in (("p", 0.0), ("w", 0.5))]
+    m = mg.Mechanism(
+        "belt", pairs=pairs, drives=["p"], gears=[mg.Pulley(k, k, (x, 0, 0), Z, radius=0.05) for k, x in (("p", 0.0), ("w", 0.5))],
+        couplings=[mg.BeltDrive("B", over=["p", "w"], pretension=300.0)],
+    )  # fmt: skip
+    s = moved(m, loads=[mg.Friction(k, mu=MU, radius=RADIUS) for k in "pw"])
+    assert sum(s.coupling("B").tension.values()) == pytest.approx(600.0)
+    assert s["w"].normal_forces == pytest.approx(600.0)
+    assert s["p"].effort == pytest.approx(2 * RHO * 600.0)
 
 
 def test_feet_that_lift_are_not_solved_with_friction() -> None:

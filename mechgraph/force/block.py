@@ -23,6 +23,7 @@ from mechgraph.force.reactions import (
     effort_map,
     least_multiples,
     least_under_signs,
+    on_settled_flanks,
     on_their_flanks,
     orthonormal_stress,
     pair_power,
@@ -37,7 +38,7 @@ from mechgraph.kinematics.state import Configuration, FactoredClosure
 from mechgraph.kinematics.touching import ContactLines
 from mechgraph.maths.linear import add_at
 from mechgraph.maths.se3 import Array, Index, Mask, cross, rotate_back
-from mechgraph.maths.tolerances import MOTIONS
+from mechgraph.maths.tolerances import MOTIONS, STRESSES
 from mechgraph.model.belts import pretensions
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
@@ -183,17 +184,17 @@ def forces_of_block(
         passive = f.motions() if task.idle is None else f.sensitivity()[:, task.idle]
         held, holds, hold_terms = hold(here, task.passive, passive, loads, given, site.largest)
         loads = loads + held
-    wrenches = pretensioned(here, METHODS[task.method](ForceProblem(here, loads, given, task.driven, f)), f)
+    first = pretensioned(here, METHODS[task.method](ForceProblem(here, loads, given, task.driven, f)), f)
     lines = ContactLines(here)
-    wrenches = on_their_flanks(here, wrenches, lines)
-    found, flank = _least_on_flanks(here, wrenches, f, task, lines)
+    found, flank = _least_on_flanks(here, on_their_flanks(here, first, lines), f, task, lines)
     dry = [load for load in task.loads if load.follows_reactions]
     rubs: Rubbed | None = None
     ranges: Array | None = None
     if dry:
         dq = moving_rates(rates.dq, rates.ddq)
-        solve, found, rubs, flank = _rough(here, task, f, wrenches, found, (lines, flank), dry, dq)
+        solve = _FrictionProblem(here, task, f, first, lines, (found, flank), dry)
         ranges = solve.at_rest(dq, given)
+        found, rubs, flank = solve.forces(dq)
         given = given + rubs.efforts
     own = np.zeros_like(found.efforts)
     own[task.driven] = (found.efforts - given - found.coupled)[task.driven]
@@ -326,31 +327,6 @@ def _least(
     )
 
 
-def _rough(
-    here: Configuration,
-    task: ForceTask,
-    f: FactoredClosure,
-    wrenches: Wrenches,
-    smooth: _FreeForces,
-    contacts: tuple[ContactLines, Array],
-    dry: Sequence[Any],
-    dq: Array,
-) -> tuple[_FrictionProblem, _FreeForces, Rubbed, Array]:
-    """Forces with friction, on the flanks on which teeth then touch: friction may turn the force between them round."""
-    lines, flank = contacts
-    # how often flanks are changed
-    for _ in range(5):
-        solve = _FrictionProblem(here, task, f, smooth, lines, flank, dry)
-        found, rubs = solve.moving(dq)
-        turned = ((found.multipliers < 0.0) != (flank < 0.0)).any(axis=0) & (rubs.outcome == 0)
-        if not (lines and turned.any()):
-            return solve, found, rubs, flank
-        flank = np.where(turned, found.multipliers, flank)
-        smooth = _least(here, _relieved(wrenches, lines, flank), f, task, lines, flank)
-    rubs.outcome[turned] = OUTCOMES.index("friction not determined")
-    return solve, _without(found, turned), rubs, flank
-
-
 def _without(found: _FreeForces, places: Mask) -> _FreeForces:
     """The same with no value at some positions."""
     parts = (
@@ -361,36 +337,35 @@ def _without(found: _FreeForces, places: Mask) -> _FreeForces:
 
 
 class _FrictionProblem:
-    """Reactions with friction beside those without it, for any directions of motion."""
+    """Reactions with friction beside those without it, ``smooth``, for any directions of motion, from total ``wrenches`` on the first
+    flanks of teeth.
+    """
 
     def __init__(
         self,
         here: Configuration,
         task: ForceTask,
         f: FactoredClosure,
-        found: _FreeForces,
+        wrenches: Wrenches,
         lines: ContactLines,
-        flank: Array,
+        smooth: tuple[_FreeForces, Array],
         dry: Sequence[Any],
     ) -> None:
-        self.here, self.task, self.f, self.found, self.lines, self.flank, self.dry = (
-            here,
-            task,
-            f,
-            found,
-            lines,
-            flank,
-            dry,
-        )
+        self.here, self.task, self.f, self.wrenches, self.lines, self.dry = here, task, f, wrenches, lines, dry
         if task.redundant == "elastic" and seats_of(here).push.any():
             why = "reactions split by stiffness, with pairs that only push, are not solved together with friction"
             raise DeclarationError(
                 f"solve {here.system.m.name!r}", [f"{why}; declare these pairs closed='form', or leave friction out"]
             )
+        self.found, self.flank = self.smooth = smooth
+        self._answer_units()
+
+    def _answer_units(self) -> None:
+        """Forces under a unit effort in every freedom of pairs that rub."""
         self.unit: dict[int, dict[str, Array]] = {}
-        s, nothing = here.system, np.zeros_like(found.efforts)
-        still = self._answer(nothing) if found.locked is not None else None
-        for k in dict.fromkeys(s.m.place_of_pair(load.of) for load in dry):
+        s, nothing = self.here.system, np.zeros_like(self.found.efforts)
+        still = self._answer(nothing) if self.found.locked is not None else None
+        for k in dict.fromkeys(s.m.place_of_pair(load.of) for load in self.dry):
             first = int(s.first_column[k])
             for column in range(first, first + s.m.pairs[k].type.f):
                 efforts = nothing.copy()
@@ -402,12 +377,41 @@ class _FrictionProblem:
         """Forces under given efforts ``(F, T)`` alone."""
         here = self.here
         problem = ForceProblem(here, np.zeros((6, len(here.system.m.links), here.T)), efforts, self.task.driven, self.f)
-        wrenches = METHODS[self.task.method](problem)
-        wrenches = _relieved(wrenches, self.lines, self.flank) if self.lines else wrenches
-        one = _least(here, wrenches, self.f, self.task, self.lines, self.flank)
+        wrenches = pretensioned(here, METHODS[self.task.method](problem), self.f, part=0.0)
+        one = self._least(wrenches)
         return {name: getattr(one, name) for name in ("reactions", "efforts", "multipliers", "coupled")}
 
-    def moving(self, dq: Array, at_rest: bool = False) -> tuple[_FreeForces, Rubbed]:
+    def _least(self, wrenches: Wrenches) -> _FreeForces:
+        """The forces of total wrenches on the first flanks, on those that act."""
+        here, lines, flank = self.here, self.lines, self.flank
+        wrenches = _relieved(on_settled_flanks(here, wrenches, lines), lines, flank) if lines else wrenches
+        return _least(here, wrenches, self.f, self.task, lines, flank)
+
+    def forces(self, dq: Array, at_rest: bool = False) -> tuple[_FreeForces, Rubbed, Array]:
+        """Forces with the friction of a motion, that friction, and the flanks ``(n, T)`` on which teeth then touch: friction may turn the
+        force between them round.
+        """
+        self._put_on(*self.smooth)
+        # how often flanks are changed
+        for _ in range(5):
+            found, rubs = self._on_flanks(dq, at_rest)
+            turned = ((found.multipliers < 0.0) != (self.flank < 0.0)).any(axis=0) & (rubs.outcome == 0)
+            if not (self.lines and turned.any()):
+                return found, rubs, self.flank
+            self._put_on(None, np.where(turned, found.multipliers, self.flank))
+        rubs.outcome[turned] = OUTCOMES.index("friction not determined")
+        return _without(found, turned), rubs, self.flank
+
+    def _put_on(self, found: _FreeForces | None, flank: Array) -> None:
+        """Take forces without friction, and those of unit efforts, on flanks of signs ``(n, T)``."""
+        same = ((flank < 0.0) == (self.flank < 0.0)).all()
+        self.flank = flank
+        if not same:
+            self.lines.settle(flank)
+            self.found = self._least(self.wrenches) if found is None else found
+            self._answer_units()
+
+    def _on_flanks(self, dq: Array, at_rest: bool) -> tuple[_FreeForces, Rubbed]:
         """Forces with the friction of a motion with rates ``dq (F, T)``, and what that is; NaN where it has no solution, or none alone."""
         found, of = self.found, {column: one["reactions"] for column, one in self.unit.items()}
         stress = found.stress.wrenches
@@ -423,10 +427,14 @@ class _FrictionProblem:
             }
             sums["reactions"] = sums["reactions"] - rubs.taken
             before, reactions = reactions, np.where(np.isnan(sums["reactions"]), reactions, sums["reactions"])
-            moved = np.abs(reactions - before).max(axis=(0, 1)) > 1e-13 * np.abs(reactions).max(axis=(0, 1))
-            if not (moved.any() and any(place.follows for place in places)):
-                return replace(found, **sums), rubs
-        rubs.outcome[moved & (rubs.outcome == 0)] = OUTCOMES.index("friction not determined")
+            moved = np.abs(reactions - before).max(axis=(0, 1))
+            size = np.abs(reactions).max(axis=(0, 1))
+            if not (any(place.follows for place in places) and (moved > STRESSES.rounding * size).any()):
+                break
+        else:
+            rubs.outcome[(moved > MOTIONS.still * size) & (rubs.outcome == 0)] = OUTCOMES.index(
+                "friction not determined"
+            )
         return _without(replace(found, **sums), rubs.outcome > 0), rubs
 
     def at_rest(self, dq: Array, given: Array) -> Array:
@@ -438,7 +446,7 @@ class _FrictionProblem:
         moved = self.f.sensitivity()
         for j, column in enumerate(self.task.driven):
             for side, sense in enumerate((-1.0, 1.0)):
-                found, rubs = self.moving(sense * moving_rates(moved[:, j]), at_rest=True)
+                found, rubs, _ = self.forces(sense * moving_rates(moved[:, j]), at_rest=True)
                 effort = (found.efforts - given - rubs.efforts - found.coupled)[column]
                 effort = np.where((rubs.outcome == 1) | (rubs.outcome == 2), sense * np.inf, effort)
                 out[column, side, rest] = effort[rest]

@@ -264,7 +264,7 @@ def _normals(a: Array, B: Array, C: Array, starts: Index) -> tuple[Array, Array,
         unit = V / np.repeat(np.where(size > 0, size, np.inf), np.diff(starts), axis=1)
         slope = np.add.reduceat(unit[..., None] * per, starts[:-1], axis=1)
         slope[~alone] = 0.0  # looked at one by one, below
-        n = n - np.linalg.solve(np.eye(m) - slope, off[..., None])[..., 0]
+        n = np.where(done[:, None], n, n - np.linalg.solve(np.eye(m) - slope, off[..., None])[..., 0])
     outcome, factor = np.zeros(len(a), dtype=int), np.full(len(a), np.nan)
     for t in np.flatnonzero(~(done & alone)):
         n[t], outcome[t], factor[t] = _grown(a[t], B[t], C[t], starts)

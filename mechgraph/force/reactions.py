@@ -220,8 +220,8 @@ def pretension_conditions(here: Configuration) -> tuple[list[BeltDrive], Array, 
     return belts, C, np.array([[belt.pretension] for belt in belts], dtype=float)
 
 
-def pretensioned(here: Configuration, wrenches: Wrenches, f: FactoredClosure) -> Wrenches:
-    """The same with the pretension of belts, and without the self-stresses that it decides.
+def pretensioned(here: Configuration, wrenches: Wrenches, f: FactoredClosure, part: float = 1.0) -> Wrenches:
+    """The same with a ``part`` of the pretension of belts, and without the self-stresses that it decides.
 
     With multipliers ``m + M y`` the conditions are ``C M y = c - C m``; of the self-stresses those with ``C M y = 0`` stay.
 
@@ -243,7 +243,7 @@ def pretensioned(here: Configuration, wrenches: Wrenches, f: FactoredClosure) ->
         belt = belts[int(np.argmax(known))]
         fault = f"pretension = {belt.pretension:g}: the tensions follow from equilibrium, as of a belt with a tensioner; leave it out"
         raise DeclarationError(f"coupling {belt.belt!r}", [fault])
-    y = np.linalg.pinv(A) @ (c - np.einsum("int,nt->it", C, wrenches.multipliers)).T[..., None]
+    y = np.linalg.pinv(A) @ (part * c - np.einsum("int,nt->it", C, wrenches.multipliers)).T[..., None]
     # the rows of V^T behind the conditions span what these leave open
     mix = np.concatenate([y, np.linalg.svd(A)[2][:, len(belts) :].swapaxes(1, 2)], axis=2)
     states, multipliers = (np.einsum("...st,tsk->...kt", part, mix) for part in (stress, change))
@@ -511,30 +511,43 @@ def on_their_flanks(here: Configuration, wrenches: Wrenches, lines: ContactLines
     """
     if not lines.moving or not (wrenches.multipliers[list(lines.moving)] < 0.0).any():
         return wrenches
-    multipliers, totals = wrenches.multipliers.copy(), wrenches.totals.copy()
-    stress, change = wrenches.stress.copy(), wrenches.multiplier_stress.copy()
     base = here.system.graph.loop_rows
     lines.settled = {g: np.zeros(here.T, dtype=bool) for g in lines.moving}
     for t in range(here.T):
-        own, one = multipliers[:, t].copy(), np.array([t])
+        own = wrenches.multipliers[:, t]
         flips = [g for g in lines.moving if own[g] < 0.0]
         # flanks follow the signs, which the flanks may change in turn
         for _ in range(4):
-            every = np.concatenate([own[:, None], change[:, :, t]], axis=1)
-            y = lines.flipped(t, flips, every) if flips else None
+            y = lines.flipped(t, flips, own[:, None]) if flips else None
             if y is None:
                 break
             new = own - y[base:, 0]
             asked = [g for g in lines.moving if new[g] < 0.0]
             if asked == flips:
-                more = here.part(one).pair_wrenches(y[..., None])[..., 0]
-                totals[..., t] += more[:, :, 0]
-                stress[..., t] += more[:, :, 1:]
-                multipliers[:, t], change[:, :, t] = new, change[:, :, t] - y[base:, 1:]
                 for g in flips:
                     lines.settled[g][t] = True
                 break
             flips = asked
+    return on_settled_flanks(here, wrenches, lines)
+
+
+def on_settled_flanks(here: Configuration, wrenches: Wrenches, lines: ContactLines) -> Wrenches:
+    """Wrenches that were found with the rows of the first flanks, with those of the flanks that ``lines`` say act."""
+    turned: list[int] = np.flatnonzero(np.any([*lines.settled.values()], axis=0)).tolist() if lines.settled else []
+    if not turned:
+        return wrenches
+    multipliers, totals = wrenches.multipliers.copy(), wrenches.totals.copy()
+    stress, change = wrenches.stress.copy(), wrenches.multiplier_stress.copy()
+    base = here.system.graph.loop_rows
+    for t in turned:
+        every = np.concatenate([multipliers[:, [t]], change[:, :, t]], axis=1)
+        y = lines.flipped(t, [g for g in lines.moving if lines.settled[g][t]], every)
+        assert y is not None  # it was, when they settled
+        more = here.part(np.array([t])).pair_wrenches(y[..., None])[..., 0]
+        totals[..., t] += more[:, :, 0]
+        stress[..., t] += more[:, :, 1:]
+        multipliers[:, t] -= y[base:, 0]
+        change[:, :, t] -= y[base:, 1:]
     return Wrenches(totals, stress, multipliers, change)
 
 
