@@ -347,6 +347,17 @@ def unknown(what: str, name: object, known: Iterable[str], also: Iterable[str] =
     return f"unknown {what} {shown(name)}{hint and f'; {hint}'} ({what}s: {listed(names) or 'none'})"
 
 
+class ByName(dict[str, Any]):
+    """Values by name; one that there is not is a fault that says which there are: of ``subject``, each a ``what``."""
+
+    def __init__(self, subject: str, what: str, values: Iterable[tuple[str, Any]]) -> None:
+        super().__init__(values)
+        self.subject, self.what = subject, what
+
+    def __missing__(self, name: object) -> Any:
+        raise DeclarationError(self.subject, [unknown(self.what, name, self)])
+
+
 P = ParamSpec("P")
 R = TypeVar("R")
 FLOATING: dict[str, Any] = {"all": "ignore"}

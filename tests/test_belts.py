@@ -152,6 +152,29 @@ def test_a_slack_span_is_a_warning():
     assert not mg.solve(m, {"p": [0.0]}, loads=[]).warnings
 
 
+def test_a_slack_belt_is_one_warning():
+    with pytest.warns(mg.MechgraphWarning, match="its spans w-i, i-p, p-w are slack") as told:
+        s = mg.solve(tensioner([mg.Effort("arm", -12.0)]), {"p": [0.0, 1.0]})
+    assert len(told) == len(s.warnings) == 1
+    assert s.warnings[0].force == pytest.approx(-min(T.min() for T in s.coupling("B").tension.values()))
+
+
+def test_names_that_there_are_not_are_told_with_those_there_are():
+    s = mg.solve(drive(pretension=30.0), {"p": 0.0})
+    belt = s.coupling("B")
+    for ask, told in (
+        (lambda: s.coupling("b"), "did you mean B"),
+        (lambda: belt.tension["p-x"], "unknown span 'p-x'; did you mean p-w"),
+        (lambda: belt.wrap["q"], r"unknown pulley 'q' \(pulleys: p, w\)"),
+        (lambda: belt.friction["q"], "unknown pulley"),
+        (lambda: s["p"].components["Fw"], r"unknown component 'Fw' \(components: Fx, Fy, Fz, Mx, My\)"),
+    ):
+        with pytest.raises(mg.DeclarationError, match=told):
+            ask()
+    assert "p-w" in belt.tension
+    assert belt.tension.get("q") is None
+
+
 # --- centers that move ---------------------------------------------------------------------------------------------------
 
 ARM = mg.Pair("arm", "R", "frame", "arm", point=(0.35, 0.1, 0), axis=Z)
@@ -250,12 +273,41 @@ def test_turns_count_on_flat_belts_whose_centers_move():
     np.testing.assert_allclose(s["i"].position[:, 0] + s["arm"].position[:, 0], -1.25 * turns, atol=1e-8)
 
 
+@pytest.mark.parametrize("turns_on_it", [False, True])
+def test_a_pulley_on_an_eccentric_goes_round_and_round(turns_on_it):
+    """A pulley 3 mm off its shaft: with every turn of that the arm returns, and a length 2 pi r of belt has passed."""
+    places = {"w": (0.4, 0.0)}
+    shaft = mg.Pair("e", "R", "frame", "e", point=(0, 0, 0), axis=Z)
+    loose = [mg.Pair("p", "R", "e", "p", point=(0.003, 0, 0), axis=Z)] if turns_on_it else []
+    gears = pulleys(THREE, (0.1, 0.04, 0.05))
+    gears[2] = mg.Pulley("p", "p" if turns_on_it else "e", (0.003, 0, 0), Z, radius=0.05)
+    m = mg.Mechanism(
+        "eccentric", None, [*hinges(places), ARM, ON_ARM, shaft, *loose], ["e", "w"] if turns_on_it else ["e"], gears=gears,
+        couplings=[mg.BeltDrive("B", over=["w", "i", "p"], backs=["i"])],
+    )  # fmt: skip
+    turn = np.linspace(0, 6 * np.pi, 49)
+    s = mg.kinematics(m, {"e": turn, "w": 0.0} if turns_on_it else {"e": turn})
+    arm = s["arm"].position[:, 0]
+    np.testing.assert_allclose(arm[16:], arm[:-16], atol=1e-10)
+    assert np.ptp(arm) > 0.05
+    np.testing.assert_allclose(s.coupling("B").length, s.coupling("B").length[0], rtol=1e-11)
+    turned = s["p"].position[:, 0] if turns_on_it else s["w"].position[:, 0]
+    np.testing.assert_allclose(turned[::16], (-1.0 if turns_on_it else 0.5) * turn[::16], atol=1e-9)
+
+
 def test_a_longer_belt_lets_the_arm_swing():
     plain = mg.solve(tensioner(), {"p": 0.0}).coupling("B").length
     m = tensioner(length=float(plain) - 1e-3)
     s = mg.solve(m, {"p": [0.0, 0.3]})
     np.testing.assert_allclose(s.coupling("B").length, float(plain) - 1e-3, rtol=1e-12)
     assert (np.abs(s["arm"].position) > 1e-3).all()
+
+
+def test_a_length_that_no_place_of_the_arm_takes_is_told():
+    with pytest.raises(
+        mg.AssemblyError, match=r"Belt 'B' has the length 0.8, and its pulleys take 1.3 .* 0.499998 shorter"
+    ):
+        mg.solve(tensioner(length=0.8), {"p": 0.0})
 
 
 def on_bearings(turns=True, teeth=False, **belt):
@@ -446,11 +498,15 @@ WRONG = {
     "length": (lambda: drive(length=0.8), "ask for 0.714159"),
     "clockwise": (
         lambda: drive({"a": (0, 0), "b": (0.2, 0.3), "c": (0.4, 0)}, (0.05, 0.05, 0.05)),
-        "list them counter-clockwise",
+        "backs=; over=['c', 'b', 'a'], backs=[] would run",
     ),
     "no touch": (
         lambda: drive({"a": (0.4, 0), "b": (0.2, 0.2), "c": (0, 0)}, (0.05, 0.05, 0.05), backs=["b"]),
-        "does not touch 'b'",
+        "does not touch 'b' there; move the pulley, or change on which side it is (backs=); over=['a', 'b', 'c'], backs=[] would run",
+    ),
+    "on the wrong side": (
+        lambda: drive({"a": (0.4, 0), "b": (0.2, -0.02), "c": (0, 0)}, (0.05, 0.01, 0.05)),
+        "over=['a', 'b', 'c'], backs=['b'] would run",
     ),
     "a pulley without size": (
         lambda: mg.Mechanism("m", pairs=hinges(TWO), gears=[mg.Pulley("p", "p", (0, 0, 0), Z)]), "expected the radius"),

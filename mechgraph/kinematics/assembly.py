@@ -25,6 +25,7 @@ from mechgraph.maths.linear import compact, complement
 from mechgraph.maths.newton import Nodes, closest_zeros, least_norm_steps
 from mechgraph.maths.se3 import Array, Index, rotate
 from mechgraph.maths.tolerances import PATH, RANKS
+from mechgraph.model.belts import BeltDrive
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker
 from mechgraph.quantities import is_numeric, shown, wrong
@@ -280,11 +281,21 @@ def _closed_start(m: Mechanism, preferred: Mapping[str, float], tol: float) -> C
         raise AssemblyError(
             f"mechanism {m.name!r}: no closed configuration near start; best closure residual {error:.3g} "
             f"(largest angle [rad] or length / L over all loops, L = {system.par.L:.4g}). "
-            f"{turned or 'Check the dimensions, or give another start'}",
+            f"{turned or _belts_off(m) or 'Check the dimensions, or give another start'}",
             error,
             best,
         )
     return scaled(Configuration(system, x[:, None]))
+
+
+def _belts_off(m: Mechanism) -> str:
+    """Which belts have another length than their pulleys take where they are declared."""
+    return " ".join(
+        f"Belt {c.belt!r} has the length {c.length:.6g}, and its pulleys take {c.length - c.longer:.6g} where they are declared: no place "
+        f"of them was found that takes a belt {abs(c.longer):.6g} {'longer' if c.longer > 0 else 'shorter'}."
+        for c in m.couplings
+        if isinstance(c, BeltDrive) and c.length is not None and c.longer
+    )
 
 
 def _opposite_axis(m: Mechanism, preferred: Mapping[str, float], error: float) -> str:

@@ -22,6 +22,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import combinations, product
 from math import gcd
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
@@ -225,7 +226,7 @@ class BeltDrive(LineCoupling):
     belt: Annotated[str, TEXT("of one span: the name of the whole belt", default="the whole belt")] = ""
     span: Annotated[int | None, INTEGER("of one span: its place, from 0", default="the whole belt")] = None
     counts: ClassVar[tuple[Mapping[str, float], Mapping[str, float]] | None] = None
-    """Angles of both pulleys of a span against the carrier of the first, as sums of freedoms; None where turns go uncounted."""
+    """Angles of both pulleys of a span against their carrier, as sums of freedoms; None where turns go uncounted."""
     angles: ClassVar[tuple[float, ...]] = ()
     """Angles of their marks against the span at the start."""
 
@@ -342,10 +343,13 @@ class BeltDrive(LineCoupling):
         if len(clear) == len(self.over) or not 0 <= turns <= 1:
             yield (
                 "does not run once round, as its pulleys are listed; list them counter-clockwise, seen against their axes, and name those "
-                "on its back in backs="
+                f"on its back in backs={self._that_runs(laid)}"
             )
         elif clear:
-            yield f"does not touch {', '.join(map(repr, clear))} there; move the pulley, or change on which side it is (backs=)"
+            yield (
+                f"does not touch {', '.join(map(repr, clear))} there; move the pulley, or change on which side it is "
+                f"(backs=){self._that_runs(laid)}"
+            )
         elif uncounted := self._uncounted(m):
             yield (
                 f"nothing counts the turns between the pulleys of {uncounted}, which have no teeth; give teeth= and pitch=, or a pair Fr "
@@ -363,6 +367,22 @@ class BeltDrive(LineCoupling):
                 f"length = {self.length:.8g}: its pulleys, which keep their places, ask for {made.length[0]:.8g}; leave it out, move a "
                 "pulley, or hold one on an arm or slide"
             )
+
+    def _that_runs(self, laid: Laid) -> str:
+        """The way nearest to the declared one in which a belt runs over the same pulleys once round and touches all of them, in words."""
+        n = len(self.over)
+        changes = (
+            swapped for k in range(3) for swapped in combinations(range(n), k)
+        )  # two pulleys on the wrong side at most
+        for swapped, order in product(changes, (slice(None), slice(None, None, -1))):
+            signs = np.where(np.isin(np.arange(n), swapped), -1.0, 1.0)
+            tried = Laid(laid.centers[:, order], laid.axes, (signs * laid.w)[order])
+            over = self.over[order]
+            backs = [name for name, w in zip(over, tried.w, strict=True) if w < 0]
+            way, made = self.replace(over=over, backs=tuple(backs)), tried.course
+            if np.isfinite(made.length).all() and round(float(made.turns[0])) == 1 and not way._clear(tried):
+                return f"; over={list(over)}, backs={backs} would run"
+        return ""
 
     def _clear(self, laid: Laid) -> list[str]:
         """Pulleys that the belt would not touch: its span between their neighbors runs past them, on the right side."""
@@ -447,7 +467,7 @@ class BeltDrive(LineCoupling):
         """What whole turns of both pulleys add to the value ``(T,)`` of a row that is not linear.
 
         By how much freedoms have grown since the start, ``turned(name) (T,)``, tells by how many turns the angle of a pulley against the
-        span differs from the one in (-pi, pi]: seen from the carrier of the first pulley, a span swings by less than half a turn.
+        span differs from the one in (-pi, pi]: seen from the carrier of both pulleys, a span swings by less than half a turn.
         """
         if self.counts is None:
             return None
@@ -537,7 +557,8 @@ def chordal(a: LinePlaces, b: LinePlaces, numbers: Array, *, pitches: tuple[floa
 
 class Turns(NamedTuple):
     """Turns on the way from a pulley to another, about the common direction of their axes: freedoms with their senses that turn the first
-    against its carrier and those behind it; ``fixed``: whether nothing else moves on the way; ``known``: whether no turn goes uncounted.
+    against the carrier of both and those behind it; ``fixed``: whether nothing else moves on the way; ``known``: whether no turn goes
+    uncounted.
     """
 
     before: dict[str, float]
@@ -555,7 +576,7 @@ class Turns(NamedTuple):
 
     @property
     def counts(self) -> tuple[dict[str, float], dict[str, float]] | None:
-        """Angles of both pulleys against the carrier of the first, as sums of freedoms; None where some turns are not counted."""
+        """Angles of both pulleys against their carrier, as sums of freedoms; None where some turns are not counted."""
         return ({name: -sense for name, sense in self.before.items()}, self.behind) if self.known else None
 
 
@@ -563,9 +584,9 @@ def _turns_of(m: Any, steps: Sequence[MeshStep], a: LinkPlace, b: LinkPlace) -> 
     """The turns on the way between two pulleys."""
     fitting, first, last = fitting_of(m), a.seen(identity()), b.seen(pose_along(m, tuple(steps)))
     z = first.axis[:, 0, 0] / np.linalg.norm(first.axis)
-    before: dict[str, float] = {}
-    behind: dict[str, float] = {}
-    fixed = known = at_first = True
+    turned: list[dict[str, float]] = []
+    off: list[tuple[float, float]] = []
+    fixed = known = True
     for i, step in enumerate(steps):
         pair, X = m.pairs[step.pair], pose_along(m, tuple(steps[:i]))
         if not pair.type.f:
@@ -580,11 +601,15 @@ def _turns_of(m: Any, steps: Sequence[MeshStep], a: LinkPlace, b: LinkPlace) -> 
         known = known and turn is not None
         p = X[:, :3] @ np.asarray(pair.markers[0 if step.sense > 0 else 1].point) + X[:, 3]
         reach = fitting * max(1.0, float(np.abs(p).max()))
-        about = [float(np.abs(cross(p - place.point[:, 0, 0], z)).max()) <= reach for place in (first, last)]
-        at_first = at_first and bool(turn) and about[0]
-        (before if at_first else behind).update(turn or {})
-        fixed = fixed and bool(turn) and motion_of(pair) == "turn" and (at_first or about[1])
-    return Turns(before, behind, fixed, known)
+        away = [float(np.abs(cross(p - place.point[:, 0, 0], z)).max()) for place in (first, last)]
+        fixed = fixed and bool(turn) and motion_of(pair) == "turn"
+        turned.append(turn or {})
+        off.append((away[0] * (away[0] > reach), away[1] * (away[1] > reach)))
+    # the carrier: the link in which both centers stir least, so that the span hardly swings in it
+    stirs = [sum(a for a, _ in off[:k]) + sum(b for _, b in off[k:]) for k in range(len(off) + 1)]
+    k = stirs.index(min(stirs))
+    before, behind = (dict(item for turn in part for item in turn.items()) for part in (turned[:k], turned[k:]))
+    return Turns(before, behind, fixed and not stirs[k], known)
 
 
 def _counted(m: Any, step: MeshStep, X: Array, z: Array, fitting: float) -> dict[str, float] | None:

@@ -59,6 +59,8 @@ class BaseCoupling(Described, ABC):
 
     alone: ClassVar[bool] = True
     """Whether it stands for itself, so that it may be left out and its numbers varied without others."""
+    belt: str = ""
+    """The name of the whole of which it is a part, where it does not."""
 
     @property
     def freedoms(self) -> tuple[str, ...]:

@@ -177,7 +177,8 @@ class DeclaredParts(Formatted, Once):
 
     def coupling(self, name: str) -> BaseCoupling:
         """The coupling of that name."""
-        return self.couplings[self._index(name, _places(c.name for c in self.couplings), "coupling")]
+        belts = dict.fromkeys(c.belt for c in self.couplings if not c.alone)
+        return self.couplings[self._index(name, _places(c.name for c in self.couplings), "coupling", belts)]
 
     def place_of_link(self, name: str) -> int:
         """Index of the link of that name."""
@@ -187,9 +188,9 @@ class DeclaredParts(Formatted, Once):
         """Index of the pair of that name."""
         return self._index(name, self.pair_index, "pair")
 
-    def _index(self, name: str, places: Mapping[str, int], what: str) -> int:
+    def _index(self, name: str, places: Mapping[str, int], what: str, also: Iterable[str] = ()) -> int:
         if not isinstance(name, str) or name not in places:
-            raise DeclarationError(f"mechanism {self.name!r}", [unknown(what, name, places)])
+            raise DeclarationError(f"mechanism {self.name!r}", [unknown(what, name, (*also, *places))])
         return places[name]
 
     def freedom_names(self) -> tuple[str, ...]:

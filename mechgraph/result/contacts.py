@@ -564,17 +564,23 @@ def slack_spans(values: Trajectory) -> Iterator[LiftOff]:
     unit = unit_of(values.mechanism.units, FORCE)
     belts = [(k, one) for k, one in enumerate(values.whole.couplings) if isinstance(one, BeltDrive)]
     multipliers, loose = values.multipliers() if belts else (np.zeros((0, 0)), np.zeros((0, 0), dtype=bool))
-    for k, one in belts:
-        tension = np.where(loose[k], 0.0, np.nan_to_num(-multipliers[k])).reshape(values.batch)
+    for name in dict.fromkeys(one.belt for _, one in belts):
+        own = [(k, one.span_names[one.span or 0]) for k, one in belts if one.belt == name]
+        tensions = np.array([np.where(loose[k], 0.0, np.nan_to_num(-multipliers[k])) for k, _ in own])
         # part of the greatest tension below which a push is rounding
-        slack = tension < -1e-10 * float(np.nanmax(np.abs(tension), initial=0.0))
-        for found in stretches(values, slack, tension):
-            push = f"{found.amount:.4g}{' ' * bool(unit)}{unit}"
-            text = (
-                f"belt {one.belt}: its span {one.span_names[one.span or 0]} is slack {found.where}: it would have to push with up to "
-                f"{push}. Forces there are not physical. Give the belt more pretension, or its tensioner more load"
+        slack, least = tensions < -1e-10 * np.abs(tensions).max(initial=0.0), tensions.min(axis=0)
+        for found in stretches(values, slack.any(axis=0).reshape(values.batch), least.reshape(values.batch)):
+            push, there = (
+                f"{found.amount:.4g}{' ' * bool(unit)}{unit}",
+                slack[:, found.first : found.last + 1].any(axis=1),
             )
-            yield LiftOff(one.name, *found[:4], text, found.amount)
+            spans = ", ".join(span for (_, span), so in zip(own, there.tolist(), strict=True) if so)
+            text = (
+                f"belt {name}: its {'spans' if there.sum() > 1 else 'span'} {spans} {'are' if there.sum() > 1 else 'is'} slack "
+                f"{found.where}: it would have to push with up to {push}. Forces there are not physical. Give the belt more pretension, "
+                "or its tensioner more load"
+            )
+            yield LiftOff(name, *found[:4], text, found.amount)
 
 
 def overlaps(values: Trajectory) -> tuple[Overlap, ...]:

@@ -16,7 +16,7 @@ from mechgraph.model.belts import BeltCourse, BeltDrive
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.pairs.pair_type import PairType
-from mechgraph.quantities import unit_of
+from mechgraph.quantities import ByName, unit_of
 from mechgraph.result.trajectory import Trajectory
 from mechgraph.result.values import (
     OK,
@@ -263,7 +263,10 @@ class PairResult(Shown):
         Components n1, n2, ... (of a null space) mix force and moment: they count wrenches with ``|F|^2 + |M / L|^2 = 1`` about marker B, L
         the mean radius of the mechanism, and have the unit of a force.
         """
-        return self._values.components(self._index)
+        return self._by_name("component", self._values.components(self._index))
+
+    def _by_name(self, what: str, values: Mapping[str, Array]) -> dict[str, Array]:
+        return ByName(f"pair {self._values.whole.pairs[self._index].name!r}", what, values.items())
 
     @property
     def friction(self) -> Array:
@@ -286,7 +289,7 @@ class PairResult(Shown):
     @property
     def locked_in(self) -> dict[str, Array]:
         """What misfits lock in of the components, without any load, ``(...)`` by name; ``solve(..., redundant="elastic")``."""
-        return self._values.locked_in(self._index)
+        return self._by_name("component", self._values.locked_in(self._index))
 
     @property
     def deflection(self) -> dict[str, Array]:
@@ -294,7 +297,7 @@ class PairResult(Shown):
 
         NaN for a component of stiffness 0, which says nothing of it.
         """
-        return self._values.deflections(self._index)
+        return self._by_name("component", self._values.deflections(self._index))
 
     @property
     def unique(self) -> dict[str, Array]:
@@ -302,7 +305,7 @@ class PairResult(Shown):
 
         What is not unique is NaN, or of least norm where ``solve`` was asked for that.
         """
-        return self._values.unique(self._index)
+        return self._by_name("component", self._values.unique(self._index))
 
     @property
     def units(self) -> dict[str, Any]:
@@ -405,24 +408,28 @@ class BeltResult(Shown):
         links = [m.place_of_link(p.link) for p in self._belt.pulleys(m)]
         return self._belt.course_of(m, [np.moveaxis(self._values.link(k)[0].reshape(-1, 4, 4), 0, 2) for k in links])
 
-    def _by_name(self, names: Iterable[str], values: Array) -> dict[str, Array]:
-        """Values ``(n, positions)`` by their names, ``(...)`` each."""
-        return {name: one.reshape(self._values.batch) for name, one in zip(names, values, strict=True)}
+    def _of_spans(self, values: Iterable[Array], *shape: int) -> dict[str, Array]:
+        """Values ``(n, positions, *shape)`` by the spans, ``(..., *shape)`` each."""
+        return self._by_name("span", zip(self._spans, values, strict=True), *shape)
+
+    def _by_name(self, what: str, values: Iterable[tuple[str, Array]], *shape: int) -> dict[str, Array]:
+        batch = self._values.batch
+        return ByName(f"belt {self._name!r}", what, ((name, one.reshape((*batch, *shape))) for name, one in values))
 
     @property
     def tension(self) -> dict[str, Array]:
         """Tension of every span ``(...)``, ``"p1-p2"``: minus the multiplier of its row; NaN where it is not unique."""
-        return {name: -self._values.multiplier(k) for name, k in self._spans.items()}
+        return self._of_spans(-self._values.multiplier(k) for k in self._spans.values())
 
     @property
     def span(self) -> dict[str, Array]:
         """Length of every span ``(...)``."""
-        return self._by_name(self._spans, self._course.spans.length)
+        return self._of_spans(self._course.spans.length)
 
     @property
     def wrap(self) -> dict[str, Array]:
         """Angle of wrap on every pulley ``(...)`` [rad]."""
-        return self._by_name(self._belt.over, self._course.wrap)
+        return self._by_name("pulley", zip(self._belt.over, self._course.wrap, strict=True))
 
     @property
     def length(self) -> Array:
@@ -433,8 +440,7 @@ class BeltResult(Shown):
     def ends(self) -> dict[str, Array]:
         """Where every span leaves a pulley and where it runs onto the next, ``(..., 2, 3)``, global."""
         both = np.stack([self._course.spans.start, self._course.spans.end])
-        parts = np.moveaxis(both, (2, 3), (0, 1))
-        return {name: one.reshape(*self._values.batch, 2, 3) for name, one in zip(self._spans, parts, strict=True)}
+        return self._of_spans(np.moveaxis(both, (2, 3), (0, 1)), 2, 3)
 
     @property
     def friction(self) -> dict[str, Array]:
@@ -447,7 +453,8 @@ class BeltResult(Shown):
             ratio = np.roll(T, 1, axis=0) / T
             needed = np.abs(np.log(np.where(ratio > 0.0, ratio, np.nan)))
             needed = np.where((ratio <= 0.0) | (np.minimum(T, np.roll(T, 1, axis=0)) < 0.0), np.inf, needed)
-            return {name: one / self.wrap[name] for name, one in zip(self._belt.over, needed, strict=True)}
+            needed = needed.reshape(len(needed), -1) / self._course.wrap
+        return self._by_name("pulley", zip(self._belt.over, needed, strict=True))
 
 
 class LinkResult(Shown):
