@@ -201,9 +201,9 @@ class FieldKind:
 class FieldFormat:
     """One field: its kind, its meaning in a sentence, and its dimension (``slide`` and ``turn`` differ where a freedom decides).
 
-    ``degrees``: may be given in degrees under its name with ``_deg`` added; ``minimum``: smallest number; ``choices``: the texts
-    allowed; ``of``: of the name of a point, the field that names its link; ``normal``: of a vector, whether in a
-    plane it stands on that (a moment); ``key``: its name in files where it is another; ``table``:
+    ``degrees``: may be given in degrees under its name with ``_deg`` added; ``minimum``: smallest number; ``below``: what the size of
+    an angle stays below; ``choices``: the texts allowed; ``of``: of the name of a point, the field that names its link; ``normal``: of a
+    vector, whether in a plane it stands on that (a moment); ``key``: its name in files where it is another; ``table``:
     the table of the file that it holds; ``single``: of the name of a freedom, whether it must not be part of a rotation; ``default``:
     in words, where the value does not say it; ``held_in``: the array of ``Declared`` that holds the number, and the factor, where the
     array has another name than the field; ``rules``: more of its schema.
@@ -215,6 +215,7 @@ class FieldFormat:
     turn: Dimension = PURE
     degrees: bool = False
     minimum: float | None = None
+    below: float | None = None
     choices: tuple[str, ...] = ()
     of: str = ""
     normal: bool = False
@@ -251,6 +252,12 @@ class FieldFormat:
         stands_as = self.kind.stands_as
         if stands_as in STANDS_AS and not isinstance(value, stands_as):
             return wrong(value, what, STANDS_AS[stands_as])
+        if self.below is not None and is_numeric(value, ()) and abs(value) >= self.below:
+            return wrong(
+                value,
+                what,
+                f"an angle below {self.below:.4g} rad ({value:g} degrees are {math.radians(value):.7g} rad)",
+            )
         return None if self.kind.fault is None else self.kind.fault(value, what, self.minimum)
 
 

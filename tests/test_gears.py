@@ -443,6 +443,29 @@ def test_numbers_that_decide_are_never_assumed(kind, tmp_path):
         mg.load(file)
 
 
+@pytest.mark.parametrize(
+    ("make", "name"),
+    [
+        (lambda: mg.SpurGears("g", "A", "B", (20, 40), pressure_angle=20), "pressure_angle"),
+        (lambda: mg.Rack("g", "A", "B", 0.02, 20.0), "pressure_angle"),
+        (lambda: mg.WormGear("g", "A", "B", (2, 40), 0.01, 20), "pressure_angle"),
+        (lambda: mg.BevelGears("g", "A", "B", (20, 40), 0.002, spiral_angle=35), "spiral_angle"),
+        (lambda: mg.Gear("g", "p", 20, (0, 0, 0), (0, 0, 1), module=0.002, helix_angle=15), "helix_angle"),
+        (lambda: mg.BevelGear("g", "p", 20, (0, 0, 1), (0, 0, 1), module=0.002, cone=45), "cone"),
+        (lambda: mg.Friction("A", mu=0.1, radius=0.01, flank=30), "flank"),
+    ],
+)
+def test_degrees_in_place_of_radians_are_a_fault_that_says_the_radians(make, name):
+    pairs = [mg.Pair(k, "R", "frame", k, point=(x, 0, 0), axis=(0, 0, 1)) for k, x in (("A", 0), ("B", 0.06))]
+    one = make()
+    room = {"Gear": "gears", "BevelGear": "gears", "Friction": "loads"}.get(type(one).__name__, "couplings")
+    degrees = getattr(one, name)
+    with pytest.raises(
+        mg.DeclarationError, match=rf"{name} = .* rad \({degrees:g} degrees are {np.deg2rad(degrees):.7g} rad\)"
+    ):
+        mg.Mechanism("degrees", pairs=pairs, **{room: [one]})
+
+
 def test_rounded_places_fit_within_the_tolerance_of_the_mechanism():
     """A distance written as 0.3333 for a third: said where nothing says how the numbers are meant, fit where tol does."""
     gears, b = spur(module=1 / 90), (0.3333, 0.0, 0.0)

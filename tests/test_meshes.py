@@ -128,6 +128,21 @@ def test_what_cannot_mesh_is_refused_with_what_would_fit(gears, told):
         stage(gears)
 
 
+def test_a_gear_beside_the_axis_of_its_shaft_is_a_warning():
+    at, z = {"p": (0, 0, 0), "w": (0.06, 0, 0)}, (0, 0, 1)
+    pairs = [mg.Pair(k, "R", "frame", k, point=x, axis=z) for k, x in at.items()]
+    for off, told in (
+        (0.0, []),
+        (0.001, ["'p' is 0.001 beside the axis of pair 'p'", "'w' is 0.001 beside the axis of pair 'w'"]),
+    ):
+        gears = [mg.Gear(k, k, n, (at[k][0] + off, 0, 0.1), z, module=0.002) for k, n in (("p", 20), ("w", 40))]
+        with warnings.catch_warnings(record=True) as found:
+            warnings.simplefilter("always")
+            mg.Mechanism("stage", pairs=pairs, gears=gears, couplings=[mg.Mesh("m", "p", "w")])
+        assert len(found) == len(told)
+        assert all(words in str(one.message) for one, words in zip(found, told, strict=True))
+
+
 def test_marks_of_teeth_that_stand_in_gaps():
     """A tooth of a on the line of centers, and a gap of b: half a pitch beside its mark."""
     half = np.pi / 40

@@ -31,6 +31,7 @@ from mechgraph.fields import (
     TWO_POSITIVE,
     TWO_WHOLE,
     Described,
+    FieldFormat,
     number_fault,
     plain,
     sound_tol,
@@ -59,8 +60,6 @@ class BaseCoupling(Described, ABC):
 
     alone: ClassVar[bool] = True
     """Whether it stands for itself, so that it may be left out and its numbers varied without others."""
-    belt: str = ""
-    """The name of the whole of which it is a part, where it does not."""
 
     @property
     def freedoms(self) -> tuple[str, ...]:
@@ -495,8 +494,16 @@ def _line(marker: Marker) -> tuple[Array, Array]:
 
 
 _TEETH = TWO_WHOLE("numbers of teeth of both gears")
-_PRESSURE = NUMBER("of the flanks, in the normal section", PURE, degrees=True, minimum=0.0)
-_FULL = float(np.deg2rad(20.0))
+
+
+def tooth_angle(meaning: str, minimum: float | None = None) -> FieldFormat:
+    """A field that holds an angle of teeth."""
+    return NUMBER(meaning, PURE, degrees=True, minimum=minimum, below=1.2)
+
+
+PRESSURE = tooth_angle("of the flanks, in the normal section", minimum=0.0)
+FULL = float(np.deg2rad(20.0))
+"""The usual pressure angle."""
 
 
 @dataclass(frozen=True)
@@ -526,8 +533,8 @@ class SpurGears(Contact):
     module: Annotated[
         float | None, POSITIVE("normal module", LENGTH, default="what the distance of the axes asks for")
     ] = None
-    pressure_angle: Annotated[float, _PRESSURE] = _FULL
-    helix_angle: Annotated[float, NUMBER("of gear a, right-hand positive", PURE, degrees=True)] = 0.0
+    pressure_angle: Annotated[float, PRESSURE] = FULL
+    helix_angle: Annotated[float, tooth_angle("of gear a, right-hand positive")] = 0.0
     internal: Annotated[bool, FLAG("whether the gear with more teeth has them inside")] = False
 
     def value_faults(self, where: str) -> list[str]:
@@ -535,10 +542,6 @@ class SpurGears(Contact):
         found = super().value_faults(where)
         if not found and self.internal and self.teeth[0] == self.teeth[1]:
             found.append(wrong(self.teeth, "teeth", "different numbers of an internal pair"))
-        if not found and not (0.0 <= self.pressure_angle < 1.2 and abs(self.helix_angle) < 1.2):
-            found.append(
-                f"pressure_angle = {self.pressure_angle:g}, helix_angle = {self.helix_angle:g}: expected angles below 1.2 rad"
-            )
         return found
 
     @property
@@ -651,8 +654,8 @@ class BevelGears(Contact):
     kind: ClassVar[str] = "bevel"
     teeth: Annotated[Any, _TEETH]
     module: Annotated[float, POSITIVE("at the middle of the face", LENGTH)]
-    pressure_angle: Annotated[float, _PRESSURE] = _FULL
-    spiral_angle: Annotated[float, NUMBER("of gear a, right-hand positive", PURE, degrees=True)] = 0.0
+    pressure_angle: Annotated[float, PRESSURE] = FULL
+    spiral_angle: Annotated[float, tooth_angle("of gear a, right-hand positive")] = 0.0
 
     @property
     def ratio(self) -> float:
@@ -720,7 +723,7 @@ class WormGear(Contact):
     kind: ClassVar[str] = "worm"
     teeth: Annotated[Any, TWO_WHOLE("starts of the worm and teeth of the wheel")]
     radius: Annotated[float, POSITIVE("of the pitch cylinder of the worm", LENGTH)]
-    pressure_angle: Annotated[float, _PRESSURE] = _FULL
+    pressure_angle: Annotated[float, PRESSURE] = FULL
     left_hand: Annotated[bool, FLAG("whether the thread is left-handed")] = False
 
     @property
@@ -775,7 +778,7 @@ class Rack(Contact):
     kind: ClassVar[str] = "rack"
     slides: ClassVar[bool] = True
     radius: Annotated[float, POSITIVE("pitch radius of the pinion", LENGTH)]
-    pressure_angle: Annotated[float, _PRESSURE] = _FULL
+    pressure_angle: Annotated[float, PRESSURE] = FULL
 
     @property
     def ratio(self) -> float:

@@ -37,6 +37,7 @@ from mechgraph.maths.inertia import physical
 from mechgraph.maths.se3 import IN_PLANE, IN_SPACE, Array
 from mechgraph.maths.tolerances import SHAPES
 from mechgraph.memo import Once, of_graph
+from mechgraph.model.belts import BeltDrive
 from mechgraph.model.couplings import BaseCoupling, rim_faults
 from mechgraph.model.friction import LOADS
 from mechgraph.model.gears import GEARS
@@ -177,7 +178,7 @@ class DeclaredParts(Formatted, Once):
 
     def coupling(self, name: str) -> BaseCoupling:
         """The coupling of that name."""
-        belts = dict.fromkeys(c.belt for c in self.couplings if not c.alone)
+        belts = dict.fromkeys(c.belt for c in self.couplings if isinstance(c, BeltDrive))
         return self.couplings[self._index(name, _places(c.name for c in self.couplings), "coupling", belts)]
 
     def place_of_link(self, name: str) -> int:

@@ -40,10 +40,9 @@ from mechgraph.fields import (
 from mechgraph.maths.se3 import Array, cross
 from mechgraph.model.belts import GEARS as PULLEYS
 from mechgraph.model.belts import angle
+from mechgraph.model.couplings import FULL, PRESSURE, tooth_angle
 from mechgraph.model.lines import LinePlaces, LinesAt, LinkPlace
 from mechgraph.quantities import LENGTH, PURE, wrong
-
-_FULL = float(np.deg2rad(20.0))
 
 
 def involute(a: Any) -> Any:
@@ -164,10 +163,6 @@ class _Toothed(Described):
         found = super().value_faults(where)
         if self.axis is None:
             found.append(f"{where}axis: is missing; give a direction, e.g. (0, 0, 1) (planar=True needs none)")
-        for name in ("pressure_angle", "helix_angle", "spiral_angle"):
-            value = getattr(self, name, 0.0)
-            if not found and abs(value) >= 1.2:
-                found.append(wrong(value, where + name, "an angle below 1.2 rad"))
         if not found and getattr(self, "teeth", 1) < 1:
             found.append(wrong(self.teeth, where + "teeth", "1 or more"))  # type: ignore[attr-defined]
         return found
@@ -199,8 +194,7 @@ class _Involute(_Toothed):
 
 _POINT = POINT("in the middle of its width, on its axis", LENGTH)
 _MODULE = POSITIVE("normal module, at the pitch circle", LENGTH)
-_PRESSURE = NUMBER("of the flanks, in the normal section", PURE, degrees=True, minimum=0.0)
-_HELIX = NUMBER("at the pitch circle, right-hand positive", PURE, degrees=True)
+_HELIX = tooth_angle("at the pitch circle, right-hand positive")
 _WIDTH = POSITIVE("of the teeth", LENGTH, default="wider than the other gear")
 _MARK = DIRECTION("across the axis: the middle of a tooth", default="one across the axis, of no meaning")
 
@@ -223,7 +217,7 @@ class Gear(_Involute):
     point: Annotated[Any, _POINT]
     axis: Annotated[Any, DIRECTION("its axis", normal=True, default="in a plane its normal")] = None
     module: Annotated[float, _MODULE] = field(kw_only=True)
-    pressure_angle: Annotated[float, _PRESSURE] = _FULL
+    pressure_angle: Annotated[float, PRESSURE] = FULL
     helix_angle: Annotated[float, _HELIX] = 0.0
     shift: Annotated[float, NUMBER("profile shift, in modules; outwards positive")] = 0.0
     internal: Annotated[bool, FLAG("whether its teeth are inside")] = False
@@ -259,8 +253,8 @@ class GearRack(_Involute):
     direction: Annotated[Any, DIRECTION("in which its teeth stand in a row, across the axis of the pinion")]
     normal: Annotated[Any, DIRECTION("out of its teeth, towards the pinion")]
     module: Annotated[float, _MODULE]
-    pressure_angle: Annotated[float, _PRESSURE] = _FULL
-    helix_angle: Annotated[float, NUMBER("minus that of its pinion", PURE, degrees=True)] = 0.0
+    pressure_angle: Annotated[float, PRESSURE] = FULL
+    helix_angle: Annotated[float, tooth_angle("minus that of its pinion")] = 0.0
     width: Annotated[float | None, _WIDTH] = None
 
     @property
@@ -292,10 +286,11 @@ class BevelGear(_Toothed):
     point: Annotated[Any, POINT("on its axis, on the side of the apex where it is", LENGTH)]
     axis: Annotated[Any, DIRECTION("its axis")]
     module: Annotated[float, POSITIVE("at the middle of the face", LENGTH)]
-    pressure_angle: Annotated[float, _PRESSURE] = _FULL
-    spiral_angle: Annotated[float, NUMBER("right-hand positive, minus that of its mate", PURE, degrees=True)] = 0.0
+    pressure_angle: Annotated[float, PRESSURE] = FULL
+    spiral_angle: Annotated[float, tooth_angle("right-hand positive, minus that of its mate")] = 0.0
     cone: Annotated[
-        float | None, NUMBER("half angle of its pitch cone", PURE, default="as teeth and axes ask for", degrees=True)
+        float | None,
+        NUMBER("half angle of its pitch cone", PURE, default="as teeth and axes ask for", degrees=True, below=pi),
     ] = None
     mark: Annotated[Any, _MARK] = None
 
@@ -318,7 +313,7 @@ class Worm(_Toothed):
     point: Annotated[Any, POINT("on its axis", LENGTH)]
     axis: Annotated[Any, DIRECTION("its axis")]
     radius: Annotated[float, POSITIVE("of the pitch cylinder", LENGTH)]
-    pressure_angle: Annotated[float, _PRESSURE] = _FULL
+    pressure_angle: Annotated[float, PRESSURE] = FULL
     left_hand: Annotated[bool, FLAG("whether the thread is left-handed")] = False
     mark: Annotated[Any, _MARK] = None
 

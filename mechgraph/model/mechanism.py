@@ -33,7 +33,7 @@ from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.model.parts import Parts
 from mechgraph.model.plane import in_space, is_flat, pair_in_plane, pair_in_space, spatial_row
-from mechgraph.model.planets import planet_faults
+from mechgraph.model.planets import gear_doubts
 from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.pairs.contact_types import row_of, travels
 from mechgraph.pairs.pair_type import TABLE, PairType
@@ -295,7 +295,7 @@ class Mechanism(DeclaredParts, Shown):
         self._finish(start, faults + mapping_faults(units=units, start=start, expected=expected))
         self._set(couplings=tuple(one for c in self.couplings for one in c.written(self)))
         self._doubt()
-        for fault in planet_faults(self) if self.gears and "_changed_from" not in vars(self) else ():
+        for fault in gear_doubts(self) if self.gears and "_changed_from" not in vars(self) else ():
             warnings.warn(f"mechanism {self.name!r}: {fault}", MechgraphWarning, stacklevel=3)
 
     def _set(self, **fields: Any) -> None:

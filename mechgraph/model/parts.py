@@ -646,6 +646,10 @@ def cardan_shaft(
     for what, z in zip(("axis_a", "axis_b"), shafts, strict=True):
         if abs(float(z @ along)) <= SHAPES.met:
             given.faults.append(f"{what} = {z.tolist()}: is at right angles to p-q; a joint turns up to less than that")
+    if not is_numeric(phase, ()) or abs(phase) > 2 * np.pi:
+        given.faults.append(
+            wrong(phase, "phase", f"an angle between -2 pi and 2 pi rad (degrees: np.deg2rad({shown(phase)}))")
+        )
     masses = given.masses(mass, 2)
     given.end()
     front, rear, middle = f"{name}.front", f"{name}.rear", 0.5 * (start + end)

@@ -14,9 +14,10 @@ import numpy as np
 
 from mechgraph.errors import DeclarationError
 from mechgraph.maths.se3 import Array
-from mechgraph.model.couplings import fitting_of
-from mechgraph.model.gears import Gear, tip_radius
-from mechgraph.model.meshes import Mesh, Parallel
+from mechgraph.model.couplings import fitting_of, motion_of
+from mechgraph.model.gears import Gear, GearRack, tip_radius
+from mechgraph.model.lines import meeting
+from mechgraph.model.meshes import Mesh, Parallel, plain_pairs
 from mechgraph.quantities import door, shown
 
 
@@ -65,14 +66,40 @@ def planet_places(sun: int, ring: int, n: int) -> Array:
     return np.asarray(found)
 
 
+def gear_doubts(m: Any) -> list[str]:
+    """What is doubtful about the places of gears, pulleys and planets; nothing without geometry."""
+    return [*_off_axis(m), *planet_faults(m)] if m.has_geometry else []
+
+
+def _off_axis(m: Any) -> Iterator[str]:
+    """Gears and pulleys beside the axis about which their link turns."""
+    near, turning, fitting = m.once(meeting), m.once(plain_pairs), fitting_of(m)
+    for gear in m.gears:
+        pairs = [m.pairs[k] for k, _ in turning.get(gear.link, ())]
+        if gear.link == m.frame or isinstance(gear, GearRack) or len(pairs) < len(near[gear.link]):
+            continue
+        away = {}
+        for pair in pairs:
+            marker, z = pair.markers[int(pair.b == gear.link)], np.asarray(gear.axis) / np.linalg.norm(gear.axis)
+            d = np.subtract(marker.point, gear.point)
+            if motion_of(pair) == "turn" and np.abs(np.cross(z, marker.axis)).max() <= fitting * np.linalg.norm(
+                marker.axis
+            ):
+                away[pair.name] = float(np.linalg.norm(np.cross(d, z))), fitting * max(1.0, float(np.abs(d).max()))
+        if away and all(off > least for off, least in away.values()):
+            name = min(away, key=away.__getitem__)
+            yield (
+                f"{gear.kind} {gear.name!r} is {away[name][0]:.6g} beside the axis of pair {name!r}, about which its link turns: it runs "
+                "eccentrically; move its point onto that axis if it should not"
+            )
+
+
 def planet_faults(m: Any) -> list[str]:
-    """Planets between the same two gears that cannot be put in, or overlap, at the declared places; nothing without geometry.
+    """Planets between the same two gears that cannot be put in, or overlap, at the declared places.
 
     The value of a mesh with the first gear less that with the second one leaves the turn of the planet out; modulo the base pitch it is
     the same for all that fit.
     """
-    if not m.has_geometry:
-        return []
     meshes = [c for c in m.couplings if isinstance(c, Mesh)]
     of_gear: dict[str, list[Mesh]] = {}
     for c in meshes:

@@ -339,7 +339,9 @@ class Cone(Turned):
     """A cone, from its apex at the center."""
 
     kind = "cone"
-    half_angle: Annotated[float, POSITIVE("between axis and surface, below 90 degrees", PURE, degrees=True)]
+    half_angle: Annotated[
+        float, POSITIVE("between axis and surface, below 90 degrees", PURE, degrees=True, below=math.pi / 2)
+    ]
 
     @property
     def meridian(self) -> Curve:
@@ -360,13 +362,6 @@ class Cone(Turned):
     def looked_at(self) -> tuple[Array, Array]:
         """Nowhere: it is sharper and sharper towards the apex."""
         return np.zeros(0), np.zeros(0)
-
-    def faults(self, where: str) -> list[str]:
-        """An angle that makes no cone."""
-        found = super().faults(where)
-        return found or (
-            [] if self.half_angle < math.pi / 2 else [wrong(self.half_angle, where + "half_angle", "below pi/2")]
-        )
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
