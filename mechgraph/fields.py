@@ -99,8 +99,7 @@ def axes_of(axis: Any, second: Any) -> Array:
 def vector_fault(value: Any, what: str, *, direction: bool = False) -> str | None:
     """The fault of a vector of three numbers, or None; a direction must not be zero."""
     if not is_numeric(value, (3,)):
-        two = " (two where planar=True)" if is_numeric(value, (2,)) else ""
-        return wrong(value, what, f"three finite numbers{two}")
+        return wrong(value, what, "three finite numbers (two where planar=True)")
     if direction and not math.hypot(*value) > 1e-12:
         return f"{what} = {value!r}: has length 0; give a direction, e.g. (0, 0, 1)"
     return None
@@ -436,7 +435,7 @@ def _turned_tensor(value: Any, pose: Array) -> Any:
 
 def _series_fault(width: int) -> Callable[[Any, str, float | None], str | None]:
     """The check of a number or vector that may be an array over positions or a callable."""
-    wanted = "a finite number" if width == 1 else f"{width} finite numbers"
+    wanted = "a finite number" if width == 1 else f"{width} finite numbers (one less where planar=True)"
 
     def fault(value: Any, what: str, minimum: float | None) -> str | None:
         if callable(value):
@@ -496,7 +495,7 @@ def _vector_fault(value: Any, what: str, minimum: float | None) -> str | None:
 def _named_point_fault(value: Any, what: str, minimum: float | None) -> str | None:
     if isinstance(value, str) or is_numeric(value, (3,)):
         return None
-    return wrong(value, what, "three finite numbers, or the name of a point of the link")
+    return wrong(value, what, "three finite numbers (two where planar=True), or the name of a point of the link")
 
 
 def _points_fault(value: Any, what: str, minimum: float | None) -> str | None:

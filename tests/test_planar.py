@@ -392,6 +392,37 @@ def test_a_file_has_two_numbers_a_point(tmp_path: pathlib.Path) -> None:
     jsonschema.validate(tomllib.loads(PLANAR_FILE), rules)
 
 
+def test_a_saved_file_has_two_numbers_a_point_and_comes_back_equal(tmp_path: pathlib.Path) -> None:
+    """Links, hinges, guides, loads, gears and pulleys of the plane, as one declares them."""
+    wheels = [mg.Gear("g", "crank", 20, (0, 0), module=0.1), mg.Pulley("q", "crank", (0, 0), radius=0.2)]
+    for m in (four_bar(), slider_crank(), four_bar().replace(gears=wheels)):
+        mg.save(m, tmp_path / "m.toml")
+        text = (tmp_path / "m.toml").read_text(encoding="utf-8")
+        assert mg.load(tmp_path / "m.toml") == m
+        stored = tomllib.loads(text)
+        for table in ("link", "pair", "load", "gear"):
+            for item in stored.get(table, ()):
+                assert all(len(item[name]) == 2 for name in ("point", "center", "force") if name in item)
+                assert "second" not in item
+                assert isinstance(item.get("inertia", 0.0), float)
+                assert "axis" not in item or item["type"] == "P"
+    tilted = mg.Link("x", 1.0, (0, 0), [[1, 0, 0], [0, 2, 0], [0, 0, 2.5]])  # more than its moment about z
+    m = mg.Mechanism("x", [mg.Link("frame"), tilted], [mg.Pair("A", "R", "frame", "x", point=(0, 0))], planar=True)
+    mg.save(m, tmp_path / "m.toml")
+    assert mg.load(tmp_path / "m.toml") == m
+
+
+def test_the_plane_speaks_of_two_numbers() -> None:
+    with pytest.raises(mg.DeclarationError, match=r"point = .*two where planar=True"):
+        mg.Mechanism("m", pairs=[mg.Pair("A", "R", "frame", "a", point=(0,))], planar=True)
+    s = mg.solve(four_bar(), {"A": 0.3})
+    np.testing.assert_array_equal(s.link("rocker").point((1, 2)).position, s.link("rocker").point((1, 2, 0)).position)
+    with pytest.raises(mg.DeclarationError, match=r"unknown component 'Fz' \(components: Fx, Fy\)"):
+        s["A"].components["Fz"]
+    with pytest.raises(mg.DeclarationError, match="three finite numbers"):
+        mg.solve(four_bar().to_spatial(), {"A": 0.3}).link("rocker").point((1, 2))
+
+
 def test_layers_are_heights_of_links() -> None:
     m = four_bar().to_spatial(z={"coupler": 0.02})
     assert m.link("coupler").center[2] == m.link("coupler").points["tip"][2] == 0.02

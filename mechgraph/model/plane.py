@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from copy import copy
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, TypeVar
 
@@ -67,6 +68,35 @@ def _in_space(value: Any, about: FieldFormat) -> Any:
         third = float(value)  # of a lamina, which has the least moments about axes in its plane that a body can have
         return ((third / 2, 0.0, 0.0), (0.0, third / 2, 0.0), (0.0, 0.0, third))
     return _padded(value, about) if about.kind in (*INSIDE, DIRECTION) else value
+
+
+def in_file(item: Item) -> Item:
+    """A thing of a planar mechanism as one declares it: two numbers a vector, one a moment; itself where that would say less."""
+    short = _shortened(item)
+    back = pair_in_plane(short) if isinstance(short, Pair) else in_space(short)
+    return short if back == item else item
+
+
+def _shortened(item: Item) -> Item:
+    changes = {name: _short(getattr(item, name), about) for name, about in item.formats.items()}
+    if changes.get("second") is not None and same(
+        getattr(item, "second", None), filled_second(getattr(item, "axis", None))
+    ):
+        changes["second"] = None
+    return item.replace(**changes)
+
+
+def _short(value: Any, about: FieldFormat) -> Any:
+    if isinstance(value, Mapping) and about.kind is POINTS:
+        return {name: _short(point, replace(about, kind=POINT)) for name, point in value.items()}
+    array = real_array(value) if about.kind in (*INSIDE, DIRECTION, TENSOR) else None
+    if array is None or array.shape[-1:] != (3,):
+        return _shortened(value) if isinstance(value, Marker) else value
+    if about.kind is TENSOR:
+        return float(array[2, 2])
+    if about.kind is DIRECTION and array.tolist() == list(NORMAL):
+        return None
+    return plain(array[..., 2] if about.normal else array[..., :2])
 
 
 def _padded(value: Any, about: FieldFormat) -> Any:

@@ -34,6 +34,7 @@ from mechgraph.maths.se3 import Array
 from mechgraph.model.file_format import DEGREES, KINDS, SCHEMA, TABLES_OF_FILE, USUAL
 from mechgraph.model.mechanism import Mechanism, chain
 from mechgraph.model.motion import Motion
+from mechgraph.model.plane import in_file
 from mechgraph.pairs.contact_types import travels
 from mechgraph.pairs.curves import Curve
 from mechgraph.pairs.pair_type import TABLE as PAIR_TABLE
@@ -436,7 +437,10 @@ def to_data(m: Mechanism, path: str = "") -> dict[str, Any]:
     for key, attribute in TABLES_OF_FILE["file"].attributes.items():
         value = getattr(m, attribute)
         if key != attribute:
-            value = [_item_data(key, item, path) for item in value]
+            value = [
+                _item_data(key, in_file(item) if m.planar and isinstance(item, Described) else item, path)
+                for item in value
+            ]
         if value:
             data[key] = _plain(value, key, path)
     return data

@@ -16,7 +16,7 @@ from mechgraph.model.belts import BeltCourse, BeltDrive
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.pairs.pair_type import PairType
-from mechgraph.quantities import ByName, unit_of
+from mechgraph.quantities import ByName, is_numeric, unit_of
 from mechgraph.result.trajectory import Trajectory
 from mechgraph.result.values import (
     OK,
@@ -499,6 +499,8 @@ class LinkResult(Shown):
 
     def point(self, p: Any) -> MaterialPoint:
         """Position, velocity and acceleration of the material point ``p``, given in the link's frame."""
+        if self._values.mechanism.planar and is_numeric(p, (2,)):
+            p = (*p, 0.0)
         fault = vector_fault(p, "point")
         if fault:
             raise DeclarationError(f"link {self._values.mechanism.links[self._index].name!r}", [fault])
