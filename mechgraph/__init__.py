@@ -2,18 +2,11 @@
 
 import sys
 from collections.abc import Iterator
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from mechgraph import errors  # noqa: F401  # isort: skip  # before all that takes time to load
 from mechgraph import methods
-from mechgraph.determinacy.decomposition import Decomposition, Group
-from mechgraph.determinacy.equivalent import equivalent, multiple_joints, split_joint
-from mechgraph.determinacy.families import Families
-from mechgraph.determinacy.flat import to_planar, to_spatial
-from mechgraph.determinacy.report import DeterminacyReport, Structure, check, groups, structure
-from mechgraph.determinacy.snapping import snapped
-from mechgraph.equations.build import formulate
-from mechgraph.equations.formulation import Formulation
 from mechgraph.errors import (
     AssemblyError,
     ContentError,
@@ -30,19 +23,8 @@ from mechgraph.errors import (
     ShapeError,
     StudyError,
 )
-from mechgraph.exchange.curve_files import write_curve
 from mechgraph.exchange.files import load, save
 from mechgraph.fields import Formatted
-from mechgraph.graph.atlas import (
-    Identity,
-    MultipleJoint,
-    SystemGroup,
-    atlas,
-    identify,
-    load_chains,
-    save_chains,
-    system_groups,
-)
 from mechgraph.graph.chains import Chain
 from mechgraph.kinetostatics import Transmission, assemble, kinematics, least_preload, solve, transmission
 from mechgraph.maths import inertia
@@ -61,8 +43,6 @@ from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.model.planets import planet_places
 from mechgraph.model.response_setup import Event, ResponseSetup, Stop
 from mechgraph.model.toml import library_names as library
-from mechgraph.modes.assemblies import Assemblies, AssembliesOver, assemblies
-from mechgraph.modes.branches import Branches, branches
 from mechgraph.pairs.cam_laws import CamLaw, Segment, cam_laws
 from mechgraph.pairs.cams import least_base_radius
 from mechgraph.pairs.contact_types import Hertz
@@ -72,18 +52,36 @@ from mechgraph.pairs.journal import Journal
 from mechgraph.pairs.pair_type import PairType, pair_types
 from mechgraph.pairs.seats import Misfit, Stiffness
 from mechgraph.pairs.surfaces import Surface
-from mechgraph.pairs.travelling import cutter_path
+from mechgraph.pairs.travelling import cutter_path  # noqa: F401  # by methods
 from mechgraph.quantities import with_clear_calls
-from mechgraph.response.equilibrium import equilibrium, linearize
-from mechgraph.response.respond import Response, respond
-from mechgraph.result.free_body import FreeBody, free_body
-from mechgraph.result.over_time import OverTime, film_of, over_time
 from mechgraph.result.solution import Solution
-from mechgraph.variants.study import Study, study
 
 if TYPE_CHECKING:
     from mechgraph.compiled.compiled import Compiled, compile
+    from mechgraph.determinacy.decomposition import Decomposition, Group
+    from mechgraph.determinacy.equivalent import multiple_joints, split_joint
+    from mechgraph.determinacy.families import Families
+    from mechgraph.determinacy.report import DeterminacyReport, Structure, check, groups, structure
+    from mechgraph.equations.build import formulate
+    from mechgraph.equations.formulation import Formulation
+    from mechgraph.graph.atlas import (
+        Identity,
+        MultipleJoint,
+        SystemGroup,
+        atlas,
+        identify,
+        load_chains,
+        save_chains,
+        system_groups,
+    )
+    from mechgraph.modes.assemblies import Assemblies, AssembliesOver, assemblies
+    from mechgraph.modes.branches import Branches, branches
+    from mechgraph.response.equilibrium import equilibrium, linearize
+    from mechgraph.response.respond import Response, respond
+    from mechgraph.result.free_body import FreeBody, free_body
+    from mechgraph.result.over_time import OverTime, over_time
     from mechgraph.show.page.write import write_report
+    from mechgraph.variants.study import Study, study
 
 __all__ = [
     "Assemblies", "AssembliesOver", "AssemblyError", "Belt", "BeltDrive", "BevelGear", "BevelGears", "Bookkeeping",
@@ -103,38 +101,6 @@ __all__ = [
 ]  # fmt: skip
 
 
-def _view(shown: Mechanism | Solution) -> Any:
-    from mechgraph.show.page.write import view
-
-    return view(shown)
-
-
-def _draw_assemblies(modes: Assemblies) -> Any:
-    from mechgraph.show.diagrams import draw_assemblies
-
-    return draw_assemblies(modes)
-
-
-def _draw_branches(found: Branches, output: str | None, **asked: Any) -> Any:
-    from mechgraph.show.diagrams import draw_branches
-
-    return draw_branches(found, output, **asked)
-
-
-methods.TABLE |= {
-    "snapped": snapped,
-    "equivalent": equivalent,
-    "to_planar": to_planar,
-    "to_spatial": to_spatial,
-    "view": _view,
-    "draw_assemblies": _draw_assemblies,
-    "draw_branches": _draw_branches,
-    "film": film_of,
-    "cutter_path": cutter_path,
-    "write_curve": write_curve,
-}
-
-
 def _with_subclasses(kind: type[Any]) -> Iterator[type[Any]]:
     yield kind
     for one in kind.__subclasses__():
@@ -152,20 +118,68 @@ def __dir__() -> list[str]:
 
 
 def __getattr__(name: str) -> Any:
-    """What takes time to load, and few calls need."""
-    if name == "__version__":
-        from importlib.metadata import PackageNotFoundError, version
+    """What only some scripts need is loaded where it is first asked for (PEP 562)."""
+    home: Any
+    match name:
+        case "__version__":
+            from importlib.metadata import PackageNotFoundError, version
 
-        try:
-            return version("mechgraph")
-        except PackageNotFoundError:
-            return "(not installed)"
-    if name in ("Compiled", "compile"):
-        from mechgraph.compiled import compiled
+            try:
+                return version("mechgraph")
+            except PackageNotFoundError:
+                return "(not installed)"
+        case "Compiled" | "compile":
+            from mechgraph.compiled import compiled as home
+        case "Decomposition" | "Group":
+            from mechgraph.determinacy import decomposition as home
+        case "equivalent" | "multiple_joints" | "split_joint":
+            from mechgraph.determinacy import equivalent as home
+        case "Families":
+            from mechgraph.determinacy import families as home
+        case "to_planar" | "to_spatial":
+            from mechgraph.determinacy import flat as home
+        case "DeterminacyReport" | "Structure" | "check" | "groups" | "structure":
+            from mechgraph.determinacy import report as home
+        case "snapped":
+            from mechgraph.determinacy import snapping as home
+        case "formulate":
+            from mechgraph.equations import build as home
+        case "Formulation":
+            from mechgraph.equations import formulation as home
+        case "write_curve":
+            from mechgraph.exchange import curve_files as home
+        case (
+            "Identity"
+            | "MultipleJoint"
+            | "SystemGroup"
+            | "atlas"
+            | "identify"
+            | "load_chains"
+            | "save_chains"
+            | "system_groups"
+        ):
+            from mechgraph.graph import atlas as home
+        case "Assemblies" | "AssembliesOver" | "assemblies":
+            from mechgraph.modes import assemblies as home
+        case "Branches" | "branches":
+            from mechgraph.modes import branches as home
+        case "equilibrium" | "linearize":
+            from mechgraph.response import equilibrium as home
+        case "Response" | "respond":
+            from mechgraph.response import respond as home
+        case "FreeBody" | "free_body":
+            from mechgraph.result import free_body as home
+        case "OverTime" | "film_of" | "over_time":
+            from mechgraph.result import over_time as home
+        case "draw_assemblies" | "draw_branches":
+            from mechgraph.show import diagrams as home
+        case "view" | "write_report":
+            from mechgraph.show.page import write as home
+        case "Study" | "study":
+            from mechgraph.variants import study as home
+        case _:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}", name=name, obj=sys.modules[__name__])
+    return globals().setdefault(name, getattr(home, name))
 
-        return getattr(compiled, name)
-    if name == "write_report":
-        from mechgraph.show.page.write import write_report
 
-        return write_report
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}", name=name, obj=sys.modules[__name__])
+methods.HOMES.append(partial(getattr, sys.modules[__name__]))

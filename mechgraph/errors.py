@@ -6,7 +6,6 @@ Imported before everything else. An exception would not do: what is being loaded
 
 from __future__ import annotations
 
-import difflib
 import os
 import re
 import signal
@@ -39,6 +38,8 @@ def listed(names: Iterable[object], most: int = MOST_NAMES) -> str:
 def near_names(name: str, known: Iterable[str], least: float = 0.5) -> list[str]:
     """The known names, at most four, that may be meant by a wrong one: as like it as ``least`` (1: the same) or more."""
     # characters of a wrong name that are compared with known ones
+    import difflib
+
     return difflib.get_close_matches(name[:100], list(known), n=4, cutoff=least)
 
 

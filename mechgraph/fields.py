@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields
 from functools import lru_cache, partial
 from types import MappingProxyType
-from typing import Any, ClassVar, Self, get_type_hints
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -274,15 +274,18 @@ class Formatted:
     __signature__ = _Signature()
     formats: ClassVar[Mapping[str, FieldFormat]] = {}
     """What the fields hold, by their names."""
+    _own: ClassVar[Mapping[str, FieldFormat]] = {}
     _numeric: ClassVar[tuple[str, ...]] = ()
     _defaults: ClassVar[tuple[Any, ...]] = ()
 
     def __init_subclass__(cls) -> None:
         if cls.__repr__ is Formatted.__repr__:
             cls.__repr__ = Formatted.__repr__  # type: ignore[method-assign]  # dataclass leaves alone what stands in the class itself
-        hints = get_type_hints(cls, include_extras=True)
-        found = {name: getattr(hint, "__metadata__", (None,))[0] for name, hint in hints.items()}
-        cls.formats = {name: about for name, about in found.items() if isinstance(about, FieldFormat)}
+        hints = inspect.get_annotations(cls, eval_str=True)
+        own = {name: getattr(hint, "__metadata__", (None,))[0] for name, hint in hints.items()}
+        cls._own = {name: about for name, about in own.items() if isinstance(about, FieldFormat)}
+        bases = (vars(base).get("_own", {}) for base in reversed(cls.__mro__))
+        cls.formats = {name: about for own in bases for name, about in own.items()}
         cls._numeric = tuple(name for name, about in cls.formats.items() if about.kind.numeric)
         given = (getattr(cls, name, NEEDED) for name in cls.formats)
         cls._defaults = tuple(

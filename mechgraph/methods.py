@@ -1,6 +1,6 @@
 """Methods that a user looks for on a class of a lower room and that a room above answers.
 
-The class keeps a method of one line, ``return methods.call("view", self)``; the top of the package fills the table.
+The class keeps a method of one line, ``return methods.call("view", self)``; the top of the package finds the function.
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ Name = Literal[
     "view",
     "draw_assemblies",
     "draw_branches",
-    "film",
+    "film_of",
     "cutter_path",
     "write_curve",
 ]
-TABLE: dict[Name, Callable[..., Any]] = {}
+HOMES: list[Callable[[Name], Callable[..., Any]]] = []
+"""What gives the function of a name, put here by the top of the package."""
 
 
 def call(name: Name, *args: Any, **named: Any) -> Any:
     """What the function of that name in a room above returns."""
-    return TABLE[name](*args, **named)
+    return HOMES[0](name)(*args, **named)

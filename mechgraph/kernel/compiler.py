@@ -8,7 +8,6 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import os
-import shlex
 import shutil
 import subprocess
 import sys
@@ -28,6 +27,8 @@ LONGEST_BUILD = 600.0
 
 def compilers() -> list[list[str]]:
     """The commands of C compilers found here, the one that ``CC`` names first; running none of them."""
+    import shlex
+
     named = shlex.split(os.environ.get("CC", ""), posix=os.name != "nt")
     commands = [named, ["cc"], ["gcc"], ["clang"]]
     found = [[path, *command[1:]] for command in commands if command and (path := shutil.which(command[0]))]

@@ -506,7 +506,7 @@ class Solution(Shown):
         >>> film.closed, film.orbit.shape
         (True, (24, 2))
         """
-        found: FilmResult = methods.call("film", self, pair, journal)
+        found: FilmResult = methods.call("film_of", self, pair, journal)
         return found
 
     def load(self, index: int) -> LoadResult:
