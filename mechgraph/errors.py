@@ -284,26 +284,37 @@ class FrictionError(PathError):
         How the solution ends while friction grows from zero.
     factor : float
         By how much friction would have to fall.
+    places : tuple of str
+        Pairs and couplings whose normal forces grow there.
 
     Examples
     --------
     >>> import mechgraph as mg
-    >>> mg.FrictionError("jams", {"A.Rz": 0.0}, kind="jams", factor=0.8).factor
+    >>> mg.FrictionError("jams", {"A.Rz": 0.0}, kind="jams", factor=0.8, places=("B",)).factor
     0.8
     """
 
     def __init__(
-        self, message: str, value: dict[str, float], solution: Any = None, *, kind: str = "jams", factor: float = 1.0
+        self,
+        message: str,
+        value: dict[str, float],
+        solution: Any = None,
+        *,
+        kind: str = "jams",
+        factor: float = 1.0,
+        places: tuple[str, ...] = (),
     ) -> None:
         super().__init__(message, value, solution)
-        self.kind, self.factor = kind, factor
+        self.kind, self.factor, self.places = kind, factor, places
 
     def __reduce__(self) -> Any:
-        return _remade_friction, (str(self), self.value, self.solution, self.kind, self.factor)
+        return _remade_friction, (str(self), self.value, self.solution, self.kind, self.factor, self.places)
 
 
-def _remade_friction(message: str, value: dict[str, float], solution: Any, kind: str, factor: float) -> FrictionError:
-    return FrictionError(message, value, solution, kind=kind, factor=factor)
+def _remade_friction(
+    message: str, value: dict[str, float], solution: Any, kind: str, factor: float, places: tuple[str, ...]
+) -> FrictionError:
+    return FrictionError(message, value, solution, kind=kind, factor=factor, places=places)
 
 
 class DeadPointError(PathError):

@@ -294,10 +294,10 @@ FLAG = "Pass on_reach='flag' to keep the reachable positions"
 WITHOUT_BOUND, BEFORE_END = 1e3, 0.01
 """Slides of so many lengths L that have doubled within so much of the path before its end grow without bound."""
 RUBBING = {
-    Status.JAMS: "jams: the normal forces grow without bound at {:.4g} times the friction declared. Less friction, longer guides, or a "
-    "drive closer to the axis would move it; pass on_reach='flag' to keep the other positions",
-    Status.NO_FINITE_FORCE: "has no finite force: the solution ends at {:.4g} times the friction declared. Pass on_reach='flag' to keep "
-    "the other positions",
+    Status.JAMS: "jams: the normal forces in {} grow without bound at {:.4g} times the friction declared. Less friction, longer guides, or "
+    "a drive closer to the axis would move it; pass on_reach='flag' to keep the other positions",
+    Status.NO_FINITE_FORCE: "has no finite force: with those in {} the solution ends at {:.4g} times the friction declared. Pass "
+    "on_reach='flag' to keep the other positions",
 }
 """Why friction has no answer at a position, by its outcome."""
 REFUSED = {
@@ -321,12 +321,11 @@ def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exceptio
     status = Status(solution.status.reshape(-1)[first])
     wanted = (line.values("position", outcome.batch)[:, first] * line.unit).tolist()
     if status in RUBBING:
-        factor = float(outcome.trajectory.friction_factor(first))
+        factor, places = outcome.trajectory.friction_factor(first)
         values = dict(zip(line.drive.names, wanted, strict=True))
-        text = (
-            f"mechanism {line.m.name!r}: position {first} ({_listed(values.items())}) {RUBBING[status].format(factor)}"
-        )
-        return FrictionError(text, values, solution, kind=status.value, factor=factor)
+        why = RUBBING[status].format(", ".join(places), factor)
+        text = f"mechanism {line.m.name!r}: position {first} ({_listed(values.items())}) {why}"
+        return FrictionError(text, values, solution, kind=status.value, factor=factor, places=places)
     if outcome.found is None:
         return None
     dead = status in (Status.DEAD_POINT, Status.BEYOND_DEAD_POINT)

@@ -135,9 +135,9 @@ class Outcome:
         if len(motion.places):
             forces = self._forces(motion, f)
             self.trajectory.put(motion, forces)
-            if forces.outcome is not None:
-                for number in np.unique(forces.outcome[forces.outcome > 0]):
-                    self.trajectory.mark(motion.places[forces.outcome == number], OUTCOMES[number])
+            outcome = np.zeros(0) if forces.rubs is None else forces.rubs.outcome
+            for number in np.unique(outcome[outcome > 0]):
+                self.trajectory.mark(motion.places[outcome == number], OUTCOMES[number])
 
     def _forces(self, motion: BlockMotion, f: FactoredClosure) -> BlockForces:
         line = self.line
@@ -159,7 +159,7 @@ class Outcome:
         with np.errstate(over="ignore", invalid="ignore"):
             found = forces_of_block(task, motion.rates, f, coordinates, motion.places)
             finite = np.isfinite(found.balance + found.power) | self.contradicting[motion.places]
-            finite |= False if found.outcome is None else found.outcome > 0
+            finite |= False if found.rubs is None else found.rubs.outcome > 0
         if not finite.all():
             too_large = "forces are beyond the largest number (1.8e308): masses, loads or rates are too large"
             raise DeclarationError(f"solve {line.m.name!r}", [too_large])

@@ -118,6 +118,7 @@ def test_a_collar_lifted_beside_its_guide_jams() -> None:
         with pytest.raises(mg.FrictionError, match="jams") as error:
             moved(collar(mu))
         assert (error.value.kind, error.value.factor) == ("jams", pytest.approx(0.25 / mu, rel=1e-9))
+        assert error.value.places == ("A",)
         assert moved(collar(mu), on_reach="flag").status == "jams"
 
 
@@ -308,6 +309,9 @@ def test_at_rest_any_effort_between_holds() -> None:
     assert s["A"].effort[0] == pytest.approx(W * 0.01)
     assert s["A"].effort_range[0] == pytest.approx([W * (0.01 - rho), W * (0.01 + rho)], rel=1e-11)
     assert not s.self_locking
+    assert s["A"].sticks
+    with pytest.raises(mg.DeclarationError, match="in motion"):
+        assert moved(m).self_locking
     assert mg.solve(shaft(force(0, -W, (0.001, 0, 0))), {"A": 0.0}).self_locking
     low, high = mg.solve(collar(0.3), {"D": 0.0})["D"].effort_range[0]
     assert (low, high) == (pytest.approx(W / (1 + 1.2), rel=1e-11), np.inf)
@@ -410,6 +414,10 @@ def test_feet_that_lift_are_not_solved_with_friction() -> None:
 
 def test_preload_and_viscous() -> None:
     s = moved(shaft(force(0, -W, (0, 0, 0)), preload=50.0, viscous=0.7), 2.0)
+    assert s.load(1).power == pytest.approx(-s.losses["A"], rel=1e-12)
+    si = shaft(force(0, -W, (0, 0, 0)), viscous=0.7).replace(units={"length": "m", "mass": "kg", "time": "s"})
+    mm = si.to_units(length="mm", mass="t")
+    assert moved(mm, 2.0)["A"].effort[0] == pytest.approx(1e3 * moved(si, 2.0)["A"].effort[0], rel=1e-12)
     assert s["A"].effort[0] == pytest.approx(RHO * (W + 50.0) + 1.4, rel=1e-12)
     assert s.losses["A"] == pytest.approx(2.0 * s["A"].effort[0], rel=1e-12)
 
@@ -453,3 +461,20 @@ def test_a_slow_position_does_not_depend_on_a_fast_one_beside_it() -> None:
     assert turn["D"].friction[0, 0] == 0.0
     assert abs(turn["D"].friction[1, 0]) > 1.0
     assert (turn["A"].friction[:, 0] < 0).all()
+
+
+def test_coefficients_that_fall_with_speed_and_vary_from_case_to_case() -> None:
+    """mu + (static - mu) exp(-(s / v)^2); a study varies numbers of friction as solving every case does."""
+    for rate in (0.5, 5.0):
+        s = moved(shaft(force(0, -W, (0, 0, 0)), model="total", static=0.5, stribeck=0.05), rate)
+        mu = MU + (0.5 - MU) * np.exp(-((rate * RADIUS / 0.05) ** 2))
+        assert s["A"].effort[0] == pytest.approx(mu * RADIUS * W, rel=1e-12)
+        assert s["A"].sliding == pytest.approx(rate * RADIUS)
+        assert not s["A"].sticks
+    m, given = shaft(force(0, -W, (0, 0, 0.3)), length=0.1), {"A": mg.Motion([0.0, 1.0], velocity=1.0)}
+    values = {"loads[1].mu": [0.05, 0.3], "loads[1].length": [0.1, 0.2], "loads[1].preload": [0.0, 7.0]}
+    found = mg.study(m, values, {"T": "A.effort"}, sampling="grid", motions=given)
+    for at in range(8):
+        one = {name.partition(".")[2]: float(found.parameters[name][at]) for name in values}
+        t = mg.solve(m, given, loads=[m.loads[0], mg.Friction("A", radius=RADIUS, **one)])
+        assert np.allclose(found.outputs["T"][at], t["A"].effort, rtol=1e-12)

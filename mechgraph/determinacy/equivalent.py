@@ -201,7 +201,7 @@ def _in_place_of_gears(parts: _Parts) -> list[str]:
         for c in m.couplings
         if not isinstance(c, Contact)
     ]
-    for (_, contact), (G, _) in zip(lines.contacts, lines.wrenches, strict=True):
+    for (_, contact), (G, *_) in zip(lines.contacts, lines.wrenches, strict=True):
         if not isinstance(contact, Contact):
             continue
         first, last = contact.steps[0], contact.steps[-1]

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import scipy
@@ -40,6 +39,7 @@ from mechgraph.maths.linear import add_at
 from mechgraph.maths.se3 import Array, Index, Mask, cross, rotate_back
 from mechgraph.maths.tolerances import MOTIONS, STRESSES
 from mechgraph.model.belts import pretensions
+from mechgraph.model.friction import Friction, pairs_of, rubbing_loads
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 
@@ -121,9 +121,8 @@ class BlockForces:
     ``hold_terms (p, T)`` of the passive motions. ``multipliers (n, T)`` of the closure rows behind those of
     the loops with ``multiplier_stress (n, s, T)``, of which ``coupled_stress (F, s, T)`` are the efforts in freedoms.
     Where stiffness splits reactions: those that misfits lock in ``locked (6, P, T)``, and those of a misfit of one in every component
-    that is not rigid ``of_misfit (6, P, k, T)``. With friction: its part of the efforts ``friction (F, T)``, what of it pairs take up
-    themselves ``taken (6, P, T)``, ``normals (m, T)`` forces at all places, ``outcome (T,)`` and ``factor (T,)``, at rest the least and
-    greatest efforts between which drives may be ``range (F, 2, T)``.
+    that is not rigid ``of_misfit (6, P, k, T)``. With friction: what came about, ``rubs``, and at rest the least and greatest efforts
+    between which drives may be ``range (F, 2, T)``.
     """
 
     reactions: Array
@@ -145,11 +144,7 @@ class BlockForces:
     hold_terms: Array
     locked: Array | None = None
     of_misfit: Array | None = None
-    friction: Array | None = None
-    taken: Array | None = None
-    normals: Array | None = None
-    outcome: Array | None = None
-    factor: Array | None = None
+    rubs: Rubbed | None = None
     range: Array | None = None
 
 
@@ -187,7 +182,7 @@ def forces_of_block(
     first = pretensioned(here, METHODS[task.method](ForceProblem(here, loads, given, task.driven, f)), f)
     lines = ContactLines(here)
     found, flank = _least_on_flanks(here, on_their_flanks(here, first, lines), f, task, lines)
-    dry = [load for load in task.loads if load.follows_reactions]
+    dry = rubbing_loads(here.system.m, task.loads, site.number)
     rubs: Rubbed | None = None
     ranges: Array | None = None
     if dry:
@@ -195,7 +190,8 @@ def forces_of_block(
         solve = _FrictionProblem(here, task, f, first, lines, (found, flank), dry)
         ranges = solve.at_rest(dq, given)
         found, rubs, flank = solve.forces(dq)
-        given = given + rubs.efforts
+        given = given + rubs.efforts - rubs.teeth
+        found = replace(found, coupled=found.coupled + rubs.teeth)
     own = np.zeros_like(found.efforts)
     own[task.driven] = (found.efforts - given - found.coupled)[task.driven]
     acting = own + given + found.coupled
@@ -227,7 +223,8 @@ def forces_of_block(
         hold_terms,
         found.locked,
         found.of_misfit,
-        *((rubs.efforts, rubs.taken, rubs.normals, rubs.outcome, rubs.factor, ranges) if rubs else ()),
+        rubs=rubs,
+        range=ranges,
     )
 
 
@@ -349,7 +346,7 @@ class _FrictionProblem:
         wrenches: Wrenches,
         lines: ContactLines,
         smooth: tuple[_FreeForces, Array],
-        dry: Sequence[Any],
+        dry: Sequence[Friction],
     ) -> None:
         self.here, self.task, self.f, self.wrenches, self.lines, self.dry = here, task, f, wrenches, lines, dry
         if task.redundant == "elastic" and seats_of(here).push.any():
@@ -361,11 +358,11 @@ class _FrictionProblem:
         self._answer_units()
 
     def _answer_units(self) -> None:
-        """Forces under a unit effort in every freedom of pairs that rub."""
+        """Forces under a unit effort in every freedom of pairs through which friction would pass."""
         self.unit: dict[int, dict[str, Array]] = {}
         s, nothing = self.here.system, np.zeros_like(self.found.efforts)
         still = self._answer(nothing) if self.found.locked is not None else None
-        for k in dict.fromkeys(s.m.place_of_pair(load.of) for load in self.dry):
+        for k in dict.fromkeys(k for load in self.dry for k in pairs_of(s.m, load)):
             first = int(s.first_column[k])
             for column in range(first, first + s.m.pairs[k].type.f):
                 efforts = nothing.copy()
@@ -413,14 +410,14 @@ class _FrictionProblem:
 
     def _on_flanks(self, dq: Array, at_rest: bool) -> tuple[_FreeForces, Rubbed]:
         """Forces with the friction of a motion with rates ``dq (F, T)``, and what that is; NaN where it has no solution, or none alone."""
-        found, of = self.found, {column: one["reactions"] for column, one in self.unit.items()}
-        stress = found.stress.wrenches
+        found, of = self.found, {column: self._read(one) for column, one in self.unit.items()}
+        base, stress = self._read(vars(found)), self._read({"reactions": found.stress.wrenches, **vars(found.stress)})
         unknown = stress[:, :, :0] if self.task.redundant == "minimum_norm" else stress
         reactions = found.reactions
         # sides of balls and centers of pressure settle in a few rounds; what does not is not determined
         for _ in range(50):
-            places = places_of(self.here, dq, reactions, self.dry, at_rest)
-            rubs = rubbed(self.here, places, found.reactions, of, unknown)
+            places = places_of(self.here, dq, reactions, self.dry, at_rest, (self.lines, self.flank))
+            rubs = rubbed(self.here, places, base, of, unknown)
             sums = {
                 name: getattr(found, name) + sum(one[name] * rubs.efforts[c] for c, one in self.unit.items())
                 for name in ("reactions", "efforts", "multipliers", "coupled")
@@ -436,6 +433,10 @@ class _FrictionProblem:
                 "friction not determined"
             )
         return _without(replace(found, **sums), rubs.outcome > 0), rubs
+
+    def _read(self, forces: Mapping[str, Array]) -> Array:
+        """The wrenches that normal forces are read from: reactions, and behind them forces between teeth."""
+        return np.concatenate([forces["reactions"], self.lines.on_gears(forces["multipliers"], self.flank)], axis=1)
 
     def at_rest(self, dq: Array, given: Array) -> Array:
         """Efforts of drives ``(F, 2, T)`` on the verge of motion to - and to +, the others held; infinite where it jams, NaN in motion."""

@@ -17,13 +17,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 
+from mechgraph.errors import DeclarationError
 from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.touching import ContactLines
 from mechgraph.maths.se3 import Array, Index, cross, skew
 from mechgraph.maths.tolerances import MOTIONS, STRESSES
-from mechgraph.model.friction import Friction, rubs_as_ball, rubs_as_journal, rubs_as_plane, rubs_as_slide
+from mechgraph.model.friction import Friction, rubs_as_ball, rubs_as_contact, rubs_as_plane
+from mechgraph.model.gear_facts import mean_sliding
 
 OUTCOMES = ("ok", "jams", "no finite force", "friction not determined")
 """What becomes of a position, by number."""
@@ -31,17 +35,25 @@ OUTCOMES = ("ok", "jams", "no finite force", "friction not determined")
 
 @dataclass(frozen=True)
 class Place:
-    """A place that rubs: of which ``pair``, normal vector ``A (d, 6, T)`` of its reaction about the internal origin, friction wrench on
-    link b ``D (6, T)`` for a unit of its size and ``K (6, d, T)`` linear in it; ``preload`` (internal units). ``follows``: whether its
-    directions depend on the reactions themselves.
+    """A place that rubs: the name ``of`` the pair or coupling, normal vector ``A (d, 6, T)`` of the wrench that it ``reads`` (the reaction
+    of a pair, or behind these the force on gear b) about the internal origin, friction wrench on link b ``D (6, T)`` for a unit of its
+    size and ``K (6, d, T)`` linear in it, ``preload (T,)`` (internal units), ``speed (T,)`` of sliding. The wrench would pass through the
+    pairs ``way``, in these senses; between teeth it passes them by. ``follows``: whether its directions depend on the reactions.
     """
 
-    pair: int
+    of: str
+    reads: int
+    way: tuple[tuple[int, float], ...]
     A: Array
     D: Array
     K: Array
-    preload: float
+    preload: Array
+    speed: Array
     follows: bool = False
+
+    def between_teeth(self, pairs: int) -> bool:
+        """Whether it is one of a coupling, with so many pairs."""
+        return self.reads >= pairs
 
 
 def _rows(moment: Array, force: Array) -> Array:
@@ -56,6 +68,22 @@ def _force_at(p: Array, f: Array) -> Array:
     return np.concatenate([cross(p, f), f])
 
 
+def _unit(v: Array, least: Array | float = 0.0) -> tuple[Array, Array]:
+    """Directions of vectors ``(3, T)``, zero where they are not longer than ``least``, and their lengths ``(T,)``."""
+    size = np.sqrt((v * v).sum(axis=0))
+    return v / np.where(size > least, size, np.inf), size
+
+
+def _freedoms(here: Configuration, k: int) -> slice:
+    first = here.system.first_column
+    return slice(int(first[k]), int(first[k + 1]))
+
+
+def _twist(here: Configuration, dq: Array, k: int) -> Array:
+    """Twist ``(6, T)`` of link b of a pair relative to its link a."""
+    return np.asarray(np.einsum("cft,ft->ct", here.S[:, _freedoms(here, k)], dq[_freedoms(here, k)]))
+
+
 def moving_rates(dq: Array, ddq: Array | float = 0.0) -> Array:
     """Rates ``(F, T)`` without those of freedoms at rest, where friction has no direction: rounding beside the largest rate of the
     position, or a reversal within rounding of the coordinate, ``q'^2 / q''``.
@@ -66,122 +94,222 @@ def moving_rates(dq: Array, ddq: Array | float = 0.0) -> Array:
 
 
 def places_of(
-    here: Configuration, dq: Array, normal: Array, loads: Sequence[Friction], at_rest: bool = False
+    here: Configuration,
+    dq: Array,
+    normal: Array,
+    loads: Sequence[Friction],
+    at_rest: bool = False,
+    teeth: tuple[ContactLines, Array] | None = None,
 ) -> list[Place]:
-    """All places that rub in a motion ``dq (F, T)`` of ``moving_rates``; ``normal (6, P, T)``: reactions that tell where bodies touch."""
-    return [
-        place
-        for load in loads
-        for place in _places(here, dq, normal, load, load.coefficient_at_rest if at_rest else load.mu)
-    ]
+    """All places that rub in a motion ``dq (F, T)`` of ``moving_rates``; ``normal (6, P, T)``: reactions that tell where bodies touch,
+    ``teeth``: lines of contact and signs ``(n, T)`` that tell on which flanks; the first ones where left out.
+    """
+    m = here.system.m
+    found: list[Place] = []
+    for load in loads:
+        if load.of in m.pair_index:
+            rubbing = _Rubbing(here, load, m.pair_index[load.of], dq, normal, at_rest)
+            found += next(make for rubs, make in _MAKERS if rubs(rubbing.row))(rubbing)
+        else:
+            lines, flank = teeth or (ContactLines(here), np.ones((len(m.couplings), here.T)))
+            found.append(_between_teeth(here, load, dq, at_rest, lines, flank))
+    return found
 
 
-def _places(here: Configuration, dq: Array, normal: Array, load: Friction, mu: float) -> Iterator[Place]:
-    s = here.system
-    k = s.m.place_of_pair(load.of)
-    pair, L, T = s.m.pairs[k], s.par.L, here.T
-    number, i = s.place_of(k)
-    row, first = pair.type, int(s.first_column[k])
-    S = here.S[:, first : first + row.f]
-    rate = dq[first : first + row.f]
-    twist = np.einsum("cft,ft->ct", S, rate)
-    preload = load.preload / L
-    force = _rows(np.zeros((3, 3, T)), np.broadcast_to(np.eye(3)[:, :, None], (3, 3, T)))
-    none = np.zeros((6, 3, T))
-    if row.touching:
-        before = next(iter(row.reactions or ())).frame
-        c = here.frames[number][before][:, 3, i]
-        r = (pair.radius_b or 0.0) / L
-        size = np.sqrt((normal[3:, k] ** 2).sum(axis=0))
-        n = normal[3:, k] / np.where(size > 0, size, 1.0)
-        slip = twist[3:] + cross(twist[:3], c - r * n)
-        speed = np.sqrt((slip * slip).sum(axis=0))
-        u = slip / np.where(speed > MOTIONS.rounding * np.abs(twist).max(axis=0), speed, np.inf)
-        yield Place(
-            k, force, -mu * _force_at(c, u), np.concatenate([-mu * r * skew(u), np.zeros((3, 3, T))]), preload, True
-        )
-        return
-    origin = here.pair_points[:, k] if load.on == "b" else here.frames[number][0][:, 3, i]
-    r = (load.radius or 0.0) / L
-    if rubs_as_plane(row):
-        z = here.frames[number][0][:, 2, i]
-        w, turn = normal[:, k], (twist[:3] * z).sum(axis=0)
-        press = (w[3:] * z).sum(axis=0)
-        # the center of pressure, where the force has no moment in the plane: p + z x M / F_z
-        at = origin + cross(z, w[:3] - cross(origin, w[3:])) / np.where(press != 0, press, np.inf)
-        v = twist[3:] + cross(twist[:3], at)
-        v = v - z * (v * z).sum(axis=0)
-        speed = np.sqrt((v * v).sum(axis=0) + (r * turn) ** 2)
-        share = np.where(speed > MOTIONS.rounding * np.abs(twist).max(axis=0), speed, np.inf)
-        D = -mu * (_force_at(at, v / share) + r * _couple(r * turn / share * z))
-        yield Place(k, _rows(np.zeros((1, 3, T)), z[None]), D, np.zeros((6, 1, T)), preload, True)
-        return
-    if rubs_as_ball(row):
-        spin = np.sqrt((twist[:3] ** 2).sum(axis=0))
-        part = mu / np.hypot(1.0, mu) if load.model == "circle" else mu
-        yield Place(k, force, -part * r * _couple(twist[:3] / np.where(spin > 0, spin, np.inf)), none, preload)
-        return
+def _or_zero(value: Any) -> Any:
+    return 0.0 if value is None else value
+
+
+class _Rubbing:
+    """A pair that rubs in a motion: its screws ``S (6, f, T)``, ``rate (f, T)``, relative ``twist (6, T)``, the wrench ``w (6, T)`` by
+    which it presses, radius ``r``, and the ``origin (3, T)`` of its places, over L.
+    """
+
+    def __init__(self, here: Configuration, load: Friction, k: int, dq: Array, normal: Array, at_rest: bool) -> None:
+        s = here.system
+        self.here, self.load, self.k, self.at_rest, self.L, self.T = here, load, k, at_rest, s.par.L, here.T
+        self.pair, self.w = s.m.pairs[k], normal[:, k]
+        self.row = self.pair.type
+        self.S, self.rate, self.twist = here.S[:, _freedoms(here, k)], dq[_freedoms(here, k)], _twist(here, dq, k)
+        self.r = _or_zero(load.radius) / self.L
+        self.origin = here.pair_points[:, k] if load.on == "b" else self.frame(0)[:, 3]
+
+    def frame(self, number: int) -> Array:
+        """A frame of the pair ``(3, 4, T)``."""
+        group, i = self.here.system.place_of(self.k)
+        return np.asarray(self.here.frames[group][number][:, :, i])
+
+    def mu(self, speed: Array) -> Array:
+        """The coefficient ``(T,)`` at sliding speeds."""
+        return self.load.coefficient(self.L * speed, self.at_rest)
+
+    @property
+    def rolls_below(self) -> Array:
+        """Sliding speeds ``(T,)`` that are rounding."""
+        return np.asarray(MOTIONS.rounding * np.abs(self.twist).max(axis=0))
+
+    def place(self, A: Array, D: Array, speed: Array, K: Array | None = None, follows: bool = False) -> Place:
+        """A place of the pair."""
+        K = np.zeros((6, len(A), self.T)) if K is None else K
+        preload = np.broadcast_to(self.load.preload / self.L, self.T)
+        return Place(self.load.of, self.k, ((self.k, 1.0),), A, D, K, preload, speed, follows)
+
+    def forces(self) -> Array:
+        """What reads all of a force ``(3, 6, T)``."""
+        eye = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, self.T))
+        return _rows(np.zeros((3, 3, self.T)), eye)
+
+
+def _touching(x: _Rubbing) -> Iterator[Place]:
+    """A point or line, on the side of link b's curve to which the force points."""
+    c, r = x.frame(next(iter(x.row.reactions or ())).frame)[:, 3], _or_zero(x.pair.radius_b) / x.L
+    n, _ = _unit(x.w[3:])
+    u, speed = _unit(x.twist[3:] + cross(x.twist[:3], c - r * n), x.rolls_below)
+    mu = x.mu(speed)
+    yield x.place(
+        x.forces(),
+        -mu * _force_at(c, u),
+        speed,
+        np.concatenate([-mu * r * skew(u), np.zeros((3, 3, x.T))]),
+        follows=True,
+    )
+
+
+def _plane(x: _Rubbing) -> Iterator[Place]:
+    """A plane, at the center of pressure, where the force has no moment in it: ``p + z x M / F_z``."""
+    z, w = x.frame(0)[:, 2], x.w
+    turn, press = ((part * z).sum(axis=0) for part in (x.twist[:3], w[3:]))
+    at = x.origin + cross(z, w[:3] - cross(x.origin, w[3:])) / np.where(press != 0, press, np.inf)
+    v = x.twist[3:] + cross(x.twist[:3], at)
+    v = v - z * (v * z).sum(axis=0)
+    speed = np.sqrt((v * v).sum(axis=0) + (x.r * turn) ** 2)
+    share = np.where(speed > x.rolls_below, speed, np.inf)
+    D = -x.mu(speed) * (_force_at(at, v / share) + x.r * _couple(x.r * turn / share * z))
+    yield x.place(_rows(np.zeros((1, 3, x.T)), z[None]), D, speed, follows=True)
+
+
+def _ball(x: _Rubbing) -> Iterator[Place]:
+    u, spin = _unit(x.twist[:3])
+    mu = x.mu(x.r * spin)
+    part = mu / np.hypot(1.0, mu) if x.load.model == "circle" else mu
+    yield x.place(x.forces(), -part * x.r * _couple(u), x.r * spin)
+
+
+def _about_axes(x: _Rubbing) -> Iterator[Place]:
+    """Turns about axes and slides along them."""
     axes: dict[int, dict[bool, int]] = {}
-    for j, f in enumerate(row.freedoms):
+    for j, f in enumerate(x.row.freedoms):
         axes.setdefault(int(np.argmax(np.abs(f.twist[:3] if f.turns else f.twist[3:]))), {})[f.turns] = j
+    zero, pitch = np.zeros(x.T), x.pair.pitch_per_radian / x.L
     for found in axes.values():
         turn, slide = found.get(True), found.get(False)
-        u = S[:3, turn] if turn is not None else S[3:, slide]
-        axial = _rows(np.zeros((1, 3, T)), u[None])
-        w = np.zeros(T) if turn is None else rate[turn]
-        v = np.zeros(T) if slide is None else rate[slide]
-        if row.takes_pitch:
-            yield _thread(k, load, mu, u, axial, np.sign(w), pair.pitch_per_radian / L, r, preload)
-        if rubs_as_journal(row) or rubs_as_slide(row) or load.length is not None:
-            yield from _along(k, load, mu, u, origin, r, w, v, L, preload)
-        if load.thrust_radius is not None:
-            yield Place(k, axial, -mu * load.thrust_radius / L * _couple(np.sign(w) * u), np.zeros((6, 1, T)), preload)
+        u = x.S[3:, slide] if turn is None else x.S[:3, turn]
+        axial = _rows(np.zeros((1, 3, x.T)), u[None])
+        w, v = (zero if j is None else x.rate[j] for j in (turn, slide))
+        if x.row.takes_pitch:
+            yield _thread(x, u, axial, w, pitch)
+            v = pitch * w
+        if not x.row.takes_pitch or x.load.length is not None:
+            yield from _along(x, u, w, v)
+        if x.load.thrust_radius is not None:
+            t = x.load.thrust_radius / x.L
+            yield x.place(axial, -x.mu(t * np.abs(w)) * t * _couple(np.sign(w) * u), t * np.abs(w))
 
 
-def _thread(
-    k: int, load: Friction, mu: float, u: Array, axial: Array, s: Array, pitch: float, r: float, preload: float
-) -> Place:
-    """Friction couple of a thread: more where the motion goes against the axial force Q on b's load, ``s`` the sense of the turn."""
-    lead = np.arctan2(abs(pitch), r)
-    phi = np.arctan(mu / np.cos(np.arctan(np.tan(load.flank) * np.cos(lead))))
-    up, down = r * (np.tan(lead + phi) - np.tan(lead)), r * (np.tan(lead) - np.tan(lead - phi))
+def _thread(x: _Rubbing, u: Array, axial: Array, w: Array, pitch: Any) -> Place:
+    """Friction couple of a thread that turns at ``w``: more where the motion goes against the axial force Q on b's load."""
+    speed, lead = np.hypot(x.r, pitch) * np.abs(w), np.arctan2(np.abs(pitch), x.r)
+    phi = np.arctan(x.mu(speed) / np.cos(np.arctan(np.tan(x.load.flank) * np.cos(lead))))
+    up, down = x.r * (np.tan(lead + phi) - np.tan(lead)), x.r * (np.tan(lead) - np.tan(lead - phi))
     mean, more = 0.5 * (up + down), 0.5 * (up - down) * np.sign(pitch)
-    return Place(k, axial, -mean * _couple(s * u), -more * _couple(s * s * u)[:, None], preload)
+    return x.place(axial, -mean * _couple(np.sign(w) * u), speed, -more * _couple(np.abs(np.sign(w)) * u)[:, None])
 
 
-def _along(
-    k: int, load: Friction, mu: float, u: Array, p: Array, r: float, w: Array, v: Array, L: float, preload: float
-) -> Iterator[Place]:
-    """Places along an axis ``u`` through ``p`` that carry radial forces, under a turn ``w`` at the radius ``r`` and a slide ``v``."""
-    T = u.shape[1]
-    speed = np.hypot(r * w, v)
+def _along(x: _Rubbing, u: Array, w: Array, v: Array) -> Iterator[Place]:
+    """Places along an axis ``u`` through the origin that carry radial forces, under a turn ``w`` at the radius and a slide ``v``."""
+    p, speed = x.origin, np.hypot(x.r * w, v)
     share = np.where(speed > 0, speed, np.inf)
-    round_, along = r * w / share, v / share
-    size = mu / np.sqrt(1.0 + (mu * round_) ** 2) if load.model == "circle" else np.full(T, mu)
-    D = -size * (r * round_ * _couple(u) + along * _force_at(p, u))
+    round_, along, mu = x.r * w / share, v / share, x.mu(speed)
+    size = mu / np.sqrt(1.0 + (mu * round_) ** 2) if x.load.model == "circle" else mu
+    D = -size * (x.r * round_ * _couple(u) + along * _force_at(p, u))
     across = np.eye(3)[:, :, None] - u[:, None] * u[None]
-    U, at = skew(u), skew(p)
-    offset = 0.5 * (load.width or 0.0) / L
-    K = np.concatenate([size * along * offset * U, np.zeros((3, 3, T))])
-    if load.length is None:
-        yield Place(k, _rows(np.zeros((3, 3, T)), across), D, K, preload)
+    U, at, none = skew(u), skew(p), np.zeros((3, 3, x.T))
+    width = _or_zero(x.load.width) / x.L
+    K = np.concatenate([0.5 * width * size * along * U, none])
+    if x.load.length is None:
+        yield x.place(_rows(none, across), D, speed, K)
     else:
-        b = load.length / L
+        b, bending = x.load.length / x.L, np.einsum("ijt,jkt->ikt", U, at)
         for side in (1.0, -1.0):
-            bending = np.einsum("ijt,jkt->ikt", U, at)
-            yield Place(k, _rows(-side / b * U, 0.5 * across + side / b * bending), D, K, preload)
-    if load.width:
+            yield x.place(_rows(-side / b * U, 0.5 * across + side / b * bending), D, speed, K)
+    if x.load.width is not None:
         about = _rows(u[None], -np.einsum("it,ijt->jt", u, at)[None])
-        yield Place(
-            k, 2 * L / abs(load.width) * about, -mu * np.sign(v) * _force_at(p, u), np.zeros((6, 1, T)), preload
-        )
+        yield x.place(2 / np.abs(width) * about, -mu * np.sign(v) * _force_at(p, u), speed)
+
+
+_MAKERS = (
+    (rubs_as_contact, _touching),
+    (rubs_as_plane, _plane),
+    (rubs_as_ball, _ball),
+    (lambda row: True, _about_axes),
+)
+"""What makes the places of a pair: the first whose test holds."""
+
+
+def _between_teeth(
+    here: Configuration, load: Friction, dq: Array, at_rest: bool, lines: ContactLines, flank: Array
+) -> Place:
+    """Teeth on the flanks of signs ``(n, T)``: ``mu N`` against the sliding at the pitch point, or the couple ``mu N arm`` against the
+    relative turn; with an efficiency as much of it as leaves that.
+    """
+    s = here.system
+    g = next(g for g, c in enumerate(s.m.couplings) if c.name == load.of)
+    push, P = lines.push(g, flank)
+    way = tuple((step.pair, step.sense) for step in s.m.couplings[g].steps)
+    twist = sum(sense * _twist(here, dq, k) for k, sense in way)
+    rounding, arm = MOTIONS.rounding * np.abs(twist).max(axis=0), mean_sliding(s.m, s.m.couplings[g])
+    if arm is None:
+        u, speed = _unit(twist[3:] + cross(twist[:3], P), rounding)
+        U, arm = _force_at(P, u), 1.0
+    else:
+        u, turn = _unit(twist[:3], rounding)
+        U, arm = _couple(u), arm / s.par.L
+        speed = arm * turn
+    if load.efficiency is None:
+        part = arm * load.coefficient(s.par.L * speed, at_rest)
+    else:
+        part = _part_lost(load, U, twist, push, lines.screws(g))
+    across = push[3:] / (push[3:] ** 2).sum(axis=0)
+    A = np.concatenate([np.zeros((3, here.T)), across])[None]
+    preload = np.broadcast_to(load.preload / s.par.L, here.T)
+    return Place(load.of, len(s.m.pairs) + g, way, A, -part * U, np.zeros((6, 1, here.T)), preload, speed)
+
+
+def _part_lost(load: Friction, U: Array, twist: Array, push: Array, screws: tuple[Array, Array]) -> Array:
+    """Size ``f (T,)`` of a friction wrench ``-f N U`` on gear b that leaves an efficiency of the power.
+
+    The teeth move at the speed v along their line, ``V_b - V_a = v (Z_b / p_b - Z_a / p_a)`` for the screws Z of both gears against their
+    carrier with powers p of a unit push on them. Power goes in at a where v is positive: ``eta = (1 - f c_b) / (1 + f c_a)``.
+    """
+    Za, Zb = (Z / (push * Z).sum(axis=0) for Z in screws)
+    Q = Zb - Za
+    sense = np.sign((twist * Q).sum(axis=0))
+    ca, cb = -sense * (U * Za).sum(axis=0), sense * (U * Zb).sum(axis=0)
+    eta: Any = load.efficiency
+    room = np.where(sense > 0, cb + eta * ca, ca + eta * cb)
+    if (room * np.abs(sense) < 0).any():
+        fault = f"efficiency = {np.min(eta):g}: that little is lost in no teeth of a gear in a ring; expected more than one over the ratio"
+        raise DeclarationError(load.where.removesuffix(": "), [fault])
+    return np.asarray(np.where(room > 0, (1.0 - eta) / np.where(room > 0, room, 1.0), 0.0))
 
 
 @dataclass(frozen=True)
 class Rubbed:
-    """Friction that came about: ``efforts (F, T)``, the part of the wrenches on links b that their own pairs take up ``taken (6, P, T)``,
-    the ``normals (m, T)``; ``outcome (T,)`` by its number and by how much friction would have to
-    fall ``factor (T,)``.
+    """Friction that came about: ``efforts (F, T)``, the part of the wrenches on links b that pairs on their way take up ``taken (6, P,
+    T)``, the ``normals (m, T)``; ``outcome (T,)`` by its number and by how much friction would have to fall ``factor (T,)``.
+
+    Of these, the efforts of ``teeth (F, T)``, what is ``beside (6, P, T)`` them, and their wrenches on gears b ``rubbing (6, n, T)``: they
+    pass the pairs by. How the normal forces grow where the solution ends ``growth (m, T)``, ``speeds (m, T)`` of sliding and ``names``.
     """
 
     efforts: Array
@@ -189,63 +317,91 @@ class Rubbed:
     normals: Array
     outcome: Array
     factor: Array
+    teeth: Array
+    beside: Array
+    rubbing: Array
+    growth: Array
+    speeds: Array
+    names: tuple[str, ...]
 
 
 def rubbed(here: Configuration, places: Sequence[Place], base: Array, unit: dict[int, Array], stress: Array) -> Rubbed:
     """Solve for the normal forces; ``base (6, P, T)`` reactions without friction, ``unit`` those of a unit effort in freedoms, by column.
 
-    Normal forces that ``stress (6, P, s, T)`` may change have to be zero along it: the least friction, no force locked in.
+    Behind the reactions stand the forces on gears b, one a coupling, where teeth rub. Normal forces that ``stress (6, P, s, T)`` may
+    change have to be zero along it: the least friction, no force locked in.
     """
-    s, T, m = here.system, here.T, len(places)
-    dims = [place.A.shape[0] for place in places]
-    starts = np.concatenate([[0], np.cumsum(dims)]).astype(np.intp)
-    parts = [(place.D[:, None], place.K) for place in places]
-    split = [[_parted(here, place.pair, W) for W in both] for place, both in zip(places, parts, strict=True)]
-    a, B, C = np.zeros((starts[-1], T)), np.zeros((starts[-1], m, T)), np.zeros((starts[-1], starts[-1], T))
+    T = here.T
+    starts = np.concatenate([[0], np.cumsum([len(place.A) for place in places])]).astype(np.intp)
+    split = [[_passed_on(here, place.way, W) for W in (place.D[:, None], place.K)] for place in places]
+    preload = np.array([np.broadcast_to(place.preload, T) for place in places])
+    a, B, C = _linear(places, split, starts, base, unit)
+    n, V, outcome, factor, growth = _normals(a + np.einsum("dnt,nt->dt", B, preload), B, C, starts)
     for t, place in enumerate(places):
-        mine = slice(starts[t], starts[t + 1])
-        a[mine] = np.einsum("dct,ct->dt", place.A, base[:, place.pair])
-        for o, other in enumerate(places):
-            for (efforts, taken), into in zip(
-                split[o], (B[mine, o : o + 1], C[mine, starts[o] : starts[o + 1]]), strict=True
-            ):
-                moved = -taken if other.pair == place.pair else np.zeros_like(taken)
-                first = int(s.first_column[other.pair])
-                for j in range(efforts.shape[0]):
-                    moved = moved + unit[first + j][:, place.pair, None] * efforts[j]
-                into[:] = np.einsum("dct,cnt->dnt", place.A, moved)
-    a = a + np.einsum("dnt,n->dt", B, [place.preload for place in places])
-    n, V, outcome, factor = _normals(a, B, C, starts)
-    largest = np.abs(base).max(axis=(0, 1), initial=0.0)
-    for t, place in enumerate(places):
-        loose = np.einsum("dct,cst->dst", place.A, stress[:, place.pair])
+        loose = np.einsum("dct,cst->dst", place.A, stress[:, place.reads])
         if loose.size and (size := np.sqrt((loose**2).sum(axis=(0, 1)))).max(initial=0.0) > STRESSES.unique:
             along = np.abs(np.einsum("dst,dt->st", loose, np.nan_to_num(V[starts[t] : starts[t + 1]]))).max(
                 axis=0, initial=0.0
             )
+            largest = np.abs(base).max(axis=(0, 1), initial=0.0)
             unknown = (size > STRESSES.unique) & (along > STRESSES.unique * size * largest)
             outcome = np.where((outcome == 0) & unknown, OUTCOMES.index("friction not determined"), outcome)
-    n, V = np.where(outcome > 0, np.nan, n), np.where(outcome > 0, np.nan, V)
-    n = n + np.array([place.preload for place in places])[:, None]
-    efforts, taken = np.zeros((s.n_freedoms, T)), np.zeros((6, len(s.m.pairs), T))
+    n, V = np.where(outcome > 0, np.nan, n) + preload, np.where(outcome > 0, np.nan, V)
+    P, F = len(here.system.m.pairs), here.system.n_freedoms
+    efforts, teeth = np.zeros((2, F, T))
+    taken, beside = np.zeros((2, 6, P, T))
+    rubbing = np.zeros((6, len(here.system.m.couplings), T))
     for t, place in enumerate(places):
-        first, mine = int(s.first_column[place.pair]), slice(starts[t], starts[t + 1])
-        for (own, held), size in zip(split[t], (n[t : t + 1], V[mine]), strict=True):
-            efforts[first : first + len(own)] += np.einsum("fnt,nt->ft", own, size)
-            taken[:, place.pair] += np.einsum("cnt,nt->ct", held, size)
-    return Rubbed(efforts, taken, n, outcome, factor)
+        mine = V[starts[t] : starts[t + 1]]
+        for parts, size in zip(split[t], (n[t : t + 1], mine), strict=True):
+            for k, columns, own, held in parts:
+                part = np.einsum("fnt,nt->ft", own, size), np.einsum("cnt,nt->ct", held, size)
+                efforts[columns] += part[0]
+                taken[:, k] += part[1]
+                if place.between_teeth(P):
+                    teeth[columns] += part[0]
+                    beside[:, k] += part[1]
+        if place.between_teeth(P):
+            rubbing[:, place.reads - P] += place.D * n[t] + np.einsum("cdt,dt->ct", place.K, mine)
+    speeds, names = np.array([place.speed for place in places]), tuple(place.of for place in places)
+    return Rubbed(efforts, taken, n, outcome, factor, teeth, beside, rubbing, growth, speeds, names)
 
 
-def _parted(here: Configuration, k: int, W: Array) -> tuple[Array, Array]:
-    """Wrenches ``(6, n, T)`` in a pair as efforts in its freedoms ``(f, n, T)``, and what is left, which it takes up itself."""
-    s = here.system
-    mine = slice(first := int(s.first_column[k]), first + s.m.pairs[k].type.f)
-    efforts = np.einsum("cft,cnt->fnt", here.S[:, mine], W)
-    return efforts, W - np.einsum("cft,fnt->cnt", here.E[:, mine], efforts)
+Passed = list[tuple[int, slice, Array, Array]]
+"""For every pair that n wrenches pass: its place, its freedoms, efforts there ``(f, n, T)`` and what it takes up ``(6, n, T)``."""
 
 
-def _normals(a: Array, B: Array, C: Array, starts: Index) -> tuple[Array, Array, Array, Array]:
-    """Sizes ``n (m, T)`` and normal vectors of all places, outcomes and factors ``(T,)``."""
+def _passed_on(here: Configuration, way: tuple[tuple[int, float], ...], W: Array) -> Passed:
+    """Wrenches on link b as efforts in the freedoms of the pairs on a way, and what is left, which these take up themselves."""
+    out = []
+    for k, sense in way:
+        mine = _freedoms(here, k)
+        efforts = sense * np.einsum("cft,cnt->fnt", here.S[:, mine], W)
+        out.append((k, mine, efforts, sense * W - np.einsum("cft,fnt->cnt", here.E[:, mine], efforts)))
+    return out
+
+
+def _linear(
+    places: Sequence[Place], split: Sequence[Sequence[Passed]], starts: Index, base: Array, unit: dict[int, Array]
+) -> tuple[Array, Array, Array]:
+    """``a (d, T)``, ``B (d, m, T)`` and ``C (d, d, T)`` of the normal vectors ``V = a + B n + C V`` of all places."""
+    T, m = base.shape[-1], len(places)
+    a, B, C = np.zeros((starts[-1], T)), np.zeros((starts[-1], m, T)), np.zeros((starts[-1], starts[-1], T))
+    for t, place in enumerate(places):
+        mine = slice(starts[t], starts[t + 1])
+        a[mine] = np.einsum("dct,ct->dt", place.A, base[:, place.reads])
+        for o, both in enumerate(split):
+            for parts, into in zip(both, (B[mine, o : o + 1], C[mine, starts[o] : starts[o + 1]]), strict=True):
+                for k, columns, efforts, held in parts:
+                    moved = -held if k == place.reads else np.zeros_like(held)
+                    for effort, column in zip(efforts, range(columns.start, columns.stop), strict=True):
+                        moved = moved + unit[column][:, place.reads, None] * effort
+                    into += np.einsum("dct,cnt->dnt", place.A, moved)
+    return a, B, C
+
+
+def _normals(a: Array, B: Array, C: Array, starts: Index) -> tuple[Array, Array, Array, Array, Array]:
+    """Sizes ``n (m, T)`` and normal vectors of all places, outcomes and factors ``(T,)``, and how sizes grow where they end."""
     a, B, C = (np.moveaxis(part, -1, 0) for part in (a, B, C))
     m = B.shape[2]
     linear = np.linalg.solve(np.eye(a.shape[1]) - C, np.concatenate([a[..., None], B], axis=2))
@@ -265,11 +421,11 @@ def _normals(a: Array, B: Array, C: Array, starts: Index) -> tuple[Array, Array,
         slope = np.add.reduceat(unit[..., None] * per, starts[:-1], axis=1)
         slope[~alone] = 0.0  # looked at one by one, below
         n = np.where(done[:, None], n, n - np.linalg.solve(np.eye(m) - slope, off[..., None])[..., 0])
-    outcome, factor = np.zeros(len(a), dtype=int), np.full(len(a), np.nan)
+    outcome, factor, growth = np.zeros(len(a), dtype=int), np.full(len(a), np.nan), np.zeros_like(n)
     for t in np.flatnonzero(~(done & alone)):
-        n[t], outcome[t], factor[t] = _grown(a[t], B[t], C[t], starts)
+        n[t], outcome[t], factor[t], growth[t] = _grown(a[t], B[t], C[t], starts)
     V = free + np.einsum("tdn,tn->td", per, n)
-    return n.T, V.T, outcome, factor
+    return n.T, V.T, outcome, factor, growth.T
 
 
 def _newton(a: Array, B: Array, C: Array, starts: Index, k: float, n: Array) -> tuple[Array, bool]:
@@ -294,8 +450,10 @@ def _slope(V: Array, size: Array, B: Array, starts: Index) -> Array:
     return np.asarray(np.add.reduceat(unit[:, None] * B, starts[:-1], axis=0))
 
 
-def _grown(a: Array, B: Array, C: Array, starts: Index) -> tuple[Array, int, float]:
-    """The solution that is connected with the frictionless one while friction grows; why there is none, and at which part of it."""
+def _grown(a: Array, B: Array, C: Array, starts: Index) -> tuple[Array, int, float, Array]:
+    """The solution that is connected with the frictionless one while friction grows; why there is none, at which part of it, and how sizes
+    grow there.
+    """
     n, _ = _newton(a, B, C, starts, 0.0, np.zeros(B.shape[1]))
     k, step = 0.0, 1 / 64
     while k < 1.0:
@@ -308,7 +466,7 @@ def _grown(a: Array, B: Array, C: Array, starts: Index) -> tuple[Array, int, flo
         step /= 2
         if step < 1e-9:  # far below what tells friction from friction
             return _ended(a, B, C, starts, k, n)
-    return (n, 3, np.nan) if _others(a, B, C, starts, n) else (n, 0, np.nan)
+    return n, 3 if _others(a, B, C, starts, n) else 0, np.nan, 0.0 * n
 
 
 def _rises(a: Array, B: Array, C: Array, starts: Index, k: float, n: Array) -> bool:
@@ -319,16 +477,19 @@ def _rises(a: Array, B: Array, C: Array, starts: Index, k: float, n: Array) -> b
     return bool(np.linalg.det(np.eye(len(n)) - _slope(V, size, k * inverse @ B, starts)) > 0)
 
 
-def _ended(a: Array, B: Array, C: Array, starts: Index, k: float, n: Array) -> tuple[Array, int, float]:
-    """Why the solution ends at a part ``k`` of the friction: without bound, where ``1 - k |V|'`` is singular along n, or a fold."""
+def _ended(a: Array, B: Array, C: Array, starts: Index, k: float, n: Array) -> tuple[Array, int, float, Array]:
+    """Why the solution ends at a part ``k`` of the friction: without bound, where ``1 - k |V|'`` is singular along n, or a fold; the
+    direction in which it is singular.
+    """
     inverse = np.linalg.inv(np.eye(len(a)) - k * C)
     V = inverse @ (a + k * B @ n)
     size = np.add.reduceat(V * V, starts[:-1]) ** 0.5
     without_bound = float(n.max(initial=0.0)) > 1e5 * max(float(np.abs(a).max(initial=0.0)), 1e-300)
-    values = np.linalg.eigvals(_slope(V, size, inverse @ B, starts))
+    slope = _slope(V, size, inverse @ B, starts)
+    values, growth = np.linalg.eigvals(slope), np.abs(np.linalg.svd(np.eye(len(n)) - k * slope)[2][-1])
     real = values.real[(np.abs(values.imag) < 1e-6 * np.abs(values).max()) & (values.real > 0)]
     factor = 1.0 / float(real.max()) if without_bound and real.size and not C.any() else k
-    return n, 1 if without_bound else 2, factor
+    return n, 1 if without_bound else 2, factor, growth
 
 
 def _others(a: Array, B: Array, C: Array, starts: Index, n: Array) -> bool:

@@ -45,6 +45,8 @@ class Site:
     (internal units), against which a sum that cancels is rounding.
     """
 
+    solves_friction = False
+
     def __init__(
         self, here: Configuration, rates: Velocities, coordinates: Array, batch: tuple[int, ...], good: Any, t: Any
     ) -> None:
@@ -56,7 +58,6 @@ class Site:
         self.wrenches = np.zeros((6, len(self.m.links), here.T))
         self.efforts = np.zeros((system.n_freedoms, here.T))
         self.largest = 0.0
-        self.solves_friction = False
 
     def collect(self, loads: tuple[Load, ...]) -> None:
         """Evaluate all loads."""

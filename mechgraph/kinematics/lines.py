@@ -92,6 +92,17 @@ class LineRows:
             out[np.delete(np.arange(6), self.system.graph.span)] = 0.0
         return out
 
+    def screws(self, poses: Array) -> tuple[Array, Array]:
+        """Screws ``(6, T)`` in which both gears of the first row turn against their carrier; a rack slides."""
+        found = []
+        for side, turns in enumerate(self.couplings[0].turning):
+            place = self._places(poses, side, np.array([0]))
+            z = place.axis[:, 0]
+            found.append(
+                np.concatenate([z, cross(place.point[:, 0], z)]) if turns else np.concatenate([np.zeros_like(z), z])
+            )
+        return found[0], found[1]
+
     @property
     def scale(self) -> Array:
         """Relations are lengths: over L."""

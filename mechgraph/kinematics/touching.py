@@ -48,18 +48,18 @@ class ContactLines:
         return np.array([self.here.system.first_column[step.pair] for step in contact.steps], dtype=np.intp)
 
     @cached_property
-    def wrenches(self) -> list[tuple[Array, Array]]:
-        """For every contact the wrench on gear b for a unit multiplier ``(6, 2, T)``, of a positive and of a negative one, and the points
-        ``(3, 2, T)`` at which it acts.
+    def wrenches(self) -> list[tuple[Array, Array, Array]]:
+        """For every contact the wrench on gear b for a unit multiplier ``(6, 2, T)``, of a positive and of a negative one, the points
+        ``(3, 2, T)`` at which it acts, and its normal force ``(2, T)``.
         """
         return [self._of(g, contact) for g, contact in self.contacts]
 
-    def _of(self, g: int, contact: BaseCoupling) -> tuple[Array, Array]:
+    def _of(self, g: int, contact: BaseCoupling) -> tuple[Array, Array, Array]:
         if not isinstance(contact, Contact):
             return self._of_line(g)
         here, columns = self.here, self._columns(contact)
         first, last = contact.steps[0].pair, contact.steps[-1].pair
-        S = [here.S[:, columns[i]] for i in (0, -1)]
+        S = self.screws(g)
         along = S[1][3:] if contact.slides else S[1][:3]
         axes = Axes(here.pair_points[:, first], S[0][:3], here.pair_points[:, last], along, here.system.par.L)
         P, n = self._lines(g, axes)
@@ -73,9 +73,18 @@ class ContactLines:
         pick = np.where(turned, [[1], [0]], [[0], [1]])
         places = np.arange(here.T)
         G = np.stack([(line * size)[:, pick[i], places] for i in range(2)], axis=1)
-        return G, np.stack([P[:, pick[i], places] for i in range(2)], axis=1)
+        points = np.stack([P[:, pick[i], places] for i in range(2)], axis=1)
+        return G, points, np.stack([np.abs(size[pick[i], places]) for i in range(2)])
 
-    def _of_line(self, g: int) -> tuple[Array, Array]:
+    def screws(self, g: int) -> tuple[Array, Array]:
+        """Screws ``(6, T)`` of gears a and b in their turns (of a rack its slide) against their carrier."""
+        here, contact = self.here, self.here.system.m.couplings[g]
+        if isinstance(contact, Contact):
+            first, last = (here.S[:, column] for column in self._columns(contact)[[0, -1]])
+            return first, last
+        return LineRows(here.system, np.array([g])).screws(here.poses)
+
+    def _of_line(self, g: int) -> tuple[Array, Array, Array]:
         """The same of a coupling along a line that the poses tell."""
         here, row = self.here, self.here.system.graph.loop_rows + g
         rows, coupling = LineRows(here.system, np.array([g])), here.system.m.couplings[g]
@@ -83,10 +92,29 @@ class ContactLines:
         P, n = (np.repeat(part, 2, axis=1) for part in (at.point, at.along))
         if isinstance(coupling, LineCoupling) and coupling.other is not None:
             n[:, 1] = rows.lines(here.poses, other=True).along[:, 0]
-        G = np.concatenate([cross(P, n), n]) * here.system.row_scale[row] * here.system.par.L
+        per = np.broadcast_to(here.system.row_scale[row] * here.system.par.L, (2, here.T))
+        G = np.concatenate([cross(P, n), n]) * per
         if here.system.m.planar:
             G[np.delete(np.arange(6), here.system.graph.span)] = 0.0
-        return G, P
+        return G, P, per
+
+    def _acting(self, g: int, flank: Array) -> Mask:
+        """Where the second line of a contact acts, by signs ``(n, T)`` of multipliers."""
+        return np.asarray((flank[g] < 0.0) & self.settled.get(g, np.array(g not in self.moving)))
+
+    def multiplier_of_one(self, g: int, flank: Array) -> Array:
+        """The multiplier ``(T,)`` of a normal force of one, on the flanks of signs ``(n, T)``."""
+        per = self.wrenches[self._number(g)][2]
+        return np.where(flank[g] < 0.0, -1.0, 1.0) / np.where(self._acting(g, flank), per[1], per[0])
+
+    def push(self, g: int, flank: Array) -> tuple[Array, Array]:
+        """The wrench ``(6, T)`` of a normal force of one on gear b, on the flanks of signs ``(n, T)``, and its point ``(3, T)``."""
+        G, P, _ = self.wrenches[self._number(g)]
+        line = np.where(self._acting(g, flank), G[:, 1], G[:, 0])
+        return self.multiplier_of_one(g, flank) * line, np.where(flank[g] < 0.0, P[:, 1], P[:, 0])
+
+    def _number(self, g: int) -> int:
+        return [one for one, _ in self.contacts].index(g)
 
     @cached_property
     def moving(self) -> dict[int, Array]:
@@ -144,9 +172,8 @@ class ContactLines:
         ``flank (n, T)``: the sign of the multiplier that says which line acts.
         """
         out = []
-        for (g, _), (G, _) in zip(self.contacts, self.wrenches, strict=True):
-            there = (flank[g] < 0.0) & self.settled.get(g, np.array(g not in self.moving))
-            acting = np.where(there, G[:, 1], G[:, 0])
+        for (g, _), (G, _, _) in zip(self.contacts, self.wrenches, strict=True):
+            acting = np.where(self._acting(g, flank), G[:, 1], G[:, 0])
             value = multipliers[g]
             out.append(acting.reshape(6, *(1,) * (value.ndim - 1), self.here.T) * value)
         return out
@@ -175,10 +202,15 @@ class ContactLines:
                 out[:, step.pair] -= E.reshape(6, *(1,) * (multipliers.ndim - 2), here.T) * multipliers[g]
         return out
 
+    def on_gears(self, multipliers: Array, flank: Array) -> Array:
+        """For every coupling the wrench on gear b ``(6, n, ..., T)`` for multipliers ``(n, ..., T)``; zero where it acts in freedoms."""
+        out = np.zeros((6, *multipliers.shape))
+        for (g, _), F in zip(self.contacts, self.on_gear(multipliers, flank), strict=True):
+            out[:, g] = F
+        return out
+
     def unit(self, flank: Array) -> list[Array]:
         """For every coupling the wrench on gear b for a unit multiplier, ``(6, 1, T)``; none for one that acts in freedoms."""
-        n = len(self.here.system.m.couplings)
-        out = [np.zeros((6, 0, self.here.T))] * n
-        for (g, _), F in zip(self.contacts, self.on_gear(np.ones((n, self.here.T)), flank), strict=True):
-            out[g] = F[:, None]
-        return out
+        touching = {g for g, _ in self.contacts}
+        units = self.on_gears(np.ones((len(self.here.system.m.couplings), self.here.T)), flank)
+        return [units[:, [g] if g in touching else []] for g in range(units.shape[1])]

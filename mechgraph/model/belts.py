@@ -42,7 +42,7 @@ from mechgraph.fields import (
     second_direction,
 )
 from mechgraph.maths.se3 import Array, cross, identity
-from mechgraph.model.couplings import MeshStep, are_placed, fitting_of, motion_of
+from mechgraph.model.couplings import OF_BELTS, MeshStep, are_placed, fitting_of, motion_of
 from mechgraph.model.lines import LineCoupling, LinePlaces, LinesAt, LinkPlace, Relation, meeting, pose_along, way
 from mechgraph.quantities import FORCE, LENGTH, shown, unknown, wrong
 
@@ -237,6 +237,11 @@ class BeltDrive(LineCoupling):
                 object.__setattr__(self, name, tuple(value))
         object.__setattr__(self, "terms", ())
         object.__setattr__(self, "constant", None)
+
+    @property
+    def rubs(self) -> tuple[str, ...]:  # type: ignore[override]
+        """See ``BaseCoupling``: teeth do not slip."""
+        return () if self.toothed else OF_BELTS
 
     # --- its pulleys -------------------------------------------------------------------------------------------------
 

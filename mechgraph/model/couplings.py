@@ -58,6 +58,8 @@ class BaseCoupling(Described, ABC):
     steps: tuple[Any, ...] = ()
     """Pairs on the way along which the force of the coupling is closed, where it acts along a line of its own."""
 
+    rubs: ClassVar[tuple[str, ...]] = ()
+    """Arguments of ``Friction`` that it takes; none of what does not rub."""
     alone: ClassVar[bool] = True
     """Whether it stands for itself, so that it may be left out and its numbers varied without others."""
 
@@ -276,6 +278,10 @@ def teeth_lines(P: Array, away: Array, trace: Array, pressure_angle: float) -> L
     return np.stack([P, P], axis=1), np.stack([out + over, out - over], axis=1)
 
 
+OF_TEETH = ("mu", "static", "stribeck", "preload", "efficiency")
+OF_BELTS = ("mu", "wrap", "preload")
+
+
 @dataclass(frozen=True)
 class Contact(BaseCoupling):
     """What gears, racks and belts share.
@@ -285,6 +291,7 @@ class Contact(BaseCoupling):
     """
 
     kind: ClassVar[str]
+    rubs: ClassVar[tuple[str, ...]] = OF_TEETH
     slides: ClassVar[bool] = False
     """Whether gear b slides, as a rack does."""
     name: Annotated[str, TEXT("name", default="g1, g2, ...")]
@@ -385,6 +392,14 @@ class Contact(BaseCoupling):
                 f"{self.b!r} need a common carrier"
             )
         return _OnCarrier(Axes(p, z, q, w), senses_a, senses_b[::-1])
+
+    def axes_in(self, m: Any) -> Axes:
+        """The axes of the gears on their carrier, in a mechanism without faults."""
+        steps = self._way(m)
+        assert not isinstance(steps, str)
+        placed = self._axes(m, steps)
+        assert not isinstance(placed, str)
+        return placed.axes
 
     def placed(self, m: Any) -> Self:
         """The same with the coefficients of its freedoms, by their full names; needs sound faults-free gears."""
@@ -579,11 +594,7 @@ class SpurGears(Contact):
         """The normal module, that which the distance of the axes asks for where none is given."""
         if self.module is not None:
             return float(self.module)
-        steps = self._way(m)
-        assert not isinstance(steps, str)
-        placed = self._axes(m, steps)
-        assert not isinstance(placed, str)
-        return float(2 * np.linalg.norm(placed.axes.across) * np.cos(self.helix_angle) / self._sum)
+        return float(2 * np.linalg.norm(self.axes_in(m).across) * np.cos(self.helix_angle) / self._sum)
 
     def lines(self, axes: Axes) -> Lines:
         """See ``Contact``."""
@@ -686,14 +697,22 @@ class BevelGears(Contact):
             for q in at_apex
         ]
 
-    def lines(self, axes: Axes) -> Lines:
-        """See ``Contact``."""
+    def _cone(self, axes: Axes) -> tuple[Array, Array, Array, Array]:
+        """The apex, the axes towards both gears, and half the angle of the pitch cone of a."""
         apex, _ = self._apex(axes)
         ea, eb = (z * np.sign(((p - apex) * z).sum(axis=0)) for p, z in ((axes.pa, axes.za), (axes.pb, axes.zb)))
         cosine = (ea * eb).sum(axis=0)
-        sine = np.sqrt(1.0 - cosine**2)
-        angle = np.arctan2(sine, self.teeth[1] / self.teeth[0] + cosine)
-        side = unit(eb - ea * cosine)
+        return apex, ea, eb, np.arctan2(np.sqrt(1.0 - cosine**2), self.teeth[1] / self.teeth[0] + cosine)
+
+    def cones(self, axes: Axes) -> tuple[float, float]:
+        """Half the angles of both pitch cones."""
+        _, ea, eb, angle = self._cone(axes)
+        return float(angle[0]), float(np.arccos(np.clip((ea * eb).sum(axis=0), -1.0, 1.0))[0] - angle[0])
+
+    def lines(self, axes: Axes) -> Lines:
+        """See ``Contact``."""
+        apex, ea, eb, angle = self._cone(axes)
+        side = unit(eb - ea * (ea * eb).sum(axis=0))
         line = np.cos(angle) * ea + np.sin(angle) * side
         P = apex + line * (self.module * self.teeth[0] / 2 / axes.unit / np.sin(angle))
         away = np.cos(angle) * side - np.sin(angle) * ea
@@ -776,6 +795,7 @@ class Rack(Contact):
     """
 
     kind: ClassVar[str] = "rack"
+    rubs: ClassVar[tuple[str, ...]] = ("preload", "efficiency")
     slides: ClassVar[bool] = True
     radius: Annotated[float, POSITIVE("pitch radius of the pinion", LENGTH)]
     pressure_angle: Annotated[float, PRESSURE] = FULL
@@ -823,6 +843,7 @@ class Belt(Contact):
     """
 
     kind: ClassVar[str] = "belt"
+    rubs: ClassVar[tuple[str, ...]] = OF_BELTS
     radii: Annotated[Any, TWO_POSITIVE("of both pulleys", LENGTH)]
     crossed: Annotated[bool, FLAG("whether the strands cross")] = False
 
@@ -830,6 +851,12 @@ class Belt(Contact):
     def ratio(self) -> float:
         """``r_b / r_a``."""
         return self.radii[1] / self.radii[0]
+
+    def wrap(self, axes: Axes) -> float:
+        """The smaller angle of wrap."""
+        a, b = self.radii
+        reach = -(a + b) if self.crossed else abs(a - b)
+        return float(np.pi - 2 * np.arcsin(reach / np.linalg.norm(axes.across)))
 
     def misfits(self, axes: Axes, fitting: float) -> list[str]:
         """See ``Contact``."""

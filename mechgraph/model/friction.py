@@ -1,18 +1,21 @@
-"""Dry friction in pairs: what a user declares; ``mechgraph.force.friction`` solves for it."""
+"""Dry friction in pairs and between teeth: what a user declares; ``mechgraph.force.friction`` solves for it."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from copy import copy
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import NUMBER, POSITIVE, TEXT
+from mechgraph.maths.se3 import Array
 from mechgraph.model.loads import BASIC_LOADS, Load, LoadSite
 from mechgraph.pairs.factors import UNIT_TWISTS
 from mechgraph.pairs.pair_type import PairType
-from mechgraph.quantities import FORCE, LENGTH, unknown, wrong
+from mechgraph.quantities import FORCE, FORCE_PER_VELOCITY, LENGTH, MOMENT_PER_RATE, unknown, wrong
 
 SINGLE = frozenset(UNIT_TWISTS.values())
 """Twists of freedoms that turn about or slide along an axis of the frame before them."""
@@ -20,36 +23,40 @@ SINGLE = frozenset(UNIT_TWISTS.values())
 
 @dataclass(frozen=True, eq=False)
 class Friction(Load):
-    """Declare dry friction in a pair: it acts against the motion, in proportion to the normal forces of the pair.
+    """Declare dry friction in a pair or between teeth: it acts against the motion, in proportion to normal forces.
 
     A turn about an axis rubs as a journal: couple ``rho |F|`` of the radial force F, ``rho = radius sin(atan mu)`` (the friction
     circle), and ``mu thrust_radius |F_axial|`` where ``thrust_radius`` is given. A slide: ``mu |F|`` at the shoes, ``width`` puts
     them off the axis and bears the moment about it. Turn and slide along one axis share one force. A screw: ``radius |Q| (tan(lead
     +- phi) - +-tan lead)``, ``tan phi = mu / cos flank``. A ball: ``rho |F|`` against the relative angular velocity. A contact:
     ``mu N`` against its sliding. A plane: ``mu |F|`` at the center of pressure against the velocity there, its turn through
-    ``radius``. With ``length`` two places ``+-length / 2`` along the axis carry ``F / 2 +- M x z / length``. Solved in ``solve``
-    and ``study``, not in ``respond``. Source: J. E. Shigley and J. J. Uicker, Theory of Machines and Mechanisms, 1995, chapter 13
-    (friction circle).
+    ``radius``. With ``length`` two places ``+-length / 2`` along the axis carry ``F / 2 +- M x z / length``.
+
+    Teeth: worms and crossed gears ``mu N`` against the sliding at the pitch point; others the couple ``mu N`` times the mean distance of
+    the contact from the pitch point against their relative turn, or what leaves ``efficiency`` of the power that goes in. A flat belt:
+    a limit alone, ``T1 / T2 <= e^(mu wrap)`` (Euler, Eytelwein); ``preload`` is a tension more in its strands.
+
+    Solved in ``solve`` and ``study``. Sources: J. E. Shigley and J. J. Uicker, Theory of Machines and Mechanisms, 1995, chapter 13
+    (friction circle); G. Niemann and H. Winter, Maschinenelemente II, 2003, chapter 21 (teeth).
 
     Examples
     --------
     >>> import mechgraph as mg
-    >>> m = mg.load("four-bar")
-    >>> given = {"A": mg.Motion(0.5, velocity=10.0)}
-    >>> smooth, rough = (
-    ...     mg.solve(m, given, loads=[*m.loads, *more]) for more in ([], [mg.Friction("A", mu=0.1, radius=0.02)])
-    ... )
-    >>> more = rough["A"].effort - smooth["A"].effort
-    >>> bool(np.isclose(more, 0.02 * np.sin(np.arctan(0.1)) * rough["A"].magnitude)[0]) if (
-    ...     np := __import__("numpy")
-    ... ) else None
+    >>> import numpy as np
+    >>> m, given = mg.load("four-bar"), {"A": mg.Motion(0.5, velocity=10.0)}
+    >>> smooth = mg.solve(m, given)
+    >>> rough = mg.solve(m, given, loads=[*m.loads, mg.Friction("A", mu=0.1, radius=0.02)])
+    >>> couple = 0.02 * np.sin(np.arctan(0.1)) * rough["A"].magnitude
+    >>> np.allclose(rough["A"].effort - smooth["A"].effort, couple)
     True
     """
 
     kind: ClassVar[str] = "friction"
     subject: ClassVar[str] = "friction of {of}"
-    of: Annotated[str, TEXT("name of the pair")]
-    mu: Annotated[float, NUMBER("coefficient of friction", minimum=0.0)] = field(kw_only=True)
+    of: Annotated[str, TEXT("name of the pair, or of gears, a rack, a worm or a belt")]
+    mu: Annotated[
+        float | None, NUMBER("coefficient of friction", minimum=0.0, default="`efficiency` tells the losses")
+    ] = field(default=None, kw_only=True)
     static: Annotated[float | None, NUMBER("coefficient at rest, `mu` or more", minimum=0.0, default="mu")] = field(
         default=None, kw_only=True
     )
@@ -76,16 +83,26 @@ class Friction(Load):
         TEXT("`circle`: the force that the pair transmits is tangent to the circle; `total`: rho = mu radius", choices=("circle", "total"),
              default="circle"),
     ] = field(default="circle", kw_only=True)  # fmt: skip
-    viscous: Annotated[float, NUMBER("effort per rate in every single freedom", minimum=0.0)] = field(
-        default=0.0, kw_only=True
-    )
+    viscous: Annotated[
+        float, NUMBER("effort per rate in every single freedom", FORCE_PER_VELOCITY, MOMENT_PER_RATE, minimum=0.0)
+    ] = field(default=0.0, kw_only=True)
     preload: Annotated[float, NUMBER("normal force more at every place", FORCE, minimum=0.0)] = field(
         default=0.0, kw_only=True
     )
+    stribeck: Annotated[
+        float | None,
+        POSITIVE("v of the coefficient mu + (static - mu) exp(-(s / v)^2) at the sliding speed s", (1, 0, -1), default="mu at any speed"),
+    ] = field(default=None, kw_only=True)  # fmt: skip
+    efficiency: Annotated[float | None, POSITIVE("of teeth, out over in whichever way power goes; at most 1")] = field(
+        default=None, kw_only=True
+    )
+    wrap: Annotated[
+        float | None, NUMBER("of a belt: angle of wrap", degrees=True, minimum=0.0, default="as it lies")
+    ] = field(default=None, kw_only=True)
 
     def act(self, site: LoadSite) -> None:
         """What is viscous, ``-viscous x'``; the rest is solved with the reactions, and refused where nothing does so."""
-        if not getattr(site, "solves_friction", False):
+        if not site.solves_friction:
             raise DeclarationError(
                 self.where.removesuffix(": "),
                 [
@@ -93,7 +110,7 @@ class Friction(Load):
                 ],
             )
         for name in site.freedoms_of(self.of) if self.viscous else ():
-            site.add_effort(name, -self.viscous * site.freedom(name)[1])
+            site.add_effort(name, -site.number(self.viscous) * site.freedom(name)[1])
 
     @property
     def by_position(self) -> bool:
@@ -108,56 +125,122 @@ class Friction(Load):
     @property
     def coefficient_at_rest(self) -> float:
         """``static``, or mu."""
-        return self.mu if self.static is None else self.static
+        static: float = self._mu if self.static is None else self.static
+        return static
+
+    @property
+    def _mu(self) -> float:
+        return 0.0 if self.mu is None else self.mu
+
+    def coefficient(self, speed: Array, at_rest: bool = False) -> Array:
+        """At sliding speeds ``(T,)`` in the user's units, or ``at_rest``: on the verge of sliding."""
+        rest, mu = self.coefficient_at_rest, self._mu
+        if at_rest or self.stribeck is None:
+            return np.broadcast_to(rest if at_rest else mu, speed.shape)
+        return np.asarray(mu + (rest - mu) * np.exp(-np.square(speed / self.stribeck)))
+
+    def in_own_units(self, units: Mapping[str, str], turns: Callable[[Any], bool]) -> Self:
+        """See ``Load``."""
+        return self.without_quantities(units, self._turns(turns))
+
+    def converted(self, base: tuple[float, float, float], turns: Callable[[Any], bool]) -> Self:
+        """See ``Load``."""
+        return self.in_units(base, self._turns(turns))
+
+    def _turns(self, turns: Callable[[Any], bool]) -> bool:
+        """Whether its pair turns."""
+        return any(turns(name) for name in (self.of, *(f"{self.of}.R{axis}" for axis in "xyz")))
+
+    def with_numbers(self, number: Callable[[Any], Any]) -> Friction:
+        """The same with what a function makes of its numbers."""
+        out = copy(self)
+        vars(out).update({name: number(getattr(self, name)) for name in self.formats})
+        return out
+
+    # --- faults ------------------------------------------------------------------------------------------------------
 
     def faults(self, names: Any) -> list[str]:
         """What is wrong with this load."""
         found = super().faults(names)
-        pair = next((p for p in names.pairs if p.name == self.of), None)
-        if pair is None:
-            return [*found, self.where + unknown("pair", self.of, [p.name for p in names.pairs])]
-        if found or not isinstance(pair.type, PairType):
+        pair: Any = next((p for p in names.pairs if p.name == self.of), None)
+        coupling = coupling_of(names, self)
+        if pair is None and coupling is None:
+            known = [*(p.name for p in names.pairs), *(c.name for c in names.couplings)]
+            return [*found, self.where + unknown("pair", self.of, known)]
+        if found or (coupling is None and not isinstance(pair.type, PairType)):
             return found
-        if self.static is not None and self.static < self.mu:
-            found.append(self.where + wrong(self.static, "static", f"mu = {self.mu:g} or more"))
-        return found + [self.where + fault for fault in self._misplaced(pair)]
+        if next(load for load in names.loads if isinstance(load, Friction) and load.of == self.of) is not self:
+            found.append("of: is declared before; a pair or coupling takes one mg.Friction")
+        found += self._of_pair(pair) if coupling is None else self._of_coupling(coupling)
+        found += self._of_numbers()
+        return [self.where + fault for fault in found]
 
-    def _misplaced(self, pair: Any) -> list[str]:
+    def _of_numbers(self) -> Iterator[str]:
+        if self.mu is None and self.efficiency is None:
+            yield "mu: is missing; give the coefficient of friction"
+        if self.static is not None and self.static < self._mu:
+            yield wrong(self.static, "static", f"mu = {self._mu:g} or more")
+        if self.efficiency is not None and self.efficiency > 1.0:
+            yield wrong(self.efficiency, "efficiency", "a number above 0 and at most 1")
+        if self.efficiency is not None and self.mu is not None:
+            yield "mu, efficiency: both are given; give one of them"
+
+    def _misplaced(self, taken: Iterable[str], what: str) -> Iterator[str]:
+        """Arguments without meaning."""
+        for name, default in zip(self.formats, self._defaults, strict=True):
+            if name not in ("of", "mu", *taken) and getattr(self, name) != default:
+                yield f"{name}: has no meaning for {what}; leave it out"
+
+    def _of_coupling(self, coupling: Any) -> Iterator[str]:
+        if not coupling.rubs:
+            yield f"of: coupling {self.of}: nothing of it rubs; expected gears, a rack, a worm or a flat belt (toothed=False)"
+            return
+        yield from self._misplaced(coupling.rubs, f"a {coupling.kind} coupling")
+        if self.mu is not None and "mu" not in coupling.rubs:
+            yield "mu: takes the numbers of its teeth; declare mg.Gear, mg.GearRack and mg.Mesh, or give efficiency="
+
+    def _of_pair(self, pair: Any) -> Iterator[str]:
         """Numbers without meaning for the pair, and those that are missing."""
         row = pair.type
-        rows = {
-            "journal": rubs_as_journal(row),
-            "slide": rubs_as_slide(row),
-            "screw": row.takes_pitch,
-            "ball": rubs_as_ball(row),
-            "plane": rubs_as_plane(row),
-        }
-        rolls = pair.roller is not None
-        if rolls or not (any(rows.values()) or row.touching):
-            why = "a roller rolls" if rolls else "nothing of it rubs under a normal force"
-            return [
-                f"of: pair {pair.name} of type {row.symbol}: {why}; expected one that turns about, slides along or touches at a place"
-            ]
-        takes = {
-            "radius": any(rows[one] for one in ("journal", "screw", "ball", "plane")), "thrust_radius": rows["journal"],
-            "width": rows["slide"],
-            "length": rows["journal"] or rows["slide"], "flank": rows["screw"],
-        }  # fmt: skip
-        out = [
-            f"{name}: has no meaning for type {row.symbol}; leave it out"
-            for name, taken in takes.items()
-            if not taken and getattr(self, name)
-        ]
-        if self.radius is None and takes["radius"] and not rows["plane"]:
-            out.append(f"radius: type {row.symbol} turns; give the radius at which it rubs")
+        ways = [way for way in WAYS if way.of(row)]
+        if pair.roller is not None or not ways:
+            why = "nothing of it rubs under a normal force" if pair.roller is None else "a roller rolls"
+            yield f"of: pair {pair.name} of type {row.symbol}: {why}; expected one that turns about, slides along or touches at a place"
+            return
+        taken = {*OF_PAIRS, *(name for way in ways for name in (*way.needs, *way.takes))}
+        yield from self._misplaced(taken, f"type {row.symbol}")
+        if self.radius is None and any(way.needs for way in ways):
+            yield f"radius: type {row.symbol} turns; give the radius at which it rubs"
+        if self.width == 0.0:
+            yield wrong(self.width, "width", "a number other than 0, or leave it out")
+        if self.viscous and len({f.turns for f in row.freedoms}) > 1:
+            yield f"viscous: type {row.symbol} turns and slides, in two units; give mg.Spring(freedom=, damping=) instead"
         if row.takes_pitch and self.radius is not None:
             lead = np.arctan2(abs(pair.pitch_per_radian), self.radius)
             phi = np.arctan(self.coefficient_at_rest / np.cos(np.arctan(np.tan(self.flank) * np.cos(lead))))
             if lead + phi >= 0.5 * np.pi:
-                out.append(
-                    f"mu: a thread with lead angle {np.rad2deg(lead):.4g} deg and friction angle {np.rad2deg(phi):.4g} has no finite force"
-                )
-        return out
+                angles = f"lead angle {np.rad2deg(lead):.4g} deg and friction angle {np.rad2deg(phi):.4g}"
+                yield f"mu: a thread with {angles} has no finite force"
+
+
+def coupling_of(m: Any, load: Any) -> Any:
+    """The coupling that a friction names, of a belt its first span; None for one of a pair."""
+    return next((c for c in m.couplings if load.of in (c.name, getattr(c, "belt", None))), None)
+
+
+def rubbing_loads(m: Any, loads: Iterable[Load], number: Callable[[Any], Any]) -> list[Friction]:
+    """The friction among loads that exerts forces, which belts do not, with the numbers of every position."""
+    out = []
+    for load in loads:
+        if isinstance(load, Friction) and "wrap" not in getattr(coupling_of(m, load), "rubs", ()):
+            out.append(load.with_numbers(number))
+    return out
+
+
+def pairs_of(m: Any, load: Friction) -> list[int]:
+    """Places of the pair that rubs, or of those on the way between gears."""
+    coupling = coupling_of(m, load)
+    return [m.place_of_pair(load.of)] if coupling is None else [step.pair for step in coupling.steps]
 
 
 def rubs_as_journal(row: PairType) -> bool:
@@ -176,6 +259,11 @@ def rubs_as_slide(row: PairType) -> bool:
     return not row.touching and _bears(row) and sum(_is(f, turn=False) for f in row.freedoms) == 1
 
 
+def rubs_as_screw(row: PairType) -> bool:
+    """Whether it turns along a thread."""
+    return row.takes_pitch
+
+
 def rubs_as_ball(row: PairType) -> bool:
     """Whether it turns as a ball and bears forces in all directions."""
     return not row.touching and len(row.freedoms) == 3 and not any(row.drivable) and len(row.component_names) == 3
@@ -191,6 +279,11 @@ def rubs_as_plane(row: PairType) -> bool:
     )
 
 
+def rubs_as_contact(row: PairType) -> bool:
+    """Whether its elements touch at a place."""
+    return row.touching is not None
+
+
 def _is(freedom: Any, *, turn: bool) -> bool:
     return freedom.turns is turn and freedom.twist in SINGLE and not any(freedom.per_pitch)
 
@@ -198,6 +291,26 @@ def _is(freedom: Any, *, turn: bool) -> bool:
 def _bears(row: PairType) -> bool:
     """Whether it bears forces across its axes: at least two components that are forces, in a plane one."""
     return sum(not c.is_couple for c in row.reactions or ()) >= (2 if row.normal is None else 1)
+
+
+class _Way(NamedTuple):
+    """A way in which pairs rub: which ones, and the arguments of ``Friction`` that it needs and takes."""
+
+    of: Callable[[PairType], bool]
+    needs: tuple[str, ...] = ()
+    takes: tuple[str, ...] = ()
+
+
+OF_PAIRS = ("static", "stribeck", "model", "viscous", "preload", "on")
+"""Arguments that all pairs take."""
+WAYS = (
+    _Way(rubs_as_journal, ("radius",), ("thrust_radius", "length")),
+    _Way(rubs_as_slide, (), ("length", "width")),
+    _Way(rubs_as_screw, ("radius",), ("length", "flank")),
+    _Way(rubs_as_ball, ("radius",)),
+    _Way(rubs_as_plane, (), ("radius",)),
+    _Way(rubs_as_contact),
+)
 
 
 LOADS: dict[str, type[Load]] = {**BASIC_LOADS, Friction.kind: Friction}

@@ -7,16 +7,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import acos, cos, pi, sin, sqrt, tan
-from typing import Any
+from itertools import pairwise
+from math import acos, atan, cos, pi, sin, sqrt, tan
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mechgraph.errors import DeclarationError
+from mechgraph.model.couplings import Axes, BaseCoupling, BevelGears, Rack, SpurGears
 from mechgraph.model.gears import Gear, tip_radius
-from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.meshes import Mesh, Parallel, WithRack
+from mechgraph.model.meshes import Bevels, Mesh, Parallel, WithRack
 from mechgraph.quantities import door
+
+if TYPE_CHECKING:
+    from mechgraph.model.mechanism import Mechanism
 
 NAN2 = (float("nan"), float("nan"))
 
@@ -130,13 +134,8 @@ def _overlap(met: Any) -> float:
 def _parallel(met: Parallel, mesh: Mesh) -> MeshFacts:
     one, two, d, w = met.one, met.two, met.distance, met.working_angle
     inner = one.internal or two.internal
-    shorter = 0.0
-    if not inner:
-        shorter = max(0.0, met.shifts - (d - one.radius - two.radius) / one.module)
-    tips, bases = (tip_radius(one, shorter), tip_radius(two, shorter)), (one.base_radius, two.base_radius)
-    ways = [np.sign(k) * sqrt(max(tip**2 - k**2, 0.0)) for tip, k in zip(tips, bases, strict=True)]
-    length = sum(ways) + (1.0 if inner else -1.0) * d * sin(w)
-    contact = float(length / (2 * pi * abs(bases[0]) / one.teeth))
+    tips, bases = _tips(met), (one.base_radius, two.base_radius)
+    contact = sum(_reaches(bases, tips, w)) / (2 * pi * abs(bases[0]) / one.teeth)
     backlash = met.backlash + mesh.backlash
     radii = abs(bases[0]) / cos(w), abs(bases[1]) / cos(w)
     faults = [
@@ -146,18 +145,35 @@ def _parallel(met: Parallel, mesh: Mesh) -> MeshFacts:
     ]
     if contact < 1.0:
         faults.append(f"contact ratio {contact:.4g}: teeth part before the next ones meet; expected more than 1")
-    faults += list(_interference(met, tips, ways)) if not inner else list(_inside(met, tips))
+    faults += list(_interference(met, tips)) if not inner else list(_inside(met, tips))
     return MeshFacts(
         "parallel", two.teeth / one.teeth, d, w, radii, tips, (_root(one), _root(two)), met.asked_shifts, contact, _overlap(met), backlash,
         (backlash / radii[0], backlash / radii[1]), (least_shift(one), least_shift(two)), tuple(faults),
     )  # fmt: skip
 
 
-def _interference(met: Parallel, tips: Any, ways: list[Any]) -> Iterator[str]:
+def _tips(met: Parallel) -> tuple[float, float]:
+    """Radii of the tip circles, shortened to keep the clearance."""
+    one, two, shorter = met.one, met.two, 0.0
+    if not (one.internal or two.internal):
+        shorter = max(0.0, met.shifts - (met.distance - one.radius - two.radius) / one.module)
+    return tip_radius(one, shorter), tip_radius(two, shorter)
+
+
+def _reaches(bases: tuple[float, float], tips: tuple[float, float], w: float) -> tuple[float, float]:
+    """How far from the pitch point both tips reach along the line of action; base radii are negative with teeth inside."""
+    one, two = (
+        float(np.sign(k)) * (sqrt(max(tip**2 - k**2, 0.0)) - abs(k) * tan(w))
+        for k, tip in zip(bases, tips, strict=True)
+    )
+    return one, two
+
+
+def _interference(met: Parallel, tips: Any) -> Iterator[str]:
     """Tips that reach below the base circle of the other gear along the line of action."""
     whole = met.distance * sin(met.working_angle)
-    for gear, mate, way in ((met.one, met.two, ways[0]), (met.two, met.one, ways[1])):
-        if way > whole * (1 + 1e-12):
+    for gear, mate, tip in ((met.one, met.two, tips[0]), (met.two, met.one, tips[1])):
+        if sqrt(max(tip**2 - gear.base_radius**2, 0.0)) > whole * (1 + 1e-12):
             yield f"the tips of {gear.name!r} reach below the base circle of {mate.name!r}: involutes interfere"
 
 
@@ -178,11 +194,7 @@ def _inside(met: Parallel, tips: Any) -> Iterator[str]:
 def _rack(met: WithRack, mesh: Mesh) -> MeshFacts:
     pinion, a = met.pinion, met.pinion.transverse_angle
     distance = -float((np.ravel(met.there.point - met.at.point)) @ np.ravel(met.there.mark))
-    tip = tip_radius(pinion)
-    # the tip line of the rack is a module above its pitch line
-    behind = (pinion.module - (distance - pinion.radius)) / sin(a)
-    length = sqrt(max(tip**2 - pinion.base_radius**2, 0.0)) - pinion.radius * sin(a) + behind
-    contact = length / (2 * pi * pinion.base_radius / pinion.teeth)
+    tip, contact = tip_radius(pinion), sum(_reaches_of_rack(met)) / (2 * pi * pinion.base_radius / pinion.teeth)
     backlash = 2.0 * (distance - pinion.radius - pinion.module * pinion.shift) * tan(a) + mesh.backlash
     faults = []
     if pinion.shift < least_shift(pinion) - 1e-9:
@@ -199,3 +211,88 @@ def _rack(met: WithRack, mesh: Mesh) -> MeshFacts:
         (distance - pinion.radius) / pinion.module, contact, _overlap(met), backlash, both(backlash / pinion.radius, 0.0),
         both(least_shift(pinion), nan), tuple(faults),
     )  # fmt: skip
+
+
+def _reaches_of_rack(met: WithRack) -> tuple[float, float]:
+    """How far the tips of the pinion and of the rack reach along the line of action."""
+    pinion, a = met.pinion, met.pinion.transverse_angle
+    distance = -float((np.ravel(met.there.point - met.at.point)) @ np.ravel(met.there.mark))
+    tip = sqrt(max(tip_radius(pinion) ** 2 - pinion.base_radius**2, 0.0))
+    # the tip line of the rack is a module above its pitch line
+    return tip - pinion.radius * sin(a), (pinion.module - (distance - pinion.radius)) / sin(a)
+
+
+# --- how far from the pitch point teeth touch -------------------------------------------------------------------------------
+
+
+def mean_sliding(m: Mechanism, coupling: BaseCoupling) -> float | None:
+    """Mean distance ``s`` of the contact of teeth from their pitch point: a normal force N loses ``mu N s |w_b - w_a|``. None of worms
+    and crossed gears, which slide at the pitch point; NaN where the numbers of the teeth are not known.
+
+    The same load on all teeth in contact. For contact ratios ``e = e_1 + e_2`` of 1 and more, no part above 1, it is ``p (1 - e + e_1^2 +
+    e_2^2) / 2`` with the base pitch p: the loss of Niemann and Winter.
+    """
+    of = coupling.seen(m) if isinstance(coupling, Mesh) else coupling
+    path = next((make for kind, make in PATHS.items() if isinstance(of, kind)), None)
+    return None if path is None else _mean_distance(*path(m, of))
+
+
+def _mean_distance(one: float, two: float, pitch: float) -> float:
+    """Mean of ``|s| / n`` over a base pitch for teeth in contact from ``-one`` to ``two``, n of them where one is at s."""
+    if not np.isfinite(one + two):
+        return float("nan")
+    steps = pitch * np.arange(np.ceil((one + two) / pitch))
+    cuts = np.unique(np.clip([0.0, *(steps - one), *(two - steps)], -one, two))
+    total = 0.0
+    for low, high in pairwise(cuts):
+        s = (low + high) / 2
+        total += abs(high**2 - low**2) / 2 / (np.floor((s + one) / pitch) + np.floor((two - s) / pitch) + 1)
+    return float(total / pitch)
+
+
+Path = tuple[float, float, float]
+"""How far both tips reach from the pitch point along the line of action, and the base pitch."""
+
+
+def _path_of_spur(m: Mechanism, c: SpurGears) -> Path:
+    """Of gears without profile shift."""
+    module, sides = c.module_in(m), [-1.0 if c.internal and z == max(c.teeth) else 1.0 for z in c.teeth]
+    w = atan(tan(c.pressure_angle) / cos(c.helix_angle))
+    radii = [module * z / (2 * cos(c.helix_angle)) for z in c.teeth]
+    return _standard(sides, radii, module, w, c.teeth[0])
+
+
+def _standard(sides: list[float], radii: list[float], module: float, w: float, teeth: float) -> Path:
+    bases = (sides[0] * radii[0] * cos(w), sides[1] * radii[1] * cos(w))
+    tips = (radii[0] + sides[0] * module, radii[1] + sides[1] * module)
+    return *_reaches(bases, tips, w), 2 * pi * radii[0] * cos(w) / teeth
+
+
+def _path_of_bevel(m: Mechanism, c: BevelGears, axes: Axes | None = None) -> Path:
+    """Of the spur gears on the back cones (Tredgold), which turn against each other as the bevel gears do."""
+    axes = c.axes_in(m) if axes is None else axes
+    cones = c.cones(axes)
+    w = atan(tan(c.pressure_angle) / cos(c.spiral_angle))
+    sides = [float(np.sign(cos(cone))) for cone in cones]
+    radii = [c.module * z / (2 * abs(cos(cone))) for z, cone in zip(c.teeth, cones, strict=True)]
+    return _standard(sides, radii, c.module * cos(c.spiral_angle), w, c.teeth[0] / abs(cos(cones[0])))
+
+
+def _path_of_parallel(m: Mechanism, met: Parallel) -> Path:
+    bases = (met.one.base_radius, met.two.base_radius)
+    return *_reaches(bases, _tips(met), met.working_angle), 2 * pi * abs(bases[0]) / met.one.teeth
+
+
+def _path_of_rack(m: Mechanism, met: WithRack) -> Path:
+    return *_reaches_of_rack(met), 2 * pi * met.pinion.base_radius / met.pinion.teeth
+
+
+PATHS: dict[type, Any] = {
+    SpurGears: _path_of_spur,
+    BevelGears: _path_of_bevel,
+    Rack: lambda m, c: (np.nan, np.nan, 1.0),
+    Parallel: _path_of_parallel,
+    WithRack: _path_of_rack,
+    Bevels: lambda m, met: _path_of_bevel(m, met.bevels, met.axes),
+}
+"""Where teeth touch, of gears that do not slide at their pitch point."""

@@ -61,7 +61,8 @@ class LineCoupling(BaseCoupling):
     ``linear``: whether the relation is one of freedoms with constant coefficients, so that it is solved as that; else it is evaluated
     from the poses. ``numbers``: its lengths. ``period``: by what its value grows from tooth to tooth, where the residue tells as much.
     ``other``: the relation of the other flank of teeth, which negative multipliers press on, its line reversed so that the sense of the
-    relation stays. ``longer``: by how much the closed row is above its value at the start.
+    relation stays. ``longer``: by how much the closed row is above its value at the start. ``turning``: which
+    of both turn about their axes; a rack slides along its own.
     """
 
     ends: tuple[LinkPlace, LinkPlace]
@@ -71,6 +72,7 @@ class LineCoupling(BaseCoupling):
     period: float = float("inf")
     longer: float = 0.0
     linear: bool = False
+    turning: tuple[bool, bool] = (True, True)
     is_force = True
 
     @property

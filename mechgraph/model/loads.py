@@ -62,7 +62,12 @@ Breaks = Annotated[Any, BREAKS("of a function of time: when it jumps or bends, f
 
 
 class LoadSite(Protocol):
-    """What a load sees of a mechanism at a batch of ``T`` positions (component axes first, positions last)."""
+    """What a load sees of a mechanism at a batch of ``T`` positions (component axes first, positions last).
+
+    ``solves_friction``: whether forces that follow the reactions are found there.
+    """
+
+    solves_friction: bool
 
     def add_weight(self, acceleration: Any) -> None:
         """Force ``m g`` at the mass center of every link, for one ``g (3,)``."""

@@ -16,6 +16,7 @@ from mechgraph.fields import (
 from mechgraph.maths.se3 import Array, cross, identity
 from mechgraph.model.belts import angle
 from mechgraph.model.couplings import (
+    OF_TEETH,
     Axes,
     BevelGears,
     MeshStep,
@@ -66,6 +67,7 @@ class Mesh(LineCoupling):
     """
 
     kind: ClassVar[str] = "mesh"
+    rubs: ClassVar[tuple[str, ...]] = OF_TEETH
     name: Annotated[str, TEXT("name", default="g1, g2, ...")]
     a: Annotated[str, TEXT("the first gear")]
     b: Annotated[str, TEXT("the second gear")]
@@ -156,6 +158,7 @@ class Mesh(LineCoupling):
             "period": met.period,
             "held": met.held,
             "other": flanks[1] if self.flank == "auto" else flanks[0],
+            "turning": tuple(not isinstance(gear, GearRack) for gear in (one, two)),
         }
         return self._put(m, steps, coefficients, **known)
 
@@ -567,7 +570,8 @@ class Bevels(Still):
     held = (True, True)
 
     @property
-    def _pair(self) -> BevelGears:
+    def bevels(self) -> BevelGears:
+        """The same as gears on pairs of their own."""
         one, two = self.one, self.two
         return BevelGears(
             "", one.name, two.name, (one.teeth, two.teeth), one.module, one.pressure_angle, one.spiral_angle
@@ -585,10 +589,10 @@ class Bevels(Still):
 
     def misfits(self, fitting: float) -> list[str]:
         """See ``Meeting``."""
-        found = self.faults or self._pair.misfits(self.axes, fitting)
+        found = self.faults or self.bevels.misfits(self.axes, fitting)
         if found:
             return found
-        apex = self._pair._apex(self.axes)[0]
+        apex = self.bevels._apex(self.axes)[0]
         ea, eb = (
             z * np.sign(dot(p - apex, z)) for p, z in ((self.axes.pa, self.axes.za), (self.axes.pb, self.axes.zb))
         )
@@ -602,7 +606,7 @@ class Bevels(Still):
 
     def lines(self) -> tuple[Array, Array]:
         """See ``Still``."""
-        return self._pair.lines(self.axes)
+        return self.bevels.lines(self.axes)
 
 
 class Worms(Still):

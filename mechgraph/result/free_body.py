@@ -698,7 +698,8 @@ def free_body(s: Solution, link: str) -> FreeBody:
             if link_of == link:
                 mesh = s.coupling(c.name)
                 assert isinstance(mesh, CouplingResult)
-                wrench = sign * np.concatenate([np.cross(mesh.point, mesh.force), mesh.force], axis=-1)
+                moment = mesh.moment + np.cross(mesh.point, mesh.force)
+                wrench = sign * np.concatenate([moment, mesh.force], axis=-1)
                 add(c.name, "contact", marker.point, wrench, "force of the other gear, about the middle of this one")
     for place, load in enumerate(m.loads):
         found = s.load(place).wrenches

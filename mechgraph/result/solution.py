@@ -49,7 +49,7 @@ from mechgraph.result.values import (
     PassedCrossing,
     Unbalanced,
 )
-from mechgraph.result.views import BeltResult, CouplingResult, LinkResult, PairResult, PositionLabels
+from mechgraph.result.views import BeltResult, CouplingResult, LinkResult, PairResult, PositionLabels, losses
 
 if TYPE_CHECKING:
     import pandas
@@ -587,16 +587,26 @@ class Solution(Shown):
     @property
     def losses(self) -> dict[str, Array]:
         """Power lost in the pairs with friction, by name, ``(...)``; never negative."""
-        return self._values.losses()
+        return losses(self._values)
 
     @property
     def self_locking(self) -> Array:
-        """Whether the mechanism stays at rest with all drives off ``(...)``: effort 0 is within the range of every drive."""
-        ends = [
-            self[self.whole.pairs[k].name].effort_range[..., j, :] for k, j in map(self.whole.freedom, self.actuated)
-        ]
+        """Whether the mechanism stays at rest with all drives off ``(...)``: effort 0 is within the range of every drive.
+
+        Raises
+        ------
+        DeclarationError
+            A position in motion, or without forces: only what rests can stay.
+        """
         rest = np.ones(self.batch, dtype=bool)
-        for low, high in (np.moveaxis(end, -1, 0) for end in ends):
+        for k, j in map(self.whole.freedom, self.actuated):
+            pair = self[self.whole.pairs[k].name]
+            low, high = np.moveaxis(pair.effort_range[..., j, :], -1, 0)
+            doubt = np.isnan(low) | np.isnan(high) | (pair.velocity[..., j] != 0)
+            if doubt.any():
+                place = self.place(int(np.argmax(doubt)))
+                why = f"self_locking: {place} is in motion or has no forces; solve at rest, with positions alone as motions"
+                raise DeclarationError(f"solution of {self.mechanism.name!r}", [why])
             rest &= (low < high) & (low <= 0) & (high >= 0)
         return rest
 
@@ -714,7 +724,7 @@ class Solution(Shown):
         rates and forces that rounding spoils (see ``checks.accuracy``).
         """
         worst = [Inaccurate(*one) for one in _worst(self.checks.accuracy, PATH.inaccurate)]
-        return (*self.doubts, *self._values.crossings(), *worst)
+        return (*self.doubts, *self._values.passed, *worst)
 
     def document(self, asked: bool = False) -> Document:
         """Return what ``print`` shows as a document.

@@ -294,7 +294,7 @@ def solution_data(values: Trajectory) -> SolutionData:
         values.load_bearing(),
         lift_offs(values),
         overlaps(values),
-        values.crossings(),
+        values.passed,
         tuple(values.passive_efforts()) if forces else (),
         ChecksData(*worst),
         values.engine,
@@ -634,7 +634,7 @@ class _SummaryText(PositionLabels):
 
     def crossings(self) -> Iterator[Block]:
         """The crossings of branches that the path was led over."""
-        if found := self.values.crossings():
+        if found := self.values.passed:
             yield Heading("Crossings passed", 2)
             yield Bullets(_shortened([*map(str, found)]))
 

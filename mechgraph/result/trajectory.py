@@ -17,8 +17,8 @@ import numpy as np
 from mechgraph.determinacy.uniqueness import labels_of
 from mechgraph.equations.terms import State
 from mechgraph.errors import DeclarationError, MechgraphError
+from mechgraph.fields import PerCase
 from mechgraph.force.block import BlockForces, hold_names, is_idle
-from mechgraph.force.friction import places_of
 from mechgraph.force.loads import Site, inertia_wrenches, kinetic_energy, user_poses, user_twists
 from mechgraph.force.reactions import PairFrames, given_effort_loads, user_state, user_wrench
 from mechgraph.kinematics.motion_path import Status, in_blocks
@@ -35,8 +35,17 @@ from mechgraph.model.lines import moving_lines
 from mechgraph.model.loads import Law, Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.pairs.pair_type import PairType
-from mechgraph.quantities import shown, unit_of
-from mechgraph.result.values import Checks, LoadBearing, LoadResult, Mask, MaterialPoint, PassedCrossing
+from mechgraph.quantities import unit_of
+from mechgraph.result.values import (
+    Checks,
+    LoadBearing,
+    LoadResult,
+    Mask,
+    MaterialPoint,
+    PassedCrossing,
+    flat_place,
+    unique_sizes,
+)
 
 
 @dataclass(frozen=True)
@@ -62,9 +71,11 @@ MOVED = ("x", "dq", "ddq", "closure")
 KEPT = (
     "reactions", "efforts", "given", "loads", "hold", "stress", "stress_efforts", "coupled", "multipliers", "multiplier_stress",
     "coupled_stress", "shaking", "balance", "power", "holds", "hold_terms",
-    "locked", "of_misfit", "friction", "taken", "normals", "factor", "range",
+    "locked", "of_misfit", "range",
 )  # fmt: skip
 """Fields of ``BlockForces`` that are kept for every position."""
+KEPT_OF_FRICTION = ("normals", "factor", "teeth", "rubbing", "growth", "speeds")
+"""Fields of ``Rubbed`` that are kept for every position; efforts and what pairs take up without those of teeth."""
 
 
 class KernelRecords(Protocol):
@@ -81,43 +92,8 @@ class KernelRecords(Protocol):
         """That part, component axes first and positions last."""
 
 
-def flat_place(batch: tuple[int, ...], index: Any) -> int:
-    """Place in the flat batch of the one position that an index names.
-
-    Raises
-    ------
-    MechgraphError
-    """
-    try:
-        flat = np.arange(int(np.prod(batch))).reshape(batch)[index]
-    except (IndexError, ValueError, TypeError):
-        text = f"state({shown(index)}): no such position in a batch {batch}; give one index an axis"
-        raise MechgraphError(text) from None
-    if np.ndim(flat):
-        raise MechgraphError(
-            f"state({shown(index)}): names {np.size(flat)} positions of a batch {batch}; give one index an axis"
-        )
-    return int(flat)
-
-
 TOGETHER = 300_000
 """Wrenches that are looked at together where all pairs are."""
-
-
-def _sizes(states: Array) -> Array:
-    """Sizes ``(T,)`` of what is unique of vectors ``(3, T)``: of their part at right angles to all that self-stresses add to them.
-
-    ``states (3, 1 + s, T)`` are the vectors and what the self-stresses have in them. NaN where these take every direction.
-    """
-    vectors, stress = states[:, 0], np.moveaxis(states[:, 1:], -1, 0)
-    if not stress.shape[-1]:
-        return np.asarray(np.linalg.norm(vectors, axis=0))
-    solved = np.asarray(np.isfinite(stress).all(axis=(1, 2)))
-    ways, sizes, _ = np.linalg.svd(np.where(solved[:, None, None], stress, 0.0), full_matrices=False)
-    loose = sizes > STRESSES.unique
-    along = np.einsum("tij,it->tj", ways, vectors) * loose
-    left = vectors - np.einsum("tij,tj->it", ways, along)
-    return np.where(solved & (loose.sum(axis=-1) < len(vectors)), np.linalg.norm(left, axis=0), np.nan)
 
 
 def _touched(stress: Array, scale: float = 1.0) -> Mask:
@@ -166,6 +142,7 @@ class Trajectory:
         self._solved = np.zeros(self._count, dtype=bool)
         self._motions: list[BlockMotion] = []
         self.passed: tuple[PassedCrossing, ...] = ()
+        self.rubbing: tuple[str, ...] = ()
         self.has_forces = False
         self.engine: Literal["dense", "sparse", "compiled"] = "dense"
         self.method: str | None = None
@@ -193,6 +170,12 @@ class Trajectory:
             if values is not None:
                 self._keep(name, places, values)
         self._largest = np.maximum(self._largest, forces.largest)
+        if (rubs := forces.rubs) is not None:
+            self.rubbing = rubs.names
+            self._keep("friction", places, rubs.efforts - rubs.teeth)
+            self._keep("taken", places, rubs.taken - rubs.beside)
+            for name in KEPT_OF_FRICTION:
+                self._keep(name, places, getattr(rubs, name))
 
     def estimate(self, places: Index, error: Array) -> None:
         """Note an estimated relative error of rates and forces ``(n,)``; the greatest stays."""
@@ -449,6 +432,7 @@ class Trajectory:
             site.collect((load,))
             wrenches, efforts = site.applied(), site.scaled_efforts()
             power = (rates.V * wrenches).sum(axis=(0, 1)) + (rates.dq * efforts).sum(axis=0)
+            power += self._friction_power(load, block)
             on_links = [user_wrench(self._system.par, wrenches[:, self.mechanism.link_index[name]]) for name in links]
             read = (
                 load.reading(site)
@@ -460,6 +444,18 @@ class Trajectory:
         found = self._evaluated(effect) if self._solved.any() else np.full((6 * len(links) + 4, self._count), np.nan)
         wrenches = {name: self._out(found[6 * i : 6 * i + 6]) for i, name in enumerate(links)}
         return LoadResult(load, wrenches, *(self._out(row) for row in found[6 * len(links) :]))
+
+    def _friction_power(self, load: Load, block: BlockMotion) -> Array | float:
+        """Power of the dry friction that a load declares ``(T,)``, internal units."""
+        if not isinstance(load, Friction) or load.of not in self.rubbing:
+            return 0.0
+        if load.of in self.whole.pair_index:
+            mine = self._columns(self.whole.place_of_pair(load.of))
+            return np.asarray((self._kept["friction"][mine][:, block.places] * block.rates.dq[mine]).sum(axis=0))
+        g = [c.name for c in self.whole.couplings].index(load.of)
+        a, b = (self.whole.place_of_link(name) for name in self.whole.couplings[g].gears(self.whole))
+        V = block.rates.V
+        return np.asarray((self._kept["rubbing"][:, g][:, block.places] * (V[:, b] - V[:, a])).sum(axis=0))
 
     # --- checks and states -----------------------------------------------------------------------------------------------
 
@@ -473,10 +469,6 @@ class Trajectory:
         wrench, term = (float(size) or 1.0 for size in self._largest)
         balance, power = self._out(self._of("balance") / wrench), self._out(self._of("power") / term)
         return Checks(closure, balance, power, accuracy)
-
-    def crossings(self) -> tuple[PassedCrossing, ...]:
-        """Crossings of branches that the path was led over."""
-        return self.passed
 
     def state(self, index: Any) -> State:
         """Screws and loads at one position, in the declared units about the global origin."""
@@ -514,6 +506,8 @@ class Trajectory:
         """What a pair transmits, reaction and efforts, and in every self-stress, ``(6, 1 + s, T)``, internal units."""
         columns = self._columns(pair)
         efforts = self._force("efforts")[columns] - self._through_contacts("multipliers", columns)
+        if "teeth" in self._kept:
+            efforts = efforts - self._kept["teeth"][columns]
         stress = self._of("stress_efforts")[columns] - self._through_contacts("multiplier_stress", columns)
         states = np.concatenate([efforts[:, None], stress], axis=1)
         E = self._evaluated(lambda block: block.here.E[:, columns])
@@ -550,7 +544,7 @@ class Trajectory:
         unit = np.repeat([self._L**2, self._L], 3)[:, None]
         unique = (~_touched(found[:, 1:]) & self._solved).astype(float)
         known = found[:, :1] if self.least_norm else found
-        sizes = np.stack([self._L**2 * _sizes(known[:3]), self._L * _sizes(known[3:])])
+        sizes = np.stack([self._L**2 * unique_sizes(known[:3]), self._L * unique_sizes(known[3:])])
         wrench = self._out(self._masked(sign * unit * found[:, 0], found[:, 1:]))
         return wrench, self._out(unique).astype(bool), self._out(sizes)
 
@@ -573,7 +567,7 @@ class Trajectory:
     def magnitude(self, pair: int) -> Array:
         """Size of what is unique of the force of the reaction, ``(...)``."""
         states = np.concatenate([self._force("reactions")[3:, pair][:, None], self._of("stress")[3:, pair]], axis=1)
-        return self._out(self._L * _sizes(states[:, :1] if self.least_norm else states)[None])[..., 0]
+        return self._out(self._L * unique_sizes(states[:, :1] if self.least_norm else states)[None])[..., 0]
 
     def components(self, pair: int) -> dict[str, Array]:
         """Reaction components by name, ``(...)``."""
@@ -600,9 +594,12 @@ class Trajectory:
         unit = np.where(self._system.is_length[columns], self._L, self._L**2)[:, None]
         return self._out(unit * self._kept.get("friction", 0.0 * self._force("efforts"))[columns])
 
-    def friction_factor(self, place: int) -> float:
-        """By how much friction would have to fall at a flat position that jams."""
-        return float(self._kept["factor"][place])
+    def friction_factor(self, place: int) -> tuple[float, tuple[str, ...]]:
+        """By how much friction would have to fall at a flat position that jams, and the names of what jams."""
+        growth = self._kept["growth"][:, place]
+        # parts of the largest: what grows with it, and what is loaded beside it
+        jammed = [name for name, size in zip(self.rubbing, growth, strict=True) if size > MOTIONS.nearby * growth.max()]
+        return float(self._kept["factor"][place]), tuple(dict.fromkeys(jammed))
 
     def effort_range(self, pair: int) -> Array:
         """Least and greatest effort of drives at rest, ``(..., f, 2)``; the effort itself in what does not rub."""
@@ -615,48 +612,16 @@ class Trajectory:
             ends = np.where(np.isnan(found), ends, found)
         return self._out(ends)
 
-    def normal_forces(self, pair: int) -> Array:
-        """Normal forces at the places of a pair that rub, ``(..., n)``."""
-        dry = [load for load in self.loads if isinstance(load, Friction)]
-        mine = [load for load in dry if load.of == self.whole.pairs[pair].name]
-        if not mine or "normals" not in self._kept:
-            return self._out(np.zeros((0, self._count)))
-
-        def count(loads: list[Friction]) -> int:
-            block = next(iter(self._motions), None) or self._motion(np.flatnonzero(self._solved)[:1])
-            return len(places_of(block.here, block.rates.dq, np.zeros((6, len(self.whole.pairs), block.here.T)), loads))
-
-        found = [(count(dry[:i]), count([load])) for i, load in enumerate(dry) if load in mine]
-        parts = [self._kept["normals"][first : first + n] for first, n in found]
-        return self._out(self._L * np.concatenate(parts))
-
-    def losses(self) -> dict[str, Array]:
-        """Power lost in pairs with friction, by name, ``(...)``."""
-        dry = {i: load.of for i, load in enumerate(self.loads) if isinstance(load, Friction)}
-        out = {name: np.zeros(self.batch) for name in dry.values()}
-        for name in out:
-            k = self.whole.place_of_pair(name)
-            out[name] = out[name] - (self.friction(k) * self.coordinates(k, 1)).sum(axis=-1)
-        for i, name in dry.items():
-            out[name] = out[name] - self.load(i).power
-        return out
+    def at_places(self, name: str, of: str) -> Array:
+        """Normal forces (``"normals"``) or speeds of sliding (``"speeds"``) at the places of a pair or coupling that rubs, ``(..., n)``."""
+        mine = [i for i, other in enumerate(self.rubbing) if other == of]
+        return self._out(self._L * self._kept[name][mine] if mine else np.zeros((0, self._count)))
 
     def locked_in(self, pair: int) -> dict[str, Array]:
         """What misfits lock in of the components, by name, ``(...)``; zero where stiffness does not split reactions."""
         known = self._kept.get("locked", 0.0 * self._force("reactions"))
         row, unit, found = self._components_of(pair, known[:, pair][:, None])
         return {name: self._out(part) for name, part in zip(row.component_names, unit * found[:, 0], strict=True)}
-
-    def deflections(self, pair: int) -> dict[str, Array]:
-        """Small motions of link b against link a along the components of a pair with a seat, ``misfit - l / k``."""
-        p = self.whole.pairs[pair]
-        soft = {} if p.stiffness is None else p.stiffness.by_component
-        off = {} if p.misfit is None else p.misfit.by_component
-        out = {}
-        for name, value in self.components(pair).items():
-            k = soft.get(name, np.inf)
-            out[name] = off.get(name, 0.0) - value / k if k else np.full(value.shape, np.nan)
-        return out
 
     def misfit_sensitivity(self) -> dict[str, dict[str, Array]]:
         """Change of every component ``"A.Fz"`` for a misfit of one in every component that is not rigid, ``(...)`` each."""
@@ -779,22 +744,45 @@ class Trajectory:
         found = self._evaluated(lambda at: ContactLines(at.here).settle(m[:, at.places])[coupling][None].astype(float))
         return np.asarray(found[0] > 0.5)
 
-    def contact(self, coupling: int) -> tuple[Array, Array]:
-        """Force of gears on the second one, and the point where it acts, ``(..., 3)``."""
-        c = self._system.m.couplings[coupling]
+    def _line(self, coupling: int, of: Callable[[ContactLines, BlockMotion, Array], Array]) -> Array:
+        """What a function tells of the line along which a coupling acts, from lines, motion and multipliers, at all positions."""
+        c, m = self._system.m.couplings[coupling], self._force("multipliers")
         if not c.steps:
             what = "acts in its freedoms, not along a line; SpurGears and its like have a force and a point"
             raise DeclarationError(f"coupling {c.name!r}", [what])
-        m, stress = self._force("multipliers"), self._of("multiplier_stress")[coupling]
 
-        def of(block: BlockMotion) -> Array:
-            lines, here = ContactLines(block.here), m[:, block.places]
-            lines.settle(here)
-            which = [g for g, _ in lines.contacts].index(coupling)
-            flank = (here[coupling] < 0.0).astype(np.intp)
-            points = lines.wrenches[which][1][:, flank, np.arange(len(block.places))]
-            return np.concatenate([lines.on_gear(here, here)[which][3:], points])
+        def at(block: BlockMotion) -> Array:
+            lines = ContactLines(block.here)
+            lines.settle(m[:, block.places])
+            return of(lines, block, m[:, block.places])
 
-        values, par = self._evaluated(of), self._system.par
+        return self._evaluated(at)
+
+    def contact(self, coupling: int) -> tuple[Array, Array, Array]:
+        """Force of gears on the second one, the point where it acts, and the moment of friction about it, ``(..., 3)``."""
+        none = np.zeros((6, len(self.whole.couplings), self._count))
+
+        def of(lines: ContactLines, block: BlockMotion, m: Array) -> Array:
+            P, W = lines.push(coupling, m)[1], self._kept.get("rubbing", none)[:, coupling, block.places]
+            return np.concatenate([lines.on_gears(m, m)[3:, coupling] + W[3:], P, shift_wrench(W, P)[:3]])
+
+        stress = self._of("multiplier_stress")[coupling]
+        values, par = self._line(coupling, of), self._system.par
         force = self._masked(par.L * values[:3], np.broadcast_to(stress, (3, *stress.shape)))
-        return self._out(force), self._out(par.L * values[3:] + par.origin.reshape(3, 1))
+        return (
+            self._out(force),
+            self._out(par.L * values[3:6] + par.origin.reshape(3, 1)),
+            self._out(par.L**2 * values[6:]),
+        )
+
+    def pressing(self, coupling: int) -> Array:
+        """Normal force between gears, ``(...)``."""
+        found = self._line(
+            coupling, lambda lines, _, m: np.abs(m[coupling] / lines.multiplier_of_one(coupling, m))[None]
+        )
+        return self._out(self._masked(self._L * found, self._of("multiplier_stress")[[coupling]]))[..., 0]
+
+    def number(self, value: Any) -> Any:
+        """A number of a load, one a position ``(...)`` where it varies from case to case."""
+        batch, _, flat = self._asked
+        return value.values[flat // batch[-1]].reshape(self.batch) if isinstance(value, PerCase) else value

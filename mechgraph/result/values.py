@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.document import Document, Shown, Table
+from mechgraph.errors import MechgraphError
 from mechgraph.maths.se3 import Array
-from mechgraph.maths.tolerances import CHECKS, PATH
+from mechgraph.maths.tolerances import CHECKS, PATH, STRESSES
 from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.quantities import unit_of
+from mechgraph.quantities import shown, unit_of
 
 SHOWN_AS_ZERO = 1e-11
 """Part of the largest value of its kind below which a value is rounding noise and shown as 0."""
@@ -281,3 +282,38 @@ def coupling_unit(m: Mechanism, coupling: BaseCoupling) -> str:
     """The unit of the multiplier: a force where all freedoms are slides, else a moment."""
     slides = coupling.is_force or not any(m.turns(name) for name in coupling.freedoms)
     return unit_of(m.units, (1 if slides else 2, 1, -2))
+
+
+def flat_place(batch: tuple[int, ...], index: Any) -> int:
+    """Place in the flat batch of the one position that an index names.
+
+    Raises
+    ------
+    MechgraphError
+    """
+    try:
+        flat = np.arange(int(np.prod(batch))).reshape(batch)[index]
+    except (IndexError, ValueError, TypeError):
+        text = f"state({shown(index)}): no such position in a batch {batch}; give one index an axis"
+        raise MechgraphError(text) from None
+    if np.ndim(flat):
+        raise MechgraphError(
+            f"state({shown(index)}): names {np.size(flat)} positions of a batch {batch}; give one index an axis"
+        )
+    return int(flat)
+
+
+def unique_sizes(states: Array) -> Array:
+    """Sizes ``(T,)`` of what is unique of vectors ``(3, T)``: of their part at right angles to all that self-stresses add to them.
+
+    ``states (3, 1 + s, T)`` are the vectors and what the self-stresses have in them. NaN where these take every direction.
+    """
+    vectors, stress = states[:, 0], np.moveaxis(states[:, 1:], -1, 0)
+    if not stress.shape[-1]:
+        return np.asarray(np.linalg.norm(vectors, axis=0))
+    solved = np.asarray(np.isfinite(stress).all(axis=(1, 2)))
+    ways, sizes, _ = np.linalg.svd(np.where(solved[:, None, None], stress, 0.0), full_matrices=False)
+    loose = sizes > STRESSES.unique
+    along = np.einsum("tij,it->tj", ways, vectors) * loose
+    left = vectors - np.einsum("tij,tj->it", ways, along)
+    return np.where(solved & (loose.sum(axis=-1) < len(vectors)), np.linalg.norm(left, axis=0), np.nan)

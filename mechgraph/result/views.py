@@ -13,6 +13,8 @@ from mechgraph.errors import DeclarationError
 from mechgraph.fields import vector_fault
 from mechgraph.maths.se3 import Array
 from mechgraph.model.belts import BeltCourse, BeltDrive
+from mechgraph.model.couplings import Belt
+from mechgraph.model.friction import Friction
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.pairs.pair_type import PairType
@@ -276,7 +278,22 @@ class PairResult(Shown):
     @property
     def normal_forces(self) -> Array:
         """Normal forces ``(..., n)`` at the places that rub, in the order of the axes of the pair; preload included."""
-        return self._values.normal_forces(self._index)
+        return self._values.at_places("normals", self._name)
+
+    @property
+    def sliding(self) -> Array:
+        """Speeds of sliding ``(..., n)`` at these places; zero where nothing slides."""
+        return self._values.at_places("speeds", self._name)
+
+    @property
+    def sticks(self) -> Array:
+        """Whether it rubs and is at rest ``(...)``: true or false."""
+        rests = ~self.sliding.any(axis=-1) & np.isfinite(self.friction).all(axis=-1)
+        return np.asarray(rests & bool(self.sliding.shape[-1]))
+
+    @property
+    def _name(self) -> str:
+        return self._values.whole.pairs[self._index].name
 
     @property
     def effort_range(self) -> Array:
@@ -297,7 +314,14 @@ class PairResult(Shown):
 
         NaN for a component of stiffness 0, which says nothing of it.
         """
-        return self._by_name("component", self._values.deflections(self._index))
+        p = self._values.whole.pairs[self._index]
+        soft = {} if p.stiffness is None else p.stiffness.by_component
+        off = {} if p.misfit is None else p.misfit.by_component
+        out = {}
+        for name, value in self.components.items():
+            k = soft.get(name, np.inf)
+            out[name] = off.get(name, 0.0) - value / k if k else np.full(value.shape, np.nan)
+        return self._by_name("component", out)
 
     @property
     def unique(self) -> dict[str, Array]:
@@ -371,6 +395,38 @@ class CouplingResult(Shown):
         return self._values.contact(self._index)[1]
 
     @property
+    def normal_force(self) -> Array:
+        """Size ``(...)`` of the normal force between teeth, preload included."""
+        found = self._values.at_places("normals", self._name)
+        return found[..., 0] if found.shape[-1] else self._values.pressing(self._index)
+
+    @property
+    def loss(self) -> Array:
+        """Power ``(...)`` lost by friction between teeth; zero without."""
+        return losses(self._values).get(self._name, np.zeros(self._values.batch))
+
+    @property
+    def slip_margin(self) -> Array:
+        """Of a flat belt with ``mg.Friction``: ``e^(mu wrap)`` over the ratio of the strands, less one ``(...)``: negative where it slips.
+
+        The strands of an ``mg.Belt``: its force and nothing, and ``preload`` more in each; on the pulley with the smaller wrap.
+        """
+        values, c = self._values, self._values.whole.couplings[self._index]
+        if not isinstance(c, Belt):
+            raise DeclarationError(f"coupling {c.name!r}", ["is no belt, which alone has a slip_margin"])
+        load, force = friction_of(values, c.name), np.linalg.norm(self.force, axis=-1)
+        return margin_to_slip(load, c.wrap(c.axes_in(values.whole)), force, np.zeros_like(force))
+
+    @property
+    def moment(self) -> Array:
+        """Moment ``(..., 3)`` of friction between teeth on the second gear about ``point``, global directions; zero without."""
+        return self._values.contact(self._index)[2]
+
+    @property
+    def _name(self) -> str:
+        return self._values.whole.couplings[self._index].name
+
+    @property
     def sliding(self) -> Array:
         """Velocity ``(..., 3)`` of the second of two gears relative to the first where they touch: zero for gears that roll on each other.
 
@@ -380,6 +436,33 @@ class CouplingResult(Shown):
         coupling = m.couplings[self._index]
         Va, Vb = (self._values.link(m.place_of_link(name))[1] for name in coupling.gears(m))
         return np.asarray(Vb[..., 3:] - Va[..., 3:] + np.cross(Vb[..., :3] - Va[..., :3], point))
+
+
+def losses(values: Trajectory) -> dict[str, Array]:
+    """Power lost in what rubs, by name, ``(...)``."""
+    dry = {i: load.of for i, load in enumerate(values.loads) if isinstance(load, Friction)}
+    return {name: -values.load(i).power for i, name in dry.items() if name in values.rubbing}
+
+
+def friction_of(values: Trajectory, name: str) -> Friction:
+    """The friction that is declared of a pair or coupling, its numbers one a position ``(...)`` where they vary."""
+    load = next((load for load in values.loads if isinstance(load, Friction) and load.of == name), None)
+    if load is None:
+        why = f"{name}: no friction is declared of it; mg.Friction({name!r}, mu=)"
+        raise DeclarationError(f"solution of {values.mechanism.name!r}", [why])
+    return load.with_numbers(values.number)
+
+
+def margin_to_slip(load: Friction, wrap: Array | float, one: Array, other: Array) -> Array:
+    """``e^(mu wrap) T2 / T1 - 1`` of strands with tensions ``T1 >= T2``."""
+    strands = np.stack([one, other]) + load.preload
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return (
+            np.exp(load.coefficient_at_rest * (wrap if load.wrap is None else load.wrap))
+            * strands.min(axis=0)
+            / strands.max(axis=0)
+            - 1.0
+        )
 
 
 class BeltResult(Shown):
@@ -455,6 +538,13 @@ class BeltResult(Shown):
             needed = np.where((ratio <= 0.0) | (np.minimum(T, np.roll(T, 1, axis=0)) < 0.0), np.inf, needed)
             needed = needed.reshape(len(needed), -1) / self._course.wrap
         return self._by_name("pulley", zip(self._belt.over, needed, strict=True))
+
+    @property
+    def slip_margin(self) -> dict[str, Array]:
+        """On every pulley ``e^(mu wrap)`` over the ratio of the strands, less one ``(...)``; negative where it slips."""
+        load, T = friction_of(self._values, self._name), np.array(list(self.tension.values()))
+        both = zip(self._belt.over, np.roll(T, 1, axis=0), T, strict=True)
+        return {name: margin_to_slip(load, self.wrap[name], one, other) for name, one, other in both}
 
 
 class LinkResult(Shown):
