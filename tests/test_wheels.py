@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.path import Path
 
 import mechgraph as mg
@@ -355,3 +356,23 @@ def test_a_roller_runs_between_the_walls_of_its_groove() -> None:
         center = found.points["K", "rod"][t]
         for wall in walls:
             assert away(center[None], found.vertices(wall, t))[0] == pytest.approx(6.0, rel=0.01)
+
+
+def test_a_shaft_goes_through_its_wheel_in_space() -> None:
+    """Seen from above: below the disc the wheel hides the shaft, above it the shaft stands before the wheel."""
+    shaft = mg.parts.bearings("b", "frame", "s", [(0, 0, -0.1), (0, 0, 0.1)], Z)
+    m = mg.Mechanism("shaft", parts=[shaft], gears=[mg.Gear("g", "s", 40, (0, 0, 0), Z, module=0.002, width=0.004)])
+    ax = show.canvas.new_axes((6.0, 4.5))
+    show.draw_skeleton(m, ax=ax, labels=False)
+    right, up, _ = show.skeleton.camera_of(24.0, -58.0)
+    canvas = FigureCanvasAgg(ax.figure)
+    canvas.draw()
+    image = np.asarray(canvas.buffer_rgba())[:, :, :3].astype(float)
+
+    def color(p: tuple[float, float, float]) -> np.ndarray:
+        x, y = ax.transData.transform([np.array(p) @ right, np.array(p) @ up])
+        return image[image.shape[0] - 1 - int(y), int(x)]
+
+    disc, below, above = color((-0.02, 0.01, 0.002)), color((0, 0, -0.01)), color((0, 0, 0.01))
+    assert np.abs(below - disc).max() < 20
+    assert np.abs(above - disc).max() > 60

@@ -253,7 +253,10 @@ class Drawing:
             vertices = self.scene.vertices(part, t)
             if np.isnan(vertices).any() or not part.scales[0] <= scale < part.scales[1]:
                 continue
-            heights.setdefault(ABOVE.get(part.role, 4.0), []).append((part, vertices))
+            level = (
+                {} if self.scene.normal is None and part.role == "wheel" else ABOVE
+            )  # in space a shaft goes through its wheel
+            heights.setdefault(level.get(part.role, 4.0), []).append((part, vertices))
             if part.role in ("center", "point"):
                 self._mark(part, vertices)
             elif part.dashed or part.role in LINES:
