@@ -459,7 +459,7 @@ def test_the_spans_of_a_belt_stay_together():
         m.replace(couplings=[one])
     with pytest.raises(mg.DeclarationError, match="lacks w-p"):
         m.replace(couplings=[one, two.replace(pretension=5.0)])
-    with pytest.raises(mg.DeclarationError, match="belong to the whole belt"):
+    with pytest.raises(mg.DeclarationError, match=r"belong to the whole belt; vary 'B\.pretension'"):
         mg.study(
             m, {"B.w-p.pretension": [1.0, 2.0]}, {"T": lambda s: s.coupling("B").tension["p-w"]}, 3, motions={"p": 0.0}
         )
@@ -476,6 +476,20 @@ def test_variants_move_the_centers():
     for i in range(2):
         alone = mg.solve(found.variant(i), {"p": [0.0, 1.0]}).coupling("B").tension["w-i"]
         np.testing.assert_allclose(found.outputs["T"][i], alone, rtol=1e-9)
+
+
+def test_numbers_of_belts_and_pulleys_vary():
+    """Tension T0 + M / 2r, and speeds by the radius of a pulley."""
+    m = drive(pretension=300.0, loads=[mg.Effort("w", 7.0)])
+    found = mg.study(
+        m, {"B.pretension": [100.0, 500.0], "gears[1].radius": [0.04, 0.06]},
+        {"T": lambda s: s.coupling("B").tension["p-w"], "w": "w.Rz"}, 4, motions={"p": [0.0, 2.0]},
+    )  # fmt: skip
+    T0, r = found.parameters["B.pretension"], found.parameters["gears[1].radius"]
+    np.testing.assert_allclose(found.outputs["T"], np.repeat((T0 + 7.0 / (2 * r))[:, None], 2, axis=1), rtol=1e-9)
+    np.testing.assert_allclose(found.outputs["w"][:, 1], 2.0 * 0.05 / r, rtol=1e-12)
+    with pytest.raises(mg.DeclarationError, match=r"pulleys of .B\.p-w. sit on that axis"):
+        mg.study(m, {"w.point.x": [0.2, 0.21]}, "w.Rz", 2, motions={"p": 0.0})
 
 
 def test_a_belt_in_the_plane_is_the_spatial_one():

@@ -563,6 +563,32 @@ def test_gears_go_through_files_units_and_motions(tmp_path):
     np.testing.assert_allclose(F, turned[:3, :3] @ mg.solve(m, {"A": 0.3}).coupling("m").force, atol=1e-12)
 
 
+def test_numbers_of_gears_vary_and_bearings_under_them_are_refused():
+    """A larger pressure angle makes the radial force T tan(a) / r; a bearing does not leave its gear behind."""
+    z, at = (0, 0, 1), {"p": (0, 0, 0), "w": (0.06, 0, 0)}
+
+    def stage(a=FULL, wider=0.0):
+        places = {"p": (0, 0, 0), "w": (0.06 + wider, 0, 0)}
+        return mg.Mechanism(
+            "stage", pairs=[mg.Pair(k, "R", "frame", k, point=places[k], axis=z) for k in at], drives=["p"],
+            gears=[mg.Gear(f"g{k}", k, n, places[k], z, module=0.002, pressure_angle=a) for k, n in (("p", 20), ("w", 40))],
+            couplings=[mg.Mesh("m", "gp", "gw")], loads=[mg.Effort("w", -3.0)],
+        )  # fmt: skip
+
+    force = {"F": lambda s: s.coupling("m").force}
+    found = mg.study(stage(), {"gp.shift": [0.0, -0.1], "m.backlash": [0.0, 1e-4]}, force, 3, motions={"p": 0.0})
+    np.testing.assert_allclose(found.outputs["F"][:, 0], np.tile([75 * np.tan(FULL), -75, 0], (3, 1)), rtol=1e-9)
+    with pytest.raises(mg.DeclarationError, match=r"of .m. sit on that axis, .* a function"):
+        mg.study(stage(), {"w.point.x": [0.06, 0.0612]}, force, 2, motions={"p": 0.0})
+    with pytest.raises(mg.DeclarationError, match=r"no number of that name in gear 'gp' \(point.x, "):
+        mg.study(stage(), {"gears[0].radius": [0.1, 0.2]}, force, 2, motions={"p": 0.0})
+    wider = mg.study(stage, {"wider": [0.0, 0.0012]}, force, 3, motions={"p": 0.0})
+    for i, more in enumerate(wider.parameters["wider"]):
+        w = np.arccos(0.06 * np.cos(FULL) / (0.06 + more))
+        T = 3.0 / (0.04 * np.cos(FULL))
+        np.testing.assert_allclose(wider.outputs["F"][i, 0], [T * np.sin(w), -T * np.cos(w), 0], rtol=1e-9, atol=1e-9)
+
+
 def test_the_kernel_serves_gears_on_pairs_r_and_refuses_rows_along_lines_by_name():
     a, b = stage(spur())[0], stage(spur(), "S")[0]
     assert a.couplings[0].linear

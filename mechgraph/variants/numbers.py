@@ -4,10 +4,10 @@ Declared numbers by name.
 
 A number is named as it is declared: ``crank.mass``, ``crank.center.x``, ``crank.inertia.xy``, ``crank.tip.x`` of a named point ``tip``,
 ``B.point.x``, ``B.axis.z``, ``B.on_a.point.y``, ``B.pitch``, ``loads[0].stiffness``, ``loads[1].force.x``; of a coupling ``g.A`` and
-``g.constant``, or ``couplings[0].A``; of gears, curves, surfaces and contacts ``g.module``, ``g.teeth.a``, ``K.curve.radius``,
-``K.curve.points[3].x``, ``K.curve.lift[12]``, ``K.surface.center.z``, ``K.roller``, ``K.hertz.moduli.b``; of a chain ``length[2]``,
-``twist[0]``, ``offset[1]`` (as in ``mg.chain``, counted from 0). Which fields of a link, pair, coupling or load are numbers, and of which
-components, their annotations say (``model.field_format``).
+``g.constant``, or ``couplings[0].A``; of gears, belts, curves, surfaces and contacts ``g.module``, ``gears[0].shift``, ``g.teeth.a``,
+``belt.pretension``, ``K.curve.radius``, ``K.curve.points[3].x``, ``K.curve.lift[12]``, ``K.surface.center.z``, ``K.roller``,
+``K.hertz.moduli.b``; of a chain ``length[2]``, ``twist[0]``, ``offset[1]`` (as in ``mg.chain``, counted from 0). Which fields of a link,
+pair, coupling or load are numbers, and of which components, their annotations say (``model.field_format``).
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ from mechgraph.errors import DeclarationError, did_you_mean, near_names
 from mechgraph.fields import POINT, XYZ, Described, FieldFormat, PerCase
 from mechgraph.maths.inertia import physical
 from mechgraph.maths.se3 import Array
-from mechgraph.model.couplings import BaseCoupling
+from mechgraph.model.belts import BeltDrive
+from mechgraph.model.lines import LineCoupling
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import NUMBERS_OF_CHAIN, Mechanism, chain_numbers, markers_of_chain
 from mechgraph.model.pair import Link, Marker, Pair
@@ -85,11 +86,13 @@ class ItemField:
     index: int
     path: tuple[str, ...]
     place: Place
+    also: tuple[int, ...] = ()
+    """Other items that hold the same number, as the spans of a belt do."""
 
     @property
     def one_by_one(self) -> bool:
         """Whether mechanisms that differ in it do so in more than arrays: in their curves, surfaces, contacts, or named points."""
-        return self.what != "couplings"
+        return self.what != "couplings" or bool(self.also)
 
     def read(self, m: Mechanism) -> float:
         """The declared value."""
@@ -138,16 +141,19 @@ def find_field(m: Mechanism, name: str) -> AnyField | str:
             return f"{name!r}: there are {count} {indexed['what']}, counted from 0"
         i, rest = int(indexed["index"]), indexed["rest"] or ""
         return _leaving(m, name, getattr(m, indexed["what"])[i], rest) or INDEXED[indexed["what"]](m, i, rest)
-    named: Sequence[tuple[Sequence[Link | Pair | BaseCoupling], Finder]] = (
+    named: Sequence[tuple[Sequence[Any], Finder]] = (
         (m.links, _link_field),
         (m.pairs, _pair_field),
         (m.couplings, _coupling_field),
+        (m.gears, _gear_field),
     )
     for items, find in named:
         for i, item in enumerate(items):
             rest = name.removeprefix(item.name + ".")
             if rest != name and (found := find(m, i, rest)):
                 return _leaving(m, name, item, rest) or found
+    if found := _belt_field(m, name):
+        return found
     example = (
         f"expected e.g. {m.links[-1].name}.mass, {m.links[-1].name}.center.x, "
         f"{m.links[-1].name}.inertia.xx, {m.pairs[0].name}.{'point' if m.pairs[0].point is not None else 'on_a.point'}.x, "
@@ -174,10 +180,13 @@ def _leaving(m: Mechanism, name: str, item: Described, rest: str) -> str | None:
 
 def _near(m: Mechanism, name: str) -> list[str]:
     """Names of numbers that may be meant by a wrong one, of the items with which it begins or whose names are near its first part."""
-    named: list[Link | Pair | BaseCoupling] = [*m.links, *m.pairs, *m.couplings]
-    items = {item.name: item for item in named}
+    items: dict[str, list[Described]] = {}
+    for item in (*m.links, *m.pairs, *m.couplings, *m.gears):
+        items.setdefault(item.name, []).append(item)
     owners = [own for own in items if name.startswith(own + ".")] or near_names(name.partition(".")[0], items)
-    return near_names(name, (f"{own}.{rest}" for own in owners for rest in _numbers_of(items[own])), ALIKE)
+    return near_names(
+        name, (f"{own}.{rest}" for own in owners for item in items[own] for rest in _numbers_of(item)), ALIKE
+    )
 
 
 def _component(item: Described, rest: str) -> tuple[tuple[str, ...], FieldFormat, tuple[Place, ...]] | None:
@@ -228,6 +237,8 @@ def _pair_field(m: Mechanism, k: int, rest: str) -> Field | ItemField | str | No
     path, about, places = found
     *side, what = path
     array, scale = about.held_in or (what, 1.0)
+    if array in MARKER and (gears := _gears_about(m, k)):
+        return f"'{pair.name}.{rest}': {gears}"
     if pair.contact is None and len(path) <= 2 and array in PLACED:
         where: Place = () if array not in MARKER else (SIDES.index(side[0]),) if side else (slice(None),)
         return Field(array, tuple((*where, *place, k) for place in places), scale)
@@ -236,12 +247,49 @@ def _pair_field(m: Mechanism, k: int, rest: str) -> Field | ItemField | str | No
     return ItemField("pairs", k, path, places[0])
 
 
+def _gears_about(m: Mechanism, pair: int | None = None) -> str:
+    """Why the axis of a pair (of any) does not vary, where places of gears and pulleys on it would have to follow."""
+    held = (
+        c.name
+        for c in m.couplings
+        if isinstance(c, LineCoupling) and c.linear and pair in (None, *(s.pair for s in c.steps))
+    )
+    if not (name := next(held, "")):
+        return ""
+    return (
+        f"gears or pulleys of {name!r} sit on that axis, and would not move with it; give a function that returns the mechanism of a "
+        "variant"
+    )
+
+
+def _belt_field(m: Mechanism, name: str) -> ItemField | None:
+    belt, _, rest = name.rpartition(".")
+    own = [k for k, c in enumerate(m.couplings) if isinstance(c, BeltDrive) and c.belt == belt]
+    found = _component(m.couplings[own[0]], rest) if own else None
+    return None if found is None else ItemField("couplings", own[0], found[0], found[2][0], tuple(own[1:]))
+
+
+def _gear_field(m: Mechanism, i: int, rest: str) -> ItemField | None:
+    found = _component(m.gears[i], rest)
+    return None if found is None else ItemField("gears", i, found[0], found[2][0])
+
+
+def _indexed_gear(m: Mechanism, i: int, rest: str) -> ItemField | str:
+    numbers = ", ".join(_numbers_of(m.gears[i]))
+    return (
+        _gear_field(m, i, rest)
+        or f"'gears[{i}].{rest}': no number of that name in gear {m.gears[i].name!r} ({numbers})"
+    )
+
+
 def _chain_field(m: Mechanism, name: str, what: str, index: int) -> ChainField | str:
     numbers = m.once(chain_numbers)
     if numbers is None:
         return f"{name!r}: mechanism {m.name!r} is no chain with twist, length and offset of every link"
     if index >= numbers.shape[1]:
         return f"{name!r}: the chain has {numbers.shape[1]} links, counted from 0"
+    if gears := _gears_about(m):
+        return f"{name!r}: {gears}"
     if m.planar and what != "length":
         return f"{name!r}: leaves the x-y plane of a planar mechanism; m.to_spatial() has it"
     return ChainField(NUMBERS_OF_CHAIN.index(what), index)
@@ -265,7 +313,7 @@ def _coupling_field(m: Mechanism, index: int, rest: str) -> Field | ItemField | 
     if rest == "constant":
         return f"'{c.name}.constant': coupling {c.name!r} keeps the value that it has at the start; declare constant="
     if not c.alone:
-        return f"'{c.name}.{rest}': its numbers belong to the whole belt; declare a mechanism for each, or vary pairs, links and loads"
+        return f"'{c.name}.{rest}': its numbers belong to the whole belt; vary '{c.name.rpartition('.')[0]}.{rest}'"
     if not c.varies:
         found = _component(c, rest)
         if found is not None:
@@ -291,6 +339,7 @@ def _numbers_of(item: Described) -> list[str]:
 INDEXED: dict[str, Callable[[Mechanism, int, str], AnyField | str]] = {
     "loads": _load_field,
     "couplings": _coupling_field,
+    "gears": _indexed_gear,
 }
 """Lists of a mechanism whose items are named by their place, counted from 0."""
 
@@ -371,11 +420,12 @@ class Variants:
             for c, own in zip(m.couplings, coupling_places(m), strict=True)
         ]
         loads = [_load_of(load, i) for load in self.loads]
-        lists: dict[str, list[Any]] = {"links": links, "pairs": pairs, "couplings": couplings}
+        lists: dict[str, list[Any]] = {"links": links, "pairs": pairs, "couplings": couplings, "gears": list(m.gears)}
         for field, values in self.own:
             items = lists[field.what]
-            items[field.index] = field.changed(items[field.index], float(values[i]))
-        return m.replace(links=links, pairs=pairs, couplings=couplings, loads=loads)
+            for k in (field.index, *field.also):
+                items[k] = field.changed(items[k], float(values[i]))
+        return m.replace(**lists, loads=loads)
 
 
 def _placed(pair: Pair, n: Declared, k: int) -> Pair:
@@ -579,7 +629,11 @@ def _alike(m: Mechanism, other: Mechanism) -> bool:
     kept = [
         [(p.type, p.closed, p.radius, p.hertz, p.film, p.stiffness, p.misfit) for p in one.pairs] for one in (m, other)
     ]
-    if kept[0] != kept[1]:
+    along = [
+        [(c, c.ends, c.numbers, c.longer, c.terms) for c in one.couplings if isinstance(c, LineCoupling)]
+        for one in (m, other)
+    ]
+    if kept[0] != kept[1] or along[0] != along[1]:
         return False
     for one, two in zip(m.loads, other.loads, strict=True):
         for f in dataclasses.fields(one):
