@@ -510,6 +510,14 @@ def test_shafts_that_leave_their_places():
     m = mg.Mechanism("m", pairs=pairs, gears=gears, couplings=[mg.Mesh("m", "a", "b")], drives=["A.Rz", "A.Tz"])
     with pytest.raises(mg.DeclarationError, match="need axes that keep their places"):
         mg.solve(m, {"A.Rz": [0.0, 0.5], "A.Tz": [0.0, 0.01]})
+    free = m.replace(
+        drives=[],
+        links=[mg.Link("frame"), *(mg.Link(k, 1.0, (0, 0, 0), mg.inertia.sphere(1.0, 0.1)) for k in ("one", "two"))],
+    )
+    held = free.replace(pairs=[mg.Pair("A", "R", "frame", "one", point=(0.1, 0, 0), axis=X), pairs[1]])
+    assert mg.respond(held, [0.0, 0.01], rates={"A.Rz": 3.0}).t[-1] == 0.01
+    with pytest.raises(mg.DeclarationError, match="need axes that keep their places"):
+        mg.respond(free, [0.0, 0.01], rates={"A.Rz": 3.0, "A.Tz": 0.1})
 
 
 def rack(order=("a", "b"), force=5.0, helix=0.2, wheel=None):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import atan, cos, pi, sin, tan
@@ -262,7 +263,7 @@ def _placed_soundly(m: Any) -> bool:
     )
 
 
-class Meeting:
+class Meeting(ABC):
     """Two gears where they meet, in the frame of the link of the first."""
 
     numbers: tuple[float, ...] = ()
@@ -277,9 +278,9 @@ class Meeting:
         """Why their teeth do not fit each other."""
         return iter(())
 
+    @abstractmethod
     def flanks(self, forward: bool) -> tuple[Relation, Relation]:
         """The relation of the flank that is asked for, and that of the other one."""
-        raise NotImplementedError
 
     def misfits(self, fitting: float) -> list[str]:
         """What is wrong with the gears and their places, and what would fit."""
@@ -480,9 +481,9 @@ class Still(Meeting):
         if not self.faults and not self.misfits(1e-3):
             self._lay(*self.lines())
 
+    @abstractmethod
     def lines(self) -> tuple[Array, Array]:
         """Points and directions ``(3, 2, 1)`` of the force on b, for both flanks."""
-        raise NotImplementedError
 
     def _lay(self, P: Array, n: Array) -> None:
         za, zb, d = self.axes.za[:, 0], self.axes.zb[:, 0], (self.axes.pb - self.axes.pa)[:, 0]

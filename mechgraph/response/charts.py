@@ -31,6 +31,7 @@ from mechgraph.kinematics.motion_path import in_blocks
 from mechgraph.kinematics.rates import PassiveMotion, Rates, Velocities
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
+from mechgraph.kinematics.touching import strayed
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import RESPONSE
 from mechgraph.model.loads import Load
@@ -490,6 +491,8 @@ def trajectory_of(
     out.engine, out.method = task.engine, "loop_wrench"
     kinetic, potential = np.zeros(t.size), np.zeros(t.size)
     for places, own, closed, v in blocks:
+        if fault := strayed(closed.here):
+            raise DeclarationError(f"mechanism {m.name!r}", [fault])
         # the batch of a block is its own: loads are functions of time here, not arrays over positions
         at, count, q = t[places], len(places), coordinates[:, places]
         rates = _still(closed.here) if at_rest else moved(closed, v, own.prescribed_at(at)[1:], own.loads, at).rates
