@@ -412,6 +412,21 @@ def test_a_sun_in_a_bearing_is_redundant_twice():
     assert r.ratios["S.Rz"]["C.Rz"] == pytest.approx(1 + 84 / 24, rel=1e-12)
 
 
+@pytest.mark.parametrize("plane", [False, True])
+def test_the_advice_is_to_let_the_sun_float(plane):
+    """Its effect is that of the same set with the sun on a plane: shares T / (n r_b) of every planet."""
+    held = mg.parts.planetary("P", 24, 30, 84, floating=False, module=0.002)
+    m = mg.Mechanism("set", parts=[held], drives=["P.carrier.Rz", "P.ring.Rz"], loads=[mg.Effort("P.sun.Rz", 6.0)])
+    m = m.to_planar() if plane else m
+    advice = mg.check(m).advice[0]
+    assert advice.brief == "P.sun let float, centered by its meshes: redundancy 2 -> 0"
+    free = advice.apply()
+    assert mg.check(free).redundancy == 0
+    s = mg.solve(free, {"P.carrier.Rz": [0.0, 0.7], "P.ring.Rz": 0.0})
+    forces = [np.linalg.norm(s.coupling(f"P.sun{i}").force, axis=-1) for i in (1, 2, 3)]
+    np.testing.assert_allclose(forces, 6.0 / (3 * 0.024 * np.cos(FULL)), rtol=1e-9)
+
+
 def test_places_of_planets():
     """(20 + 54) / 3 is not whole: places are multiples of 2 pi / 74; six of 30 teeth about 24 overlap, 54 sin 30 = 27 < 32."""
     np.testing.assert_allclose(np.rad2deg(mg.planet_places(20, 54, 3)), [0, 121.6216, 238.3784], atol=5e-5)

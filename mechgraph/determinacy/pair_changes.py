@@ -33,7 +33,9 @@ from mechgraph.kinematics.assembly import assembled, at_position, named_columns
 from mechgraph.kinematics.solver import PROBES, EngineName
 from mechgraph.maths.se3 import Array, Index, null_space
 from mechgraph.maths.tolerances import MOTIONS, STRESSES
+from mechgraph.model.couplings import motion_of
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.meshes import Mesh
 from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.pairs import pair_type as evaluation
 from mechgraph.pairs.pair_type import TABLE, PairType
@@ -54,7 +56,13 @@ COUPLING, LEFT_OUT = "coupling", "left out"
 """What a coupling is changed from and to."""
 RIGID, SPLINE = "rigid", "P"
 """What a shaft is changed from and to, in which a spline is inserted."""
-WHOLE = {COUPLING: "coupling {} left out", RIGID: "spline inserted in {}"}
+CENTERED = "centered"
+"""What a gear is changed from that is let float."""
+WHOLE = {
+    COUPLING: "coupling {} left out",
+    RIGID: "spline inserted in {}",
+    CENTERED: "{} let float, centered by its meshes",
+}
 """Changes that are not those of a pair, in words, by what is changed."""
 
 
@@ -477,16 +485,42 @@ def splines(freedoms: Freedoms, driven: Index, engine: EngineName = "auto") -> I
         if np.abs(line @ states[:, pairs[0]]).max(initial=0.0) > STRESSES.relieved * length:
             tried += 1
             new = with_spline(at_position(m, here.system, here.x[:, 0]), names[link])
-            system, x = assembled(new)
-            columns, _ = named_columns(new, system, {d.freedom: 0.0 for d in new.drives})
-            after = free_motion(system, x, columns, engine)
-            yield Effect(
-                ((names[link], RIGID, SPLINE),),
-                (freedoms.redundancy, after.redundancy),
-                (freedoms.mobility, after.mobility),
-                (len(freedoms.passive), len(after.passive)),
-                (0.0,),
-            )
+            yield _effect_of(freedoms, new, ((names[link], RIGID, SPLINE),), engine)
+
+
+def _effect_of(
+    before: Freedoms, new: Mechanism, changes: tuple[tuple[str, str, str], ...], engine: EngineName
+) -> Effect:
+    """The effect of changes, computed from a mechanism of its own."""
+    system, x = assembled(new)
+    columns, _ = named_columns(new, system, {d.freedom: 0.0 for d in new.drives})
+    after = free_motion(system, x, columns, engine)
+    return Effect(
+        changes,
+        (before.redundancy, after.redundancy),
+        (before.mobility, after.mobility),
+        (len(before.passive), len(after.passive)),
+        (0.0,) * len(changes),
+    )
+
+
+def floating(freedoms: Freedoms, engine: EngineName = "auto") -> Iterator[Effect]:
+    """The effect of gears that float between those with which they mesh, in place of a bearing: sun and ring of several planets."""
+    m, here = freedoms.position.m, freedoms.position.declared
+    mates = Counter(m.gear(name).link for c in m.couplings if isinstance(c, Mesh) for name in (c.a, c.b))
+    ends = Counter(link for pair in m.pairs for link in (pair.a, pair.b))
+    most = max(mates.values(), default=0)
+    single = {link for link, count in mates.items() if count == most > 1 == ends[link] and link != m.frame}
+    held = [pair.name for pair in m.pairs if motion_of(pair) == "turn" and single & {pair.a, pair.b}]
+    rows = (in_plane(row) if m.planar else row for row in TABLE.values())
+    free = next(row.symbol for row in rows if row and sorted(f.name for f in row.freedoms) == ["Rz", "Tx", "Ty"])
+    for chosen in (
+        (*((name,) for name in held[:2]), tuple(held[:2])) if held else ()
+    ):  # a second one where one leaves some
+        new = at_position(m, here.system, here.x[:, 0])
+        for name in chosen:
+            new = new.with_pair_type(name, free)
+        yield _effect_of(freedoms, new, tuple((name, CENTERED, free) for name in chosen), engine)
 
 
 def rank_key(chosen: tuple[Change, ...]) -> tuple[int, int, int]:
@@ -578,6 +612,10 @@ def advice(
                 found.append((max(c.effort for c in chosen), new))
         # how hard a spline is to build (see ``pair_changes.EFFORTS``)
         found += [(1, new) for new in budget.of(splines(freedoms, driven, engine), 2.0 * (one + change))]
+        afloat = budget.of(floating(freedoms, engine), 2.0 * (one + change))
+        found += [
+            (-1, new) for new in afloat if new.redundancy[1] < new.redundancy[0] and new.inputs[1] == new.inputs[0]
+        ]
         found.sort(key=lambda item: (item[0] == PLANE, item[1].redundancy[1] > 0, item[0]))
         threes = [tuple(position.m.pairs[k].name for k in three) for three in cylinders(position)]
         effects += [replace(new, cylinders=_among(threes, new)) for _, new in found]
