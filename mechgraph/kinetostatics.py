@@ -285,7 +285,9 @@ ReachName = Literal["raise", "flag"]
 RedundantName = Literal["nan", "minimum_norm", "elastic"]
 ON_REACH: tuple[ReachName, ...] = ("raise", "flag")
 REDUNDANT: tuple[RedundantName, ...] = ("nan", "minimum_norm", "elastic")
-SOLVED = (Status.OK.value, Status.CHANGE_POINT.value, Status.ACTUATORS_REST.value, Status.FRICTION_OPEN.value)
+SOLVED = tuple(
+    s.value for s in (Status.OK, Status.CHANGE_POINT, Status.ACTUATORS_REST, Status.FRICTION_OPEN, Status.LIFTS_OFF)
+)
 """Outcomes that are no reason to raise."""
 DEAD = (
     "The drivers do not determine the motion there. Drive another freedom, omit the position, or pass on_reach='flag'"

@@ -12,8 +12,7 @@ import numpy as np
 from mechgraph.determinacy.finite_motion import branches
 from mechgraph.determinacy.mobility import stand_still
 from mechgraph.errors import DeclarationError
-from mechgraph.force.block import BlockForces, ForceTask, forces_of_block
-from mechgraph.force.friction import OUTCOMES
+from mechgraph.force.block import FORCE_OUTCOMES, BlockForces, ForceTask, forces_of_block
 from mechgraph.kinematics.assembly import CLOSED
 from mechgraph.kinematics.motion_path import BLOCK, DriverPath, Positions, Status, continued, in_blocks
 from mechgraph.kinematics.prescribed import DriverMotion
@@ -113,6 +112,7 @@ class Outcome:
         )
         self.trajectory.loads = loads
         self.trajectory.method = line.options.method
+        self.trajectory.closing = closure_solver(line.engine, line.acting, line.hold)
 
     @property
     def moved(self) -> bool:
@@ -135,9 +135,8 @@ class Outcome:
         if len(motion.places):
             forces = self._forces(motion, f)
             self.trajectory.put(motion, forces)
-            outcome = np.zeros(0) if forces.rubs is None else forces.rubs.outcome
-            for number in np.unique(outcome[outcome > 0]):
-                self.trajectory.mark(motion.places[outcome == number], OUTCOMES[number])
+            for number in np.unique(forces.outcome[forces.outcome > 0]):
+                self.trajectory.mark(motion.places[forces.outcome == number], FORCE_OUTCOMES[number])
 
     def _forces(self, motion: BlockMotion, f: FactoredClosure) -> BlockForces:
         line = self.line
@@ -159,7 +158,7 @@ class Outcome:
         with np.errstate(over="ignore", invalid="ignore"):
             found = forces_of_block(task, motion.rates, f, coordinates, motion.places)
             finite = np.isfinite(found.balance + found.power) | self.contradicting[motion.places]
-            finite |= False if found.rubs is None else found.rubs.outcome > 0
+            finite |= found.outcome > 0
         if not finite.all():
             too_large = "forces are beyond the largest number (1.8e308): masses, loads or rates are too large"
             raise DeclarationError(f"solve {line.m.name!r}", [too_large])

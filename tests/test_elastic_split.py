@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy
 
 import mechgraph as mg
 
@@ -134,6 +135,7 @@ def test_a_study_over_misfits() -> None:
         {"F": lambda s: s["A"].components["Fz"]},
         motions={"A": [0.0]},
         redundant="elastic",
+        sampling="grid",
     )
     assert np.allclose(
         result.outputs["F"][:, 0], WEIGHT * 2 / 3 + result.parameters["A.misfit.Fz"] * 2e6 / 3, rtol=1e-9
@@ -158,4 +160,101 @@ def test_files_units_and_faults(tmp_path) -> None:
         with pytest.raises(mg.DeclarationError, match=words):
             m.replace(pairs=[pair.replace(stiffness=bad), m.pairs[1]])
     with pytest.raises(mg.DeclarationError, match="redundant='elastic'"):
-        mg.solve(m, {"A": [0.0]}).misfit_sensitivity  # noqa: B018
+        mg.solve(door(), {"A": [0.0]}).misfit_sensitivity  # noqa: B018
+
+
+def test_a_door_moves_as_its_hinges_give_way() -> None:
+    """The twist of a rigid body whose points at both hinges move by the deflections there, from closed forms of these."""
+    s = mg.solve(door(misfit=1e-4), {"A": [0.0]}, redundant="elastic")
+    across, down = WEIGHT * 0.4 / 1.4 / 1e7, 1e-4 - (WEIGHT * 2 / 3 + 1e-4 * 2e6 / 3) / 2e6
+    turn = 2 * across / 1.4
+    assert s.link("door").displacement[0] == pytest.approx([0, turn, 0, -across - 0.2 * turn, 0, down], abs=1e-15)
+    assert not s.link("frame").displacement.any()
+    # least-norm reactions contradict the stiffness: no motion of the door belongs to them
+    with pytest.warns(mg.MechgraphWarning, match="left out"):
+        other = mg.solve(door(misfit=1e-4), {"A": [0.0]}, redundant="minimum_norm")
+    assert np.isnan(other.link("door").displacement).any()
+
+
+def test_a_table_sinks_and_tilts() -> None:
+    m = feet([1e6, 2e6, 3e6, 4e6], (0.2, -0.1), 1e-4)
+    s = mg.solve(m, dict.fromkeys((d.freedom for d in m.drives), 0.0), redundant="elastic")
+    turn_x, turn_y, _, *_, down = s.link("table").displacement
+    for i, (x, y) in enumerate([(1, 1), (-1, 1), (-1, -1), (1, -1)]):
+        assert down + turn_x * y - turn_y * x == pytest.approx(s[f"f{i}"].deflection["Fz"], rel=1e-9)
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+def test_the_tip_of_a_four_bar_moves_by_the_work_of_a_unit_load(engine: str) -> None:
+    """Determinate in the plane: a force on the coupler and soft pins; the work of the force is twice the energy in the pins."""
+    m = mg.load("four-bar").to_planar()
+    soft = [p.replace(stiffness={"Fx": 1e5, "Fy": 3e5}) for p in m.pairs]
+    push = mg.Wrench("coupler", force=(3.0, -2.0), point=(0, 0))
+    s = mg.solve(m.replace(pairs=soft, loads=[push]), {"A": [0.7, 1.2]}, engine=engine)
+    twist, r = s.link("coupler").displacement, s.link("coupler").point((0, 0, 0)).position
+    moved = twist[:, 3:] + np.cross(twist[:, :3], np.broadcast_to(r, twist[:, 3:].shape))
+    work = moved @ [3.0, -2.0, 0.0]
+    energy = sum(s[p.name].components[c] ** 2 / k for p in soft for c, k in (("Fx", 1e5), ("Fy", 3e5)))
+    assert work == pytest.approx(energy, rel=1e-9)
+
+
+def test_a_table_tips_over() -> None:
+    """Its weight beyond the line through two feet: no feet that push bear it. Other positions of the batch are not touched."""
+    m = feet([1e6] * 4, (0.3, 0.2), closed="force")
+    x = mg.Wrench("table", force=np.array([[0, 0, 0], [900.0, 0, 0], [50.0, 0, 0]]), point=(0, 0, 0.7))
+    m = m.replace(loads=[*m.loads, x])
+    at = dict.fromkeys((d.freedom for d in m.drives), [0.0] * 3)
+    s = mg.solve(m, at, redundant="elastic")
+    assert s.status.tolist() == ["ok", "lifts off", "ok"]
+    assert np.isnan(loads(s)[:, 1]).all()
+    assert np.isfinite(loads(s)[:, [0, 2]]).all()
+    assert "lifts off" in str(s)
+
+
+def test_feet_lift_beside_what_stays_unknown() -> None:
+    """Two rigid stops share what presses across them, unknown: that does not keep a short foot from lifting."""
+    m = feet([1e6] * 4, (-0.3, -0.2), -2e-3, closed="force")
+    stops = [mg.Pair(name, "Sp", "floor", "table", point=(1, 0, 0), axis=(0, 1, 0)) for name in ("one", "two")]
+    m = m.replace(pairs=[*m.pairs, *stops], drives=["guide.Tx", "guide.Rz"])
+    s = mg.solve(m, {"guide.Tx": 0.0, "guide.Rz": 0.0}, redundant="elastic")
+    assert np.isnan(s["one"].components["Fz"])
+    assert abs(loads(s)[0]) < 1e-9 * WEIGHT
+    assert loads(s)[1:].sum() == pytest.approx(WEIGHT, rel=1e-9)
+
+
+def test_results_do_not_hang_on_other_positions() -> None:
+    m = feet([1e6, 2e6, 3e6, 4e6], (-0.3, -0.2), -1e-4, closed="force")
+    push = mg.Wrench("table", force=np.array([[0, 0, 0], [0, 0, -1e9]]), point=(0, 0, 0))
+    at = dict.fromkeys((d.freedom for d in m.drives), np.zeros(2))
+    both = mg.solve(m.replace(loads=[*m.loads, push]), at, redundant="elastic")
+    alone = mg.solve(m, dict.fromkeys(at, 0.0), redundant="elastic")
+    assert loads(both)[:, 0] == pytest.approx(loads(alone), rel=1e-12, abs=1e-12 * WEIGHT)
+
+
+def test_misfits_that_are_left_out_are_told() -> None:
+    for redundant in ("nan", "minimum_norm"):
+        with pytest.warns(mg.MechgraphWarning, match=r"misfits of A\.Fz are left out"):
+            s = mg.solve(door(misfit=1e-4), {"A": [0.0]}, redundant=redundant)
+        assert "misfits of A.Fz" in str(s)
+    with pytest.warns(mg.MechgraphWarning, match="left out"):
+        study = mg.study(door(), {"A.misfit.Fz": [0.0, 1e-4]}, "A.effort", motions={"A": [0.0]}, sampling="grid")
+    assert "left out" in str(study)
+
+
+def test_misfits_with_tolerances_give_bounds() -> None:
+    """Misfits within +-h at both hinges: the split moves by at most 2 h k1 k2 / (k1 + k2), the worst case of the study."""
+    h, k = 5e-5, 2e6 / 3
+    both = {f"{name}.misfit.Fz": scipy.stats.uniform(-h, 2 * h) for name in "AB"}
+    m = door()
+    m = m.replace(pairs=[m.pairs[0], m.pairs[1].replace(misfit={"Fz": 0.0})])
+    study = mg.study(m, both, "A:Fz", n=24, sampling="latin", seed=1, motions={"A": [0.0]}, redundant="elastic")
+    F = study.outputs["A:Fz"][:, 0]
+    off = study.parameters["A.misfit.Fz"] - study.parameters["B.misfit.Fz"]
+    assert pytest.approx(WEIGHT * 2 / 3 + k * off, rel=1e-9) == F
+    low, high = study.worst_case("A:Fz")
+    assert (low[0], high[0]) == pytest.approx((WEIGHT * 2 / 3 - 2 * h * k, WEIGHT * 2 / 3 + 2 * h * k), rel=1e-6)
+    assert ((low <= F) & (high >= F)).all()
+    soft = mg.study(
+        m, {"B.stiffness.Fz": [1e6, 4e6]}, "A:Fz", sampling="grid", motions={"A": [0.0]}, redundant="elastic"
+    )
+    assert soft.outputs["A:Fz"][:, 0] == pytest.approx(WEIGHT * np.array([2 / 3, 1 / 3]), rel=1e-9)

@@ -285,9 +285,18 @@ def test_friction_of_what_is_not_unique_is_not_determined() -> None:
     soft = m.replace(
         pairs=[p.replace(stiffness=dict.fromkeys(("Fx", "Fy", "Fz"), 1e7) | {"Mx": 0, "My": 0}) for p in m.pairs]
     )
-    elastic = moved(soft, redundant="elastic")
-    forces = sum(np.hypot(elastic[k].components["Fx"], elastic[k].components["Fy"]) for k in "ABC")
-    assert elastic["A"].effort[0] == pytest.approx(RHO * forces, rel=1e-9)
+    couples = []
+    for misfit in (0.0, 1e-5, 1e-4):
+        seats = [p.replace(misfit={"Fx": misfit}) if p.name == "B" else p for p in soft.pairs]
+        elastic = moved(soft.replace(pairs=seats), redundant="elastic")
+        forces = sum(np.hypot(elastic[k].components["Fx"], elastic[k].components["Fy"]) for k in "ABC")
+        couples.append(elastic["A"].effort[0])
+        assert couples[-1] == pytest.approx(RHO * forces, rel=1e-9)
+        # three springs along a rigid shaft without friction: two equations of balance, and no bending
+        F = np.linalg.solve([[1, 1, 1], [0, 0.3, 0.5], [0.2, -0.5, 0.3]], [-W, -0.2 * W, -0.5 * 1e7 * misfit])
+        across = RHO * np.abs(F).sum()
+        assert couples[-1] == pytest.approx(across, rel=1e-9)
+    assert couples[2] > 3 * couples[0]
 
 
 def test_a_planar_mechanism_in_space_rubs_without_locked_in_forces() -> None:
@@ -398,18 +407,33 @@ def test_belts_with_pretension_rub_in_their_bearings() -> None:
     assert s["p"].effort == pytest.approx(2 * RHO * 600.0)
 
 
-def test_feet_that_lift_are_not_solved_with_friction() -> None:
+@pytest.mark.parametrize("k", [(1e6, 1e6, 1e6, 1e6), (1e6, 2e6, 3e6, 4e6)])
+def test_a_table_is_dragged_on_four_elastic_feet(k: tuple[float, ...]) -> None:
+    """Normal forces of a rigid plate on springs, friction mu N at each; where a foot would have to pull nothing is determined."""
+    at = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)])
     plate = [
-        mg.Pair(f"f{i}", "Sp", "ground", "plate", point=(x, y, 0), axis=Z, closed="force", stiffness={"Fz": 1e6})
-        for i, (x, y) in enumerate([(1, 1), (-1, 1), (-1, -1), (1, -1)])
+        mg.Pair(f"f{i}", "Sp", "ground", "plate", point=(x, y, 0), axis=Z, closed="force", stiffness={"Fz": k[i]})
+        for i, (x, y) in enumerate(at)
     ]
     guide = mg.Pair("G", "Fr", "ground", "plate", point=(0, 0, 0), axis=Z)
-    push = mg.Wrench("plate", force=(0, 0, -W), point=(0.1, 0.2, 0))
-    m = mg.Mechanism(
-        "plate", pairs=[*plate, guide], drives=["G.Tx", "G.Ty", "G.Rz"], loads=[push, mg.Friction("f0", mu=0.3)]
-    )
-    with pytest.raises(mg.DeclarationError, match="not solved together with friction"):
-        mg.solve(m, {"G.Tx": mg.Motion(0.0, velocity=1.0), "G.Ty": 0.0, "G.Rz": 0.0}, redundant="elastic")
+
+    def dragged(*center: float) -> mg.Solution:
+        push = mg.Wrench("plate", force=(0, 0, -W), point=(*center, 0))
+        dry = [mg.Friction(p.name, mu=0.3) for p in plate]
+        m = mg.Mechanism("plate", pairs=[*plate, guide], drives=["G.Tx", "G.Ty", "G.Rz"], loads=[push, *dry])
+        return mg.solve(m, {"G.Tx": mg.Motion([0.0], velocity=1.0), "G.Ty": 0.0, "G.Rz": 0.0}, redundant="elastic")
+
+    s = dragged(0.1, 0.2)
+    twist = np.array([1, -1, 1, -1]) / k
+    N = np.linalg.solve([np.ones(4), *at.T, twist], [W, 0.1 * W, 0.2 * W, 0.0])
+    assert [s[p.name].components["Fz"][0] for p in plate] == pytest.approx(N, rel=1e-10)
+    effort = dict(zip(guide.freedom_names, s["G"].effort[0], strict=True))
+    assert effort["G.Tx"] == pytest.approx(0.3 * W, rel=1e-10)
+    assert effort["G.Rz"] == pytest.approx(-0.3 * N @ at[:, 1], rel=1e-9)
+    far = dragged(0.9, 0.9)
+    assert far.status == "friction not determined"
+    assert np.isnan(far["G"].effort).all()
+    assert np.isnan(far["f0"].normal_forces).all()
 
 
 def test_preload_and_viscous() -> None:

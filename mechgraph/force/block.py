@@ -9,13 +9,14 @@ import numpy as np
 import scipy
 
 from mechgraph.errors import DeclarationError
-from mechgraph.force.elastic import elastic_split, seats_of
+from mechgraph.force.elastic import LIFTS_OFF, component_values, elastic_split, seats_of
 from mechgraph.force.friction import OUTCOMES, Rubbed, moving_rates, places_of, rubbed
 from mechgraph.force.loads import Site, inertia_wrenches, kinetic_power
 from mechgraph.force.reactions import (
     METHODS,
     STRAIN,
     ForceProblem,
+    PairFrames,
     Stress,
     Wrenches,
     at_pair_points,
@@ -42,6 +43,9 @@ from mechgraph.model.belts import pretensions
 from mechgraph.model.friction import Friction, pairs_of, rubbing_loads
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
+
+FORCE_OUTCOMES = (*OUTCOMES, LIFTS_OFF)
+"""What becomes of the forces at a position, by number."""
 
 
 def is_idle(size: Array, terms: Array) -> bool:
@@ -122,7 +126,7 @@ class BlockForces:
     the loops with ``multiplier_stress (n, s, T)``, of which ``coupled_stress (F, s, T)`` are the efforts in freedoms.
     Where stiffness splits reactions: those that misfits lock in ``locked (6, P, T)``, and those of a misfit of one in every component
     that is not rigid ``of_misfit (6, P, k, T)``. With friction: what came about, ``rubs``, and at rest the least and greatest efforts
-    between which drives may be ``range (F, 2, T)``.
+    between which drives may be ``range (F, 2, T)``; ``unborne (T,)`` where feet that only push cannot bear the loads.
     """
 
     reactions: Array
@@ -146,6 +150,15 @@ class BlockForces:
     of_misfit: Array | None = None
     rubs: Rubbed | None = None
     range: Array | None = None
+    unborne: Mask | None = None
+
+    @property
+    def outcome(self) -> Array:
+        """What became of every position ``(T,)``, by its number in ``FORCE_OUTCOMES``."""
+        if self.rubs is not None:
+            return self.rubs.outcome
+        lifts = FORCE_OUTCOMES.index(LIFTS_OFF)
+        return np.zeros(self.power.shape, int) if self.unborne is None else np.where(self.unborne, lifts, 0)
 
 
 @dataclass(frozen=True)
@@ -225,6 +238,7 @@ def forces_of_block(
         found.of_misfit,
         rubs=rubs,
         range=ranges,
+        unborne=found.unborne,
     )
 
 
@@ -239,6 +253,7 @@ class _FreeForces:
     coupled: Array
     locked: Array | None = None
     of_misfit: Array | None = None
+    unborne: Mask | None = None
 
 
 def _least_on_flanks(
@@ -310,7 +325,7 @@ def _least(
         multipliers = multipliers - others
     found = _found(here, totals, multipliers, stress)
     if s and task.redundant == "elastic":
-        return _elastic(here, found)
+        return _elastic(here, found, any(load.follows_reactions for load in task.loads))
     if not (s and f.complete):
         return found
     y = least_multiples(here, found.reactions, found.efforts, multipliers, stress)
@@ -324,8 +339,12 @@ def _least(
     )
 
 
-def _without(found: _FreeForces, places: Mask) -> _FreeForces:
-    """The same with no value at some positions."""
+def _undetermined(found: _FreeForces, rubs: Rubbed, places: Mask) -> _FreeForces:
+    """The same with no value where friction has no solution, or is not determined, as at some more ``places``."""
+    rubs.outcome[places & (rubs.outcome == 0)] = OUTCOMES.index("friction not determined")
+    for values in (rubs.efforts, rubs.taken, rubs.normals, rubs.teeth, rubs.beside, rubs.rubbing):
+        values[..., places] = np.nan
+    places = rubs.outcome > 0
     parts = (
         np.where(places, np.nan, part) for part in (found.reactions, found.efforts, found.multipliers, found.coupled)
     )
@@ -349,12 +368,9 @@ class _FrictionProblem:
         dry: Sequence[Friction],
     ) -> None:
         self.here, self.task, self.f, self.wrenches, self.lines, self.dry = here, task, f, wrenches, lines, dry
-        if task.redundant == "elastic" and seats_of(here).push.any():
-            why = "reactions split by stiffness, with pairs that only push, are not solved together with friction"
-            raise DeclarationError(
-                f"solve {here.system.m.name!r}", [f"{why}; declare these pairs closed='form', or leave friction out"]
-            )
         self.found, self.flank = self.smooth = smooth
+        # with friction a split by stiffness holds what only pushes as if it could pull; where it would, nothing is determined
+        self.push = None if self.found.locked is None else seats_of(here.system).push
         self._answer_units()
 
     def _answer_units(self) -> None:
@@ -396,8 +412,7 @@ class _FrictionProblem:
             if not (self.lines and turned.any()):
                 return found, rubs, self.flank
             self._put_on(None, np.where(turned, found.multipliers, self.flank))
-        rubs.outcome[turned] = OUTCOMES.index("friction not determined")
-        return _without(found, turned), rubs, self.flank
+        return _undetermined(found, rubs, turned), rubs, self.flank
 
     def _put_on(self, found: _FreeForces | None, flank: Array) -> None:
         """Take forces without friction, and those of unit efforts, on flanks of signs ``(n, T)``."""
@@ -428,11 +443,12 @@ class _FrictionProblem:
             size = np.abs(reactions).max(axis=(0, 1))
             if not (any(place.follows for place in places) and (moved > STRESSES.rounding * size).any()):
                 break
-        else:
-            rubs.outcome[(moved > MOTIONS.still * size) & (rubs.outcome == 0)] = OUTCOMES.index(
-                "friction not determined"
-            )
-        return _without(replace(found, **sums), rubs.outcome > 0), rubs
+        doubtful = (moved > MOTIONS.still * size) & any(place.follows for place in places)
+        found = replace(found, **sums)
+        if self.push is not None:
+            values = component_values(PairFrames(self.here), found.reactions)
+            doubtful |= (values[self.push] < -STRESSES.rounding * np.abs(values).max(axis=0)).any(axis=0)
+        return _undetermined(found, rubs, doubtful), rubs
 
     def _read(self, forces: Mapping[str, Array]) -> Array:
         """The wrenches that normal forces are read from: reactions, and behind them forces between teeth."""
@@ -454,9 +470,9 @@ class _FrictionProblem:
         return out
 
 
-def _elastic(here: Configuration, found: _FreeForces) -> _FreeForces:
-    """Reactions and efforts as stiffness splits them; the self-stresses that stay unknown."""
-    split, stress = elastic_split(here, found.reactions, found.efforts, found.stress), found.stress
+def _elastic(here: Configuration, found: _FreeForces, held: bool) -> _FreeForces:
+    """Reactions and efforts as stiffness splits them; the self-stresses that stay unknown. ``held``: see ``elastic_split``."""
+    split, stress = elastic_split(here, found.reactions, found.efforts, found.stress, held), found.stress
 
     def of(multiples: Array) -> Array:
         return np.asarray(np.einsum("cpit,it->cpt", stress.wrenches, multiples))
@@ -471,6 +487,7 @@ def _elastic(here: Configuration, found: _FreeForces) -> _FreeForces:
         row_efforts(here, multipliers[:, None])[:, 0],
         of(split.locked),
         np.einsum("cpit,ikt->cpkt", stress.wrenches, split.unit[:, split.soft]),
+        split.unborne,
     )
 
 
@@ -566,5 +583,5 @@ def _power(
 
 
 def _largest(values: Array) -> float:
-    """Largest size of a number in an array; 0 for none."""
-    return float(max(values.max(initial=0.0), -values.min(initial=0.0)))
+    """Largest size of a number in an array; 0 for none. Positions without forces are NaN."""
+    return float(max(np.fmax.reduce(values, axis=None, initial=0.0), -np.fmin.reduce(values, axis=None, initial=0.0)))

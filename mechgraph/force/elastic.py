@@ -6,34 +6,55 @@ least (Castigliano): with the compliances ``C = diag 1/k``, zero where rigid,
     (N^T C N) x = N^T (misfit - C l0).
 
 A component with k = 0 carries nothing: ``l = 0`` is a condition. Self-stresses that strain rigid components alone stay unknown. Where a
-force closes a pair its normal component is not negative, and lifts off else (least squares under signs, ``force.reactions``).
+force closes a pair its normal component is not negative, and lifts off else (least squares under signs, ``force.reactions``); where it is
+among what stays unknown no sign is asked of it.
+
+Links move by small twists d with what their pairs give way, ``misfit - l / k``: with the reactions u that balance a unit load P on a link,
+``P . d = - sum u (misfit - l / k)`` (virtual work).
 Source: S. Timoshenko, Strength of Materials II, 1956; C. L. Lawson and R. J. Hanson, Solving Least Squares Problems, 1974.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from mechgraph.errors import DeclarationError
-from mechgraph.force.reactions import PairFrames, Stress, least_above
-from mechgraph.kinematics.state import Configuration
-from mechgraph.maths.se3 import Array, Index
+from mechgraph.force.reactions import (
+    ForceProblem,
+    PairFrames,
+    Stress,
+    least_above,
+    loop_wrench,
+    split_stress,
+)
+from mechgraph.kinematics.motion_path import Status
+from mechgraph.kinematics.state import Configuration, FactoredClosure
+from mechgraph.kinematics.system import System
+from mechgraph.kinematics.touching import ContactLines
+from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.tolerances import STRESSES
 from mechgraph.model.mechanism import Mechanism
+
+LIFTS_OFF = Status.LIFTS_OFF.value
+"""Status where what only pushes cannot bear the loads: a table that tips over."""
 
 
 @dataclass(frozen=True)
 class Seats:
-    """What pairs say of their seats: for every reaction component ``(K,)`` of all pairs, group by group, the ``compliance`` and the
-    ``misfit`` in internal units, whether it carries nothing (``loose``), the sense in which it can only push (``push``, 0 for none).
+    """What pairs say of their seats: for every reaction component ``(K,)`` of all pairs, group by group, its name ``A.Fz`` (``labels``),
+    whether it is a ``couple``, the ``compliance`` and the ``misfit`` in internal units, whether it carries nothing (``loose``) or can only
+    ``push``.
     """
 
+    labels: tuple[str, ...]
+    couple: Mask
     compliance: Array
     misfit: Array
-    loose: Array
-    push: Array
+    loose: Mask
+    push: Mask
 
     @property
     def soft(self) -> Index:
@@ -45,7 +66,7 @@ class Seats:
 class ElasticSplit:
     """Multiples ``y (s, T)`` of the self-stresses, those of them that misfits lock in ``locked (s, T)``; ``left (s, s, T)`` are the mixes
     that stay unknown (columns of zeros else), ``unit (s, K, T)`` what a misfit of one in each component adds, ``soft`` the components
-    that are not rigid.
+    that are not rigid; ``unborne (T,)`` where what only pushes cannot bear the loads.
     """
 
     y: Array
@@ -53,56 +74,62 @@ class ElasticSplit:
     left: Array
     unit: Array
     soft: Index
+    unborne: Mask
 
 
-def component_values(here: Configuration, wrenches: Array) -> Array:
+def component_values(frames: PairFrames, wrenches: Array) -> Array:
     """Components ``(K, ..., T)`` of reaction wrenches ``(6, P, ..., T)``, group by group."""
-    parts = [part.reshape(-1, *part.shape[2:]) for part in PairFrames(here).components(wrenches)]
-    return np.concatenate(parts)
+    return np.concatenate([each for part in frames.components(wrenches) for each in part])
 
 
-def seats_of(here: Configuration) -> Seats:
+def seats_of(system: System) -> Seats:
     """The seats of the pairs of a system, in the order of ``component_values``."""
-    m: Mechanism = here.system.m
-    L = here.system.par.L
-    rows: list[tuple[float, float, bool, float]] = []
-    for g in here.system.groups:
+    m: Mechanism = system.m
+    L = system.par.L
+    rows: list[tuple[str, bool, float, float, bool, bool]] = []
+    for g in system.groups:
         parts = g.row.reactions or ()
         for c, name in enumerate(g.row.component_names):
             couple = bool(parts) and parts[c].is_couple
             for k in g.pairs:
-                pair = m.pairs[k] if k < len(m.pairs) else None
-                stiff = None if pair is None or pair.stiffness is None else getattr(pair.stiffness, name, None)
-                off = 0.0 if pair is None or pair.misfit is None else getattr(pair.misfit, name, None) or 0.0
+                pair = m.pairs[k]
+                stiff = None if pair.stiffness is None else getattr(pair.stiffness, name, None)
+                off = 0.0 if pair.misfit is None else getattr(pair.misfit, name, None) or 0.0
                 unit = L * L if couple else 1.0
-                form = None if pair is None or pair.closed != "force" else pair.type.touching
+                form = pair.type.touching if pair.closed == "force" else None
                 pushed = form is not None and not form.curved and form.forces == (name,)
-                rows.append((unit / stiff if stiff else 0.0, off if couple else off / L, stiff == 0.0, float(pushed)))
-    compliance, misfit, loose, push = (np.array(part) for part in zip(*rows, strict=True))
-    return Seats(compliance, misfit, loose.astype(bool), push)
+                soft = unit / stiff if stiff else 0.0
+                rows.append((f"{pair.name}.{name}", couple, soft, off if couple else off / L, stiff == 0.0, pushed))
+    labels, *parts = zip(*rows, strict=True) if rows else ((),) * 6
+    return Seats(labels, *map(np.array, parts))
 
 
-def elastic_split(here: Configuration, reactions: Array, efforts: Array, stress: Stress) -> ElasticSplit:
-    """The multiples of all self-stresses that come about in reactions ``(6, P, T)`` beside ``efforts (F, T)``, at every position."""
-    seats, T = seats_of(here), here.T
+def elastic_split(here: Configuration, reactions: Array, efforts: Array, stress: Stress, held: bool) -> ElasticSplit:
+    """The multiples of all self-stresses that come about in reactions ``(6, P, T)`` beside ``efforts (F, T)``, at every position.
+
+    ``held``: what only pushes is held as if it could pull too.
+    """
+    seats, frames, T = seats_of(here.system), PairFrames(here), here.T
+    push = np.zeros(0, dtype=np.intp) if held else np.flatnonzero(seats.push)
     if not (seats.compliance.any() or seats.loose.any()):
         m = here.system.m
         raise DeclarationError(
             f"solve {m.name!r}",
             ["redundant='elastic': no pair has a stiffness; give those that share a load stiffness="],
         )
-    N = np.moveaxis(component_values(here, stress.wrenches), -1, 0)
-    own = component_values(here, reactions).T
-    s, K = N.shape[2], N.shape[1]
-    out = ElasticSplit(np.zeros((s, T)), np.zeros((s, T)), np.zeros((s, s, T)), np.zeros((s, K, T)), seats.soft)
-    size = max(float(np.abs(own).max(initial=0.0)), float(np.abs(efforts).max(initial=0.0)))
+    N = np.moveaxis(component_values(frames, stress.wrenches), -1, 0)
+    own = component_values(frames, reactions).T
+    K, s = N.shape[1:]
+    parts = np.zeros((s, T)), np.zeros((s, T)), np.zeros((s, s, T)), np.zeros((s, K, T))
+    out = ElasticSplit(*parts, seats.soft, np.zeros(T, dtype=bool))
+    size = np.maximum(np.abs(own).max(axis=1, initial=0.0), np.abs(efforts).max(axis=0, initial=0.0))
     for t in range(T):
-        _split_at(t, seats, N[t], own[t], out, size)
+        _split_at(t, seats, push, N[t], own[t], out, float(size[t]))
     return out
 
 
-def _split_at(t: int, seats: Seats, N: Array, own: Array, out: ElasticSplit, size: float) -> None:
-    """Fill in one position: self-stresses ``N (K, s)``, reactions ``own (K,)``; ``size`` of the largest reaction of all positions."""
+def _split_at(t: int, seats: Seats, push: Index, N: Array, own: Array, out: ElasticSplit, size: float) -> None:
+    """Fill in one position: self-stresses ``N (K, s)``, reactions ``own (K,)``; ``size`` of the largest one, components that only push."""
     C, s = seats.compliance, N.shape[1]
     free, fixed = _conditions(N[seats.loose], own[seats.loose], s, size)
     if fixed is None:  # the loads ask for what carries nothing: no self-stress is known
@@ -120,23 +147,23 @@ def _split_at(t: int, seats: Seats, N: Array, own: Array, out: ElasticSplit, siz
     A = np.sqrt(C)[:, None] * (N @ Z)
     inverse = np.linalg.inv(A.T @ A)
     N_own = own + N @ fixed
+    push = push[np.abs(N[push] @ left).max(axis=1, initial=0.0) <= STRESSES.unique]
+    G = N[push] @ Z
 
     def least(misfit: Array) -> tuple[Array, Array]:
         """Multiples of Z, and the self-stresses that stay where what lifts off carries nothing."""
         pull = (N @ Z).T @ (misfit - C * N_own)
         z, stays = inverse @ pull, np.eye(Z.shape[1])
-        pushed = np.flatnonzero(seats.push)
-        G = N[pushed] @ Z
-        if pushed.size and not left.shape[1] and (N_own[pushed] + G @ z < -STRESSES.rounding * size).any():
+        if (N_own[push] + G @ z < -STRESSES.rounding * size).any():
             b = -A @ inverse @ pull
-            found = least_above(A, b, G, -N_own[pushed])
+            found = least_above(A, b, G, -N_own[push])
             z = np.full(Z.shape[1], np.nan) if found is None else found
-            lifted = G[np.abs(N_own[pushed] + G @ z) <= STRESSES.unique * max(size, 1e-300)]
+            lifted = G[np.abs(N_own[push] + G @ z) <= STRESSES.unique * max(size, 1e-300)]
             stays = _conditions(lifted, np.zeros(len(lifted)), Z.shape[1])[0]
         return z, stays
 
     z, stays = least(seats.misfit)
-    out.y[:, t] = fixed + Z @ z
+    out.y[:, t], out.unborne[t] = fixed + Z @ z, np.isnan(z).any()
     if seats.misfit.any():
         out.locked[:, t] = Z @ (z - least(np.zeros(len(C)))[0])
     Zs = Z @ stays
@@ -153,3 +180,49 @@ def _conditions(A: Array, b: Array, s: int, size: float = 0.0) -> tuple[Array, A
     y = -turn[:r].T @ ((ways[:, :r].T @ b) / sizes[:r])
     met = np.abs(A @ y + b).max() <= STRESSES.unique * max(np.abs(b).max(), size, 1e-300)
     return turn[r:].T, y if met else None
+
+
+def strains(system: System, deflections: Mapping[str, Array]) -> Array:
+    """Deflections by component ``A.Fz``, in the user's units, as ``(K, T)`` in internal ones, in the order of ``component_values``."""
+    seats = seats_of(system)
+    unit = np.where(seats.couple, 1.0, system.par.L)
+    return np.array([deflections[name].reshape(-1) / u for name, u in zip(seats.labels, unit, strict=True)])
+
+
+def displacement(
+    here: Configuration, f: FactoredClosure, driven: Index, link: int, strain: Array, flank: Array
+) -> Array:
+    """The small twist ``(6, T)`` of a link where pairs give way by ``strain (K, T)`` in their components and drives hold; on the flanks
+    of multipliers ``(n, T)``.
+
+    A strain that is NaN is one that the others decide. NaN for what they do not decide, or contradict.
+    """
+    frames, lines = PairFrames(here), ContactLines(here)
+
+    def components(totals: Array, multipliers: Array) -> Array:
+        """Of reactions alone ``(T, K, n)``, on the flanks."""
+        totals = totals - lines.relief(multipliers, flank) if lines else totals
+        part = split_stress(here, totals, multipliers, np.arange(here.system.n_freedoms)).wrenches
+        return np.moveaxis(component_values(frames, part), -1, 0)
+
+    P, n = len(here.system.m.pairs), here.system.n_rows - here.system.graph.loop_rows
+    totals, multipliers = np.zeros((6, P, 6, here.T)), np.zeros((n, 6, here.T))
+    for i in range(6):
+        loads = np.zeros((6, len(here.system.m.links), here.T))
+        loads[i, link] = link != here.system.graph.frame
+        found = loop_wrench(ForceProblem(here, loads, np.zeros((here.system.n_freedoms, here.T)), driven, f))
+        totals[:, :, i], multipliers[:, i] = found.totals, found.multipliers
+    x = f.self_stresses(every=True)
+    stress = components(here.pair_wrenches(x), -x[here.system.graph.loop_rows :])
+    out = np.empty((6, here.T))
+    for t, (N, u) in enumerate(zip(stress, components(totals, multipliers), strict=True)):
+        open_ = np.isnan(strain[:, t])
+        known, scale = np.where(open_, 0.0, strain[:, t]), np.linalg.norm(N, axis=0)
+        N = N / np.where(scale > 0, scale, 1.0)
+        y = -np.linalg.lstsq(N[open_], u[open_])[0] if open_.any() else np.zeros((N.shape[1], 6))
+        rest = _conditions(N[open_], np.zeros(int(open_.sum())), N.shape[1])[0]
+        u = u + N @ y
+        contradicts = np.abs((N @ rest).T @ known).max(initial=0.0) > STRESSES.unique * np.abs(known).max(initial=0.0)
+        loose = np.abs(u[open_]).max(axis=0, initial=0.0) > STRESSES.unique * np.abs(u).max(initial=0.0)
+        out[:, t] = np.where(loose | contradicts, np.nan, 0.0 - known @ u)
+    return out

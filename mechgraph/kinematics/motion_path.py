@@ -55,6 +55,7 @@ class Status(Enum):
     JAMS = "jams"
     NO_FINITE_FORCE = "no finite force"
     FRICTION_OPEN = "friction not determined"
+    LIFTS_OFF = "lifts off"
 
 
 def in_blocks(places: Index, most: int = BLOCK) -> list[Index]:

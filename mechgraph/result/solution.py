@@ -46,14 +46,27 @@ from mechgraph.result.values import (
     LoadResult,
     Mask,
     MaterialPoint,
+    MisfitsLeftOut,
     PassedCrossing,
     Unbalanced,
 )
-from mechgraph.result.views import BeltResult, CouplingResult, LinkResult, PairResult, PositionLabels, losses
+from mechgraph.result.views import (
+    BeltResult,
+    CouplingResult,
+    LinkResult,
+    PairResult,
+    PositionLabels,
+    losses,
+    misfits_left_out,
+)
 
 if TYPE_CHECKING:
     import pandas
     import xarray
+
+
+Doubt = LoadBearing | LiftOff | Overlap | Unbalanced | MisfitsLeftOut
+"""What makes a solution doubtful."""
 
 
 class Column(NamedTuple):
@@ -680,11 +693,12 @@ class Solution(Shown):
         return self._values.passive_efforts()
 
     @property
-    def doubts(self) -> tuple[LoadBearing | LiftOff | Overlap | Unbalanced, ...]:
+    def doubts(self) -> tuple[Doubt, ...]:
         """What makes reactions doubtful: passive freedoms that carry load, contacts that would have to pull, or cut into each other; forces
-        that fail the check of equilibrium or power.
+        that fail the check of equilibrium or power; misfits that are left out.
         """
-        return (*self._values.load_bearing(), *lift_offs(self._values), *overlaps(self._values), *self._unbalanced())
+        v = self._values
+        return *v.load_bearing(), *lift_offs(v), *overlaps(v), *self._unbalanced(), *misfits_left_out(v)
 
     def _unbalanced(self) -> Iterator[Unbalanced]:
         checks = self.checks
@@ -719,7 +733,7 @@ class Solution(Shown):
         )
 
     @property
-    def warnings(self) -> tuple[LoadBearing | LiftOff | Overlap | Unbalanced | PassedCrossing | Inaccurate, ...]:
+    def warnings(self) -> tuple[Doubt | PassedCrossing | Inaccurate, ...]:
         """What makes reactions doubtful (``doubts``); crossings of branches that were passed, with place, miss and the other branches;
         rates and forces that rounding spoils (see ``checks.accuracy``).
         """

@@ -29,7 +29,7 @@ from mechgraph.result.values import (
     number,
     with_unit,
 )
-from mechgraph.result.views import UNASKED, PositionLabels
+from mechgraph.result.views import UNASKED, PositionLabels, misfits_left_out
 
 
 class Greatest:
@@ -610,6 +610,7 @@ class _SummaryText(PositionLabels):
             yield Heading("Not unique", 2)
             yield Paragraph(LEAST_NORM if self.values.least_norm else NO_VALUE)
             yield Bullets(_shortened(items, len(loose)))
+            yield from (Paragraph(f"Note: {warning}.") for warning in misfits_left_out(self.values))
 
     def _not_unique(self, k: int) -> list[str]:
         """Names of the components and efforts of a pair that are not unique somewhere."""

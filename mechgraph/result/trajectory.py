@@ -7,7 +7,7 @@ Component axes first, the flat batch of positions last, NaN where a position was
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import copy
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol, Self
@@ -19,6 +19,7 @@ from mechgraph.equations.terms import State
 from mechgraph.errors import DeclarationError, MechgraphError
 from mechgraph.fields import PerCase
 from mechgraph.force.block import BlockForces, hold_names, is_idle
+from mechgraph.force.elastic import displacement, seats_of, strains
 from mechgraph.force.loads import Site, inertia_wrenches, kinetic_energy, user_poses, user_twists
 from mechgraph.force.reactions import PairFrames, given_effort_loads, user_state, user_wrench
 from mechgraph.kinematics.motion_path import Status, in_blocks
@@ -146,6 +147,7 @@ class Trajectory:
         self.has_forces = False
         self.engine: Literal["dense", "sparse", "compiled"] = "dense"
         self.method: str | None = None
+        self.closing: Any = None
         self.work: Any = Work()
 
     def __getstate__(self) -> dict[str, Any]:
@@ -623,21 +625,30 @@ class Trajectory:
         row, unit, found = self._components_of(pair, known[:, pair][:, None])
         return {name: self._out(part) for name, part in zip(row.component_names, unit * found[:, 0], strict=True)}
 
+    @property
+    def split_by_stiffness(self) -> bool:
+        """Whether stiffness split redundant reactions."""
+        return "locked" in self._kept
+
+    def displacement(self, link: int, deflections: Mapping[str, Array]) -> Array:
+        """Small twist ``(..., 6)`` of a link where pairs give way by ``deflections (...)``, ``"A.Fz"``; drives, passive freedoms held."""
+        strain = strains(self._system, deflections)
+
+        def twist(block: BlockMotion) -> Array:
+            here, at = block.here, block.places
+            f = self.closing.factored(here, self.closing.chosen(here, np.full(here.T, -1)))
+            flank = self._force("multipliers")[:, at]
+            return user_twists(here, displacement(here, f, self.driven, link, strain[:, at], flank)[:, None])[:, 0]
+
+        return self._out(self._evaluated(twist))
+
     def misfit_sensitivity(self) -> dict[str, dict[str, Array]]:
         """Change of every component ``"A.Fz"`` for a misfit of one in every component that is not rigid, ``(...)`` each."""
-        if "of_misfit" not in self._kept:
-            raise DeclarationError(
-                f"misfits of {self.whole.name!r}",
-                ["reactions are not split by stiffness; solve(..., redundant='elastic')"],
-            )
-        causes: list[tuple[str, float]] = []
-        for g in self._system.groups:
-            for c, name in enumerate(g.row.component_names):
-                for k in g.pairs:
-                    p = self.whole.pairs[k]
-                    if p.stiffness is not None and p.stiffness.by_component.get(name, 0.0) > 0:
-                        couple = g.row.reactions is not None and g.row.reactions[c].is_couple
-                        causes.append((f"{p.name}.{name}", 1.0 if couple else 1.0 / self._L))
+        if not self.split_by_stiffness:
+            why = "reactions are not split by stiffness; solve(..., redundant='elastic')"
+            raise DeclarationError(f"misfits of {self.whole.name!r}", [why])
+        seats = seats_of(self._system)
+        causes = [(seats.labels[c], 1.0 if seats.couple[c] else 1.0 / self._L) for c in seats.soft]
         out: dict[str, dict[str, Array]] = {}
         for k, p in enumerate(self.whole.pairs):
             row, unit, found = self._components_of(k, self._kept["of_misfit"][:, k])

@@ -262,6 +262,24 @@ class Unbalanced(_Worst):
         return self.text
 
 
+@dataclass(frozen=True)
+class MisfitsLeftOut:
+    """Misfits in reaction ``components`` that are not unique, of which only ``redundant="elastic"`` takes account."""
+
+    components: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        """The warning in one sentence."""
+        return (
+            f"the misfits of {', '.join(self.components)} are left out, with the forces that they lock in: only redundant='elastic', "
+            "with the stiffness of the pairs, takes account of them"
+        )
+
+    def __str__(self) -> str:
+        return self.text
+
+
 OK = "ok"
 """Status of a solved position."""
 

@@ -23,6 +23,7 @@ from mechgraph.result.trajectory import Trajectory
 from mechgraph.result.values import (
     OK,
     MaterialPoint,
+    MisfitsLeftOut,
     bracket,
     coordinate,
     coupling_unit,
@@ -195,6 +196,31 @@ def _asked(values: Trajectory, call: str) -> str:
     return f"What follows from the motion was not evaluated ({size}): {call} does it."
 
 
+def deflections(values: Trajectory, k: int) -> dict[str, Array]:
+    """Small motions ``(...)`` of link b against link a along the components of a pair, ``misfit - l / k``."""
+    p, out = values.whole.pairs[k], {}
+    soft, off = ({} if seat is None else seat.by_component for seat in (p.stiffness, p.misfit))
+    for name, of in values.components(k).items():
+        stiff = soft.get(name)
+        gives = np.zeros(of.shape) if stiff is None else of / stiff if stiff else np.full(of.shape, np.nan)
+        out[name] = off.get(name, 0.0) - gives
+    return out
+
+
+def misfits_left_out(values: Trajectory) -> tuple[MisfitsLeftOut, ...]:
+    """Misfits of components that are not unique where stiffness does not split them."""
+    if not values.has_forces or values.split_by_stiffness:
+        return ()
+    given = {k: p.misfit.by_component for k, p in enumerate(values.whole.pairs) if p.misfit is not None}
+    found = [
+        f"{values.whole.pairs[k].name}.{name}"
+        for k, off in given.items()
+        for name, unique in values.unique(k).items()
+        if off.get(name) and not unique.all()
+    ]
+    return (MisfitsLeftOut(tuple(found)),) if found else ()
+
+
 class PairResult(Shown):
     """Values of one pair; see the properties."""
 
@@ -314,14 +340,7 @@ class PairResult(Shown):
 
         NaN for a component of stiffness 0, which says nothing of it.
         """
-        p = self._values.whole.pairs[self._index]
-        soft = {} if p.stiffness is None else p.stiffness.by_component
-        off = {} if p.misfit is None else p.misfit.by_component
-        out = {}
-        for name, value in self.components.items():
-            k = soft.get(name, np.inf)
-            out[name] = off.get(name, 0.0) - value / k if k else np.full(value.shape, np.nan)
-        return self._by_name("component", out)
+        return self._by_name("component", deflections(self._values, self._index))
 
     @property
     def unique(self) -> dict[str, Array]:
@@ -573,6 +592,17 @@ class LinkResult(Shown):
         return self._values.link(self._index)[2]
 
     @property
+    def displacement(self) -> Array:
+        """Small twist ``(..., 6)``, (turn, motion of the body point at the global origin), by what pairs with ``stiffness`` and ``misfit``
+        give way; drives, passive freedoms, teeth and links are rigid.
+
+        NaN for what pairs that carry nothing leave open, or where deflections contradict each other: pass ``redundant="elastic"``.
+        """
+        pairs = enumerate(self._values.whole.pairs)
+        moved = {f"{p.name}.{c}": of for k, p in pairs for c, of in deflections(self._values, k).items()}
+        return self._values.displacement(self._index, moved)
+
+    @property
     def hold(self) -> Array:
         """Wrench ``(..., 6)`` about the global origin that keeps a passive body from spinning; zero for all other links."""
         return self._values.link_hold(self._index)
@@ -643,4 +673,5 @@ def link_units(units: Mapping[str, str]) -> dict[str, Any]:
         "angular_velocity": angular[1],
         "angular_acceleration": angular[2],
         "hold": (moment,) * 3 + (force,) * 3,
+        "displacement": (angular[0],) * 3 + (length,) * 3,
     }

@@ -38,8 +38,8 @@ from mechgraph.model.parameters import Parameters
 from mechgraph.outcome import Options, Starts
 from mechgraph.quantities import items_of, shown, unit_of, wrong
 from mechgraph.result.contacts import LiftOff, Overlap
-from mechgraph.result.solution import Solution
-from mechgraph.result.values import LoadBearing, Unbalanced
+from mechgraph.result.solution import Doubt, Solution
+from mechgraph.result.values import LoadBearing, MisfitsLeftOut, Unbalanced
 from mechgraph.result.views import LinkResult, PairResult, link_units, pair_units
 from mechgraph.variants.numbers import ALIKE, AnyField, ItemField, Variants, stacked, topology_of, varied
 
@@ -369,8 +369,6 @@ def _led(line: Pipeline, path: NumbersPath, kernel: InKernel | None, valid: Mask
     return valid & ~np.isnan(x).any(axis=0), x
 
 
-Doubt = LoadBearing | LiftOff | Overlap | Unbalanced
-"""What makes a solution doubtful."""
 Build = Callable[..., Mechanism]
 NOT_SOLVED = "not solved"
 """Status of a variant that could not be built or assembled; its message says why."""
@@ -512,6 +510,8 @@ def worst(found: Iterable[Doubt]) -> tuple[Doubt, ...]:
                 name, size = warning.pair, warning.curvature
             case Unbalanced():
                 name, size = warning.check, warning.error
+            case MisfitsLeftOut():
+                name, size = warning.text, 0.0
         key = type(warning), name
         if size >= out.get(key, (size, warning))[0]:
             out[key] = size, warning
