@@ -5,6 +5,7 @@ integrals by quadrature, an orbit led by them with another integrator.
 """
 
 import re
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -16,12 +17,14 @@ FILM = mg.Journal(radius=0.02, length=0.02, clearance=2e-5, viscosity=0.02)
 SPEED = 100.0
 
 
-def rotor(arm: float = 0.01, gravity: float = 0.0, turned: float = 0.0, **more: object) -> mg.Mechanism:
+def rotor(
+    arm: float = 0.01, gravity: float = 0.0, turned: float = 0.0, loads: Sequence[mg.Wrench] = (), **more: object
+) -> mg.Mechanism:
     """A mass on a shaft in one bearing; ``turned``: the shaft along x and y of the marker turned."""
     x = (np.cos(turned), np.sin(turned), 0)
     shaft = mg.Pair("A", "R", "frame", "shaft", point=(0, 0, 0), axis=(0, 0, 1), second=x, **more)
     links = [mg.Link("frame"), mg.Link("shaft", 1.0, (arm, 0, 0))]
-    return mg.Mechanism("rotor", links, [shaft], ["A"], [mg.Gravity((0, -gravity, 0))] if gravity else [])
+    return mg.Mechanism("rotor", links, [shaft], ["A"], [*loads, mg.Gravity((0, -gravity, 0))])
 
 
 def turning(m: mg.Mechanism, n: int = 48) -> mg.Solution:
@@ -212,3 +215,39 @@ def test_a_load_that_is_not_unique_is_told() -> None:
         turning(
             m.replace(pairs=[*m.pairs, mg.Pair("C", "R", "frame", "shaft", point=(0, 0, 0.05), axis=(0, 0, 1)), second])
         ).film("A", FILM)
+
+
+def test_a_load_turning_at_half_the_speed_is_borne_by_squeeze_alone() -> None:
+    """The film sees no mean speed: the journal goes the way of the load, ``de/dt I(e) = W c^2 / (eta R L^3)``, and never turns aside."""
+    W, t = 100.0, np.linspace(0, np.pi, 40) / SPEED
+    way = np.stack([np.cos(SPEED * t / 2), np.sin(SPEED * t / 2)], axis=-1)
+    push = mg.Wrench("shaft", force=np.concatenate([W * way, 0 * way[:, :1]], axis=1), point=(0, 0, 0))
+    s = mg.solve(rotor(arm=0.0, loads=[push]), {"A": mg.Motion(SPEED * t, velocity=SPEED)})
+    film = s.film("A", FILM)
+    assert np.allclose(film.orbit, film.eccentricity[:, None] * way, atol=1e-8)
+    size = W * FILM.clearance**2 / (FILM.viscosity * FILM.radius * FILM.length**3)
+    for i in (5, 20, 39):
+        bears = quad(lambda e: force(np.array([e, 0.0]), 0.0)[0], 0, film.eccentricity[i], epsabs=1e-11)[0]
+        assert bears == pytest.approx(size * t[i], rel=1e-7)
+    assert (np.diff(film.film) < 0).all()
+
+
+def test_a_study_of_the_least_film() -> None:
+    """Outputs of a film by name: each variant has its own orbit, that of its clearance, and of a load that others do not have."""
+    m = rotor(arm=0.0, gravity=9.81, film=FILM).replace(units={"length": "m", "mass": "kg", "time": "s"})
+    motion = {"A": mg.Motion(np.linspace(0, 2 * np.pi, 8, endpoint=False), velocity=SPEED)}
+    names = ["A.film.min", "A.film.pressure", "A.film.torque", "A.film.power"]
+    for parameter, values in (("A.film.clearance", [1.5e-5]), ("shaft.mass", [3.0])):
+        study = mg.study(m, {parameter: values}, names, sampling="grid", motions=motion)
+        for i, value in enumerate(study.parameters[parameter]):
+            film = FILM.replace(clearance=value) if "film" in parameter else FILM
+            load = 9.81 * (value if parameter == "shaft.mass" else 1.0)
+            steady = film.steady(load=load, speed=SPEED)
+            assert study.outputs["A.film.min"][i] == pytest.approx(steady.film, rel=1e-6)
+            assert study.outputs["A.film.pressure"][i] == pytest.approx(np.full(8, steady.pressure), rel=1e-5)
+            assert study.outputs["A.film.torque"][i] == pytest.approx(np.full(8, steady.torque), rel=1e-5)
+    assert list(study.units.values()) == ["m", "N/m^2", "N m", "W"]
+    with pytest.raises(mg.DeclarationError, match=r"did you mean A\.film\.min"):
+        mg.study(m, {"shaft.mass": [1.0]}, "A.film.mim", motions=motion)
+    with pytest.raises(mg.DeclarationError, match="is no quantity"):
+        mg.study(rotor(), {"shaft.mass": [1.0]}, "A.film.min", motions=motion)

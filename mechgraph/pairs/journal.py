@@ -235,12 +235,16 @@ def _load_number(e: Array) -> Array:
 
 def _eccentricity_of(load: Array) -> Array:
     """The eccentricity ratio of a load over ``eta U L^3 / (4 c^2)``; it grows with the load."""
-    low, high = np.zeros(load.shape), np.full(load.shape, np.nextafter(1.0, 0.0))
-    for _ in range(64):  # halvings down to the rounding of an eccentricity near 0, steps of 2^-64
-        middle = 0.5 * (low + high)
-        small = _load_number(middle) < load
-        low, high = np.where(small, middle, low), np.where(small, high, middle)
-    return np.where(load > 0, high, 0.0)
+    ends = np.zeros(load.shape), np.full(load.shape, np.nextafter(1.0, 0.0))
+    return _root(lambda e, W: _load_number(e) - W, ends, load)
+
+
+def _root(f: Callable[..., Array], ends: tuple[Array, Array], *more: Array) -> Array:
+    """Where functions ``f(x, *more)`` that change sign between two ends are zero, element by element; NaN where they do not."""
+    from scipy.optimize import elementwise
+
+    found = elementwise.find_root(f, ends, args=more)
+    return np.where(found.success, found.x, np.nan)
 
 
 def _sommerfeld(e: Array, t: Array) -> Array:
@@ -297,31 +301,23 @@ def squeeze(e: Array, load: Array) -> Array:
 
 
 def _peak(e: Array, a: Array) -> Array:
-    """The greatest ``cos(t - a) / (1 - e . (cos t, sin t))^3`` over t."""
-    size = np.hypot(*e)
-    at = np.arctan2(e[1], e[0])
+    """The greatest ``cos(t - a) / (1 - e . (cos t, sin t))^3`` over t, where its slope is zero; by Sommerfeld's angle, in which a thin
+    film is wide.
+    """
+    size, at = np.hypot(*e), np.arctan2(e[1], e[0])
     begin = a - at - 0.5 * np.pi
-    p, q = _sommerfeld(size, begin), _sommerfeld(size, begin + np.pi)
+    ends = _sommerfeld(size, begin), _sommerfeld(size, begin + np.pi)
 
-    def value(angle: Array) -> Array:
-        """By Sommerfeld's angle, in which a thin film is wide."""
-        cosine = (size + np.cos(angle)) / (1 + size * np.cos(angle))
-        sine = np.sqrt(1 - size * size) * np.sin(angle) / (1 + size * np.cos(angle))
-        return np.asarray((cosine * np.cos(a - at) + sine * np.sin(a - at)) / (1 - size * cosine) ** 3)
+    def around(p: Array, size: Array, off: Array) -> tuple[Array, Array, Array, Array]:
+        """Thickness, ``sin t``, and cosine and sine of the angle from the squeeze."""
+        cosine, sine = (size + np.cos(p), np.sqrt(1 - size * size) * np.sin(p)) / (1 + size * np.cos(p))
+        along, over = cosine * np.cos(off) + sine * np.sin(off), sine * np.cos(off) - cosine * np.sin(off)
+        return 1 - size * cosine, sine, along, over
 
-    return _greatest(value, p, q)
+    def slope(p: Array, size: Array, off: Array) -> Array:
+        h, sine, along, over = around(p, size, off)
+        return -over * h - 3 * size * sine * along
 
-
-def _greatest(value: Callable[[Array], Array], low: Array, high: Array) -> Array:
-    """The greatest value ``(...)`` of a function with one peak between bounds, by golden sections down to rounding of the value."""
-    golden = 0.5 * (np.sqrt(5.0) - 1.0)
-    one, two = high - golden * (high - low), low + golden * (high - low)
-    f, g = value(one), value(two)
-    for _ in range(45):  # 0.618^45 = 4e-10 of the range, its square is rounding
-        left = f > g
-        low, high = np.where(left, low, one), np.where(left, two, high)
-        new = np.where(left, high - golden * (high - low), low + golden * (high - low))
-        here = value(new)
-        one, two = np.where(left, new, two), np.where(left, one, new)
-        f, g = np.where(left, here, g), np.where(left, f, here)
-    return np.maximum(f, g)
+    found = _root(slope, ends, size, a - at)
+    h, _, along, _ = around(found, size, a - at)
+    return np.asarray(along / h**3)

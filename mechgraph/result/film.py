@@ -8,6 +8,7 @@ Newton's method on the map of one cycle.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
@@ -17,11 +18,15 @@ import scipy
 from mechgraph.document import Document, Paragraph, Shown
 from mechgraph.maths.se3 import Array
 from mechgraph.pairs.journal import Journal
-from mechgraph.quantities import FORCE, LENGTH, MOMENT, POWER, PRESSURE, unit_of
+from mechgraph.quantities import FORCE, LENGTH, MOMENT, POWER, PRESSURE, PURE, unit_of
 from mechgraph.result.trajectory import Trajectory
 from mechgraph.result.values import bracket, ranges
 from mechgraph.result.views import PositionLabels
 
+FILM_DIMENSIONS = {
+    "orbit": PURE, "eccentricity": PURE, "film": LENGTH, "min": LENGTH, "pressure": PRESSURE, "torque": MOMENT, "power": POWER,
+}  # fmt: skip
+"""Numbers of a film that a study may ask for, ``"B.film.min"``, with the dimension of each."""
 WALL = 1.0 - 1e-9
 """The largest eccentricity ratio at which a film is evaluated."""
 ORBIT_GAP = 1e-8
@@ -128,9 +133,25 @@ class FilmResult(Shown):
 
 def _orbit_of(journal: Journal, loaded: Loaded) -> tuple[Array, bool]:
     """The orbit ``(2, T)``; of a cycle the one that closes, and whether it does."""
-    t = loaded.t
+    e, step, last = np.zeros(2), 1e-4, loaded.t[-1:] + loaded.gap
+    aside = step * np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])  # differences of the map of a cycle
+    rates = _rates_of(journal, loaded)
+    # an orbit that attracts closes in some six cycles; 40 tell that it does not
+    for _ in range(40) if loaded.is_cycle else ():
+        ends_at = _led(rates, loaded, e[:, None] + aside, last)[..., 0]
+        missed = ends_at[:, 0] - e
+        if np.abs(missed).max() < ORBIT_GAP:
+            return _led(rates, loaded, e[:, None], loaded.t)[:, 0], True
+        slope = (ends_at[:, 1:] - ends_at[:, :1]) / step
+        new = e + np.linalg.lstsq(np.eye(2) - slope, missed)[0]
+        e = new if np.hypot(*new) < 1.0 - step else ends_at[:, 0]
+    return _led(rates, loaded, np.zeros((2, 1)), loaded.t)[:, 0], False
+
+
+def _rates_of(journal: Journal, loaded: Loaded) -> Callable[[float, Array], Array]:
+    """Rates of eccentricities ``(2 n,)`` at a time, under load and speed drawn through the positions."""
+    t, values = loaded.t, np.concatenate([loaded.load.T, loaded.speed[None]])
     ends: Literal["periodic", "not-a-knot"] = "periodic" if loaded.is_cycle else "not-a-knot"
-    values = np.concatenate([loaded.load.T, loaded.speed[None]])
     if loaded.gap:
         t = np.append(t, t[-1] + loaded.gap)
         values = np.concatenate([values, values[:, :1]], axis=1)
@@ -145,33 +166,11 @@ def _orbit_of(journal: Journal, loaded: Loaded) -> tuple[Array, bool]:
         same = np.ones(e.shape[1])
         return journal.rates(e, now[:2, None] * same, now[2] * same).ravel()
 
-    def led(e: Array, places: Array | None = None) -> Array:
-        """Where eccentricities ``(2, n)`` are led to, ``(2, n)``, or over the times ``places``, ``(2, n, T)``."""
-        found = scipy.integrate.solve_ivp(
-            rates,
-            (t[0], t[-1]),
-            e.ravel(),
-            method="LSODA",
-            t_eval=[t[-1]] if places is None else places,
-            rtol=1e-9,
-            atol=1e-11,
-        )
-        out = found.y.reshape(2, e.shape[1], -1)
-        return out[..., -1] if places is None else out
+    return rates
 
-    e, closed = np.zeros(2), False
-    step = 1e-4
-    aside = step * np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])  # differences of the map of a cycle
-    # an orbit that attracts closes in some six cycles; 40 tell that it does not
-    for _ in range(40) if loaded.is_cycle else ():
-        ends_at = led(e[:, None] + aside)
-        missed = ends_at[:, 0] - e
-        closed = bool(np.abs(missed).max() < ORBIT_GAP)
-        if closed:
-            break
-        slope = (ends_at[:, 1:] - ends_at[:, :1]) / step
-        new = e + np.linalg.lstsq(np.eye(2) - slope, missed)[0]
-        e = new if np.hypot(*new) < 1.0 - step else ends_at[:, 0]
-    if not closed:
-        e = np.zeros(2)
-    return led(e[:, None], loaded.t)[:, 0], closed
+
+def _led(rates: Callable[[float, Array], Array], loaded: Loaded, e: Array, times: Array) -> Array:
+    """Where eccentricities ``(2, n)`` at the beginning are led to at ``times``, ``(2, n, times)``."""
+    span = loaded.t[0], loaded.t[-1] + loaded.gap
+    found = scipy.integrate.solve_ivp(rates, span, e.ravel(), method="LSODA", t_eval=times, rtol=1e-9, atol=1e-11)
+    return np.asarray(found.y.reshape(*e.shape, -1))

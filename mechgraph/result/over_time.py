@@ -22,12 +22,13 @@ from mechgraph.errors import DeclarationError, MechgraphWarning
 from mechgraph.fields import vector_fault
 from mechgraph.files import read_off
 from mechgraph.maths.se3 import Array
+from mechgraph.model.pair import Pair
 from mechgraph.pairs.factors import WRENCHES
 from mechgraph.pairs.journal import ACROSS, TURN, Journal, film_faults
 from mechgraph.quantities import ENERGY, FORCE, MOMENT, POWER, TIME, door, unit_of, wrong
 from mechgraph.result.film import FilmResult, Loaded
 from mechgraph.result.solution import Solution
-from mechgraph.result.values import bracket, number, with_unit
+from mechgraph.result.values import OK, bracket, number, with_unit
 
 FEWEST = 8
 """Positions of which the cycle of a film must have at least so many: its load is a spline through them."""
@@ -498,55 +499,44 @@ def film_of(s: Solution, pair: str, journal: Journal | None) -> FilmResult:
     about = f"film of {pair!r}"
     p = s.whole.pairs[s.whole.place_of_pair(pair)]
     journal = p.film if journal is None else journal
-    found = (
-        [] if isinstance(journal, Journal) else [wrong(journal, "film", "mg.Journal(...), here or as the pair's film=")]
-    )
-    found += journal.value_faults("") if isinstance(journal, Journal) else []
-    found += film_faults(p, "")
+    if found := _film_faults(s, p, journal):
+        raise DeclarationError(about, found)
+    assert journal is not None
+    load = -np.stack([s[p.name].components[name] for name in ACROSS], axis=-1)
+    if found := [
+        f"{name} of {p.name} is not unique; remove the redundancy (see mechgraph.check), or pass redundant='minimum_norm' or 'elastic'"
+        for name, of in zip(ACROSS, load.T, strict=True)
+        if not np.isfinite(of).all()
+    ]:
+        raise DeclarationError(about, found)
+    (cycle,) = cycles_of(s)
+    returns = cycle.closed and _returns(load, bool(cycle.gap))
+    speed = s[p.name].velocity[:, [f.twist for f in p.type.freedoms].index(TURN)]
+    out = FilmResult(s._values, p.name, journal, Loaded(cycle.t, cycle.gap if returns else 0.0, returns, load, speed))
+    starts = "the one returned starts in the middle of the bearing"
+    for doubtful, text in (
+        (not journal.is_short, f"length / diameter = {journal.length / (2 * journal.radius):.3g}; from 0.7 on a film carries less than "
+         "the short bearing says"),
+        (cycle.closed and not returns, f"the load does not return to its value at the beginning, so that no orbit closes; {starts}"),
+        (returns and not out.closed, f"no closed orbit was found; {starts}"),
+    ):  # fmt: skip
+        if doubtful:
+            warnings.warn(f"{about}: {text}", MechgraphWarning, stacklevel=3)
+    return out
+
+
+def _film_faults(s: Solution, p: Pair, journal: Any) -> list[str]:
+    """Why there is no film of a pair in a solution."""
+    given = isinstance(journal, Journal)
+    found = [] if given else [wrong(journal, "film", "mg.Journal(...), here or as the pair's film=")]
+    found += [*(journal.value_faults("") if given else []), *film_faults(p, "")]
     if not s.has_forces:
         found.append("the solution has no forces; use mechgraph.solve")
     if len(s.batch) != 1 or s.batch[-1] < FEWEST:
         found.append(f"the solution has positions {s.batch}; expected one row of at least {FEWEST}")
-    if not found and not (s.status == "ok").all():
+    if not found and not (s.status == OK).all():
         found.append("some positions were not solved; solve those that are reachable")
-    if found:
-        raise DeclarationError(about, found)
-    assert journal is not None
-    result = s[p.name]
-    load = -np.stack([result.components[name] for name in ACROSS], axis=-1)
-    for j, name in enumerate(ACROSS):
-        if not np.isfinite(load[:, j]).all():
-            found.append(
-                f"{name} of {p.name} is not unique; remove the redundancy (see mechgraph.check), or pass redundant='minimum_norm'"
-            )
-    if found:
-        raise DeclarationError(about, found)
-    (cycle,) = cycles_of(s)
-    turn = [f.twist for f in p.type.freedoms].index(TURN)
-    returns = cycle.closed and _returns(load, bool(cycle.gap))
-    if cycle.closed and not returns:
-        text = f"{about}: the load does not return to its value at the beginning, so that the positions are no cycle of it;"
-        warnings.warn(f"{text} the orbit starts in the middle of the bearing", MechgraphWarning, stacklevel=3)
-    if not journal.is_short:
-        warnings.warn(
-            f"{about}: length / diameter = {journal.length / (2 * journal.radius):.3g}; from 0.7 on a film carries less than the short "
-            "bearing says",
-            MechgraphWarning,
-            stacklevel=3,
-        )
-    out = FilmResult(
-        s._values,
-        p.name,
-        journal,
-        Loaded(cycle.t, cycle.gap if returns else 0.0, returns, load, result.velocity[:, turn]),
-    )
-    if returns and not out.closed:
-        warnings.warn(
-            f"{about}: no closed orbit was found; the one returned starts in the middle of the bearing",
-            MechgraphWarning,
-            stacklevel=3,
-        )
-    return out
+    return found
 
 
 def _returns(load: Array, open_end: bool) -> bool:

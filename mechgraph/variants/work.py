@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -38,8 +39,9 @@ from mechgraph.model.parameters import Parameters
 from mechgraph.outcome import Options, Starts
 from mechgraph.quantities import items_of, shown, unit_of, wrong
 from mechgraph.result.contacts import LiftOff, Overlap
+from mechgraph.result.film import FILM_DIMENSIONS, FilmResult
 from mechgraph.result.solution import Doubt, Solution
-from mechgraph.result.values import LoadBearing, MisfitsLeftOut, Unbalanced
+from mechgraph.result.values import OK, LoadBearing, MisfitsLeftOut, Unbalanced
 from mechgraph.result.views import LinkResult, PairResult, link_units, pair_units
 from mechgraph.variants.numbers import ALIKE, AnyField, ItemField, Variants, stacked, topology_of, varied
 
@@ -110,7 +112,7 @@ def _fault(m: Mechanism, name: str, what: Any) -> str | None:
 def _missing(m: Mechanism, what: Any) -> str:
     """What there is not: a pair or link of that name, or a quantity of it."""
     owner = what.rpartition(".")[0] or what.rpartition(":")[0] if isinstance(what, str) else ""
-    if not owner or owner in (*m.pair_index, *m.link_index):
+    if not owner or owner.removesuffix(".film") in (*m.pair_index, *m.link_index):
         return "is no quantity"
     return f"there is no pair or link {shown(owner)} (pairs: {listed(m.pair_index)}; links: {listed(m.link_index)})"
 
@@ -120,7 +122,9 @@ def _known(m: Mechanism, what: str) -> list[str]:
     owner = what.rpartition(".")[0]
     of = [(pair.name, OF_PAIR) for pair in m.pairs] + [(link.name, OF_LINK) for link in m.links]
     points = [f"{link.name}.{name}" for link in m.links for name in link.points if owner in (link.name, "")]
+    films = [f"{p.name}.film.{part}" for p in m.pairs if p.film is not None for part in FILM_DIMENSIONS]
     return [f"{name}.{part}" for name, parts in of if owner in (name, "") for part in parts] + [
+        *films,
         *points,
         *OF_SOLUTION,
         *OF_CHECKS,
@@ -140,6 +144,9 @@ def _found(m: Mechanism, text: str) -> Callable[[Solution], Any] | None:
     if colon and owner in m.pair_index and part in m.pair(owner).type.component_names:
         return lambda s: s[owner].components[part]
     owner, _, part = text.rpartition(".")
+    bearing, _, film = owner.rpartition(".")
+    if film == "film" and part in FILM_DIMENSIONS and bearing in m.pair_index and m.pair(bearing).film is not None:
+        return lambda s: _of_film(s, bearing, part)
     if owner in m.pair_index and part in OF_PAIR:
         return lambda s: getattr(s[owner], part)
     if owner in m.link_index and part in OF_LINK:
@@ -150,6 +157,22 @@ def _found(m: Mechanism, text: str) -> Callable[[Solution], Any] | None:
         link, name, rank, part = point
         return lambda s: getattr(s.link(link).at(name), RANKS[rank])[..., part]
     return None
+
+
+def _of_film(s: Solution, pair: str, name: str) -> Array:
+    """A number of the film of a pair ``(V, ...)``; NaN for variants with positions that were not solved."""
+    found = [None if film is None else np.asarray(getattr(film, name)) for film in _films(s, pair)]
+    shape = next((one.shape for one in found if one is not None), s.batch[1:])
+    return np.stack([np.full(shape, np.nan) if one is None else one for one in found])
+
+
+@lru_cache(maxsize=1)  # one orbit serves all numbers
+def _films(s: Solution, pair: str) -> list[FilmResult | None]:
+    n = s.batch[-1]
+    return [
+        s.part(slice(v * n, v * n + n)).film(pair) if (status == OK).all() else None
+        for v, status in enumerate(s.status)
+    ]
 
 
 def _point(m: Mechanism, text: str) -> tuple[str, str, int, Any] | None:
@@ -184,6 +207,8 @@ def unit_of_output(m: Mechanism, what: Output) -> str | tuple[str, ...]:
         found = link_units(m.units).get(part, "")
     elif point := _point(m, what):
         found = unit_of(m.units, (1, 0, -point[2]))
+    elif owner.endswith(".film"):
+        found = unit_of(m.units, FILM_DIMENSIONS[part]).replace("rad", "")
     elif what == "shaking":
         found = pair_units(m.units, m.pairs[0].type)["reaction"]
     return found[0] if isinstance(found, tuple) and len(set(found)) == 1 else found
