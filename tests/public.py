@@ -431,6 +431,11 @@ def declared_doors() -> list[tuple[str, Callable, tuple, dict]]:
 
 
 @functools.cache
+def rough_pin(m: mg.Mechanism) -> mg.Solution:
+    """A motion with friction in a pin."""
+    return mg.solve(m, {"A": mg.Motion([0.0, 0.1], 1.0)}, loads=[*m.loads, mg.Friction("A", mu=0.1, radius=0.01)])
+
+
 def drawn_doors(folder: Path) -> list[Door]:
     """Pictures and pages."""
     (s, _), (f, _), (study, _) = (
@@ -481,6 +486,7 @@ def drawn_doors(folder: Path) -> list[Door]:
         ("show.margin_curve", show.margin_curve, (s,), {"over": None, "ax": None}),
         ("show.point_path", show.point_path, (s, None), {"ax": None}),
         ("show.film_orbit", show.film_orbit, (s, "A", mg.Journal(1.0, 1.0, 0.001, 0.01)), {"ax": None}),
+        ("show.friction_losses", show.friction_losses, (rough_pin(m),), {"ax": None}),
         ("show.polar_force", show.polar_force, (s, "A"), {"on": "a", "ax": None}),
         ("show.reaction_curve", show.reaction_curve, (s, "A"), {"moment": True, **curve}),
         ("show.reaction_ranges", show.reaction_ranges, (s,), {"moment": True, "ax": None}),

@@ -286,6 +286,21 @@ def test_solve_prints_a_summary() -> None:
     assert np.allclose(shown, own, rtol=0.1)
 
 
+def test_friction_that_was_typed() -> None:
+    rough = ["--friction", "A:mu=0.1,radius=0.02,model=total", "--friction", "D:mu=0.2,radius=0.01,static=0.3"]
+    shown = json.loads(run("solve", "four-bar", "--drive", "A=0:360:30deg@10", *rough, "--json").stdout)
+    m = mg.load("four-bar")
+    loads = [mg.Friction("A", mu=0.1, radius=0.02, model="total"), mg.Friction("D", mu=0.2, radius=0.01, static=0.3)]
+    s = mg.solve(m, {"A": mg.Motion(np.deg2rad(np.arange(0, 360, 30.0)), 10.0)}, loads=[*m.loads, *loads])
+    assert np.isclose(shown["efforts"][0]["greatest"]["value"], s["A"].effort.max(), rtol=1e-9)
+    assert "friction" in run("report", "--help").stdout
+    for typed, words in (
+        ("A:nu=0.1", "did you mean"), ("A:radius=0.1", "expected PAIR:mu=NUMBER"), ("Q:mu=0.1", "unknown pair 'Q'"),
+        ("A:mu=much", "is not a number"), ("A:mu=0.1,radius=0.1,flank=5deg", "flank: has no meaning"),
+    ):  # fmt: skip
+        assert words in bad("solve", "four-bar", "--drive", "A=1", "--friction", typed)
+
+
 def test_the_engine_is_taken_and_named() -> None:
     shown = {}
     for engine in ("dense", "sparse"):

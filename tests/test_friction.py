@@ -451,6 +451,19 @@ def test_no_friction_is_the_smooth_result() -> None:
     assert smooth["D"].effort == dry["D"].effort
 
 
+def test_the_summary_tells_what_friction_costs() -> None:
+    text = str(moved(jack(), 2.0))
+    s = moved(jack(), 2.0)
+    row = next(line.split() for line in text.splitlines() if line.startswith("A ") and "H" not in line.split())
+    assert [float(row[1]), float(row[2])] == pytest.approx([W, float(s.losses["A"])], rel=1e-4)
+    assert f"leaves {float(s.efficiency('loads[0]')):.5g}" in text
+    rest = str(mg.solve(jack(), {"A": 0.0}))
+    low, high = mg.solve(jack(), {"A": 0.0})["A"].effort_range[0]
+    assert f"{low:.5g}" in rest.partition("holds at rest")[2]
+    assert f"{high:.5g}" in rest.partition("holds at rest")[2]
+    assert "Friction" not in str(mg.solve(jack(), {"A": 0.0}, loads=jack().loads[:1]))
+
+
 def test_faults_and_files(tmp_path) -> None:
     m = jack()
     mg.save(m, tmp_path / "jack.toml")

@@ -277,3 +277,40 @@ def test_nothing_outside_is_changed() -> None:
     mg.formulate(m).latex()
     mg.study(m, {"coupler.mass": [0.08, 0.09]}, ["A.effort"], n=2)
     assert outside() == before
+
+
+def test_forces_are_tangent_to_friction_circles() -> None:
+    """Each line of force passes its journal at r sin(atan mu); both of a rod that bears nothing else are one: the inner tangent."""
+    m = mg.load("slider-crank").to_planar()
+    at = {link.name: link.replace(mass=0.0, center=None, inertia=None) for link in m.links}
+    m = m.replace(links=[*at.values()], loads=[])
+    pins = [p for p in m.pairs if p.type.symbol == "R"]
+    slider = next(p for p in m.pairs if p.type.symbol == "P")
+    moving = slider.b if slider.a == m.frame else slider.a
+    mu, radius = 0.3, 0.02
+    rough = [mg.Friction(p.name, mu=mu, radius=radius) for p in pins]
+    push = mg.Wrench(moving, force=(-100.0, 30.0), point=(0, 0))
+    s = mg.solve(m, {m.drives[0].freedom: mg.Motion([0.8], velocity=5.0)}, loads=[push, *rough])
+    ax = show.draw_skeleton(s, forces=True, ghosts=0, traces=False)
+    lines = []
+    for p in pins:
+        (circle,), (line,) = (drawn(ax, f"axis {p.name} friction {what}") for what in ("circle", "line"))
+        ring, ends = circle.get_segments()[0], line.get_segments()[0]
+        center, rho = 0.5 * (ring.min(axis=0) + ring.max(axis=0)), 0.5 * np.ptp(ring[:, 0])
+        assert rho == pytest.approx(radius * np.sin(np.arctan(mu)), rel=1e-3)
+        way = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+        normal = np.array([-way[1], way[0]])
+        assert abs((ends[0] - center) @ normal) == pytest.approx(rho, rel=1e-3)
+        lines.append((abs(way[0]), abs(way[1]), abs(normal @ ends[0])))
+    assert np.allclose(lines[1], lines[2], atol=1e-9)
+
+
+def test_losses_by_pair_as_bars() -> None:
+    m = mg.load("four-bar")
+    rough = [mg.Friction(name, mu=0.1, radius=0.01) for name in "AD"]
+    s = mg.solve(m, {"A": mg.Motion([0.3, 0.9, 1.8], velocity=10.0)}, loads=[*m.loads, *rough])
+    ax = show.friction_losses(s)
+    assert [bar.get_width() for bar in ax.patches] == pytest.approx([s.losses[name].mean() for name in "AD"])
+    assert [label.get_text() for label in ax.get_yticklabels()] == ["A", "D"]
+    with pytest.raises(mg.DeclarationError, match="friction"):
+        show.friction_losses(mg.solve(m, {"A": [0.1]}))

@@ -232,6 +232,7 @@ def solve(
     mechanism: opt.Named,
     drive: opt.Drives = None,
     actuate: opt.Actuate = None,
+    friction: opt.Dry = None,
     out: opt.Out = None,
     include: opt.Include = None,
     method: opt.Method = "loop_wrench",
@@ -255,7 +256,7 @@ def solve(
     if json and compared:
         opt.refuse("solve", "--json and --compare exclude each other")
     opt.check_out(out, mechanism, FORMATS)
-    m = opt.loaded(mechanism)
+    m = opt.loaded(mechanism, friction)
     motions = opt.motions_of(m, drive or ())
     with opt.progress(f"solving {m.name}") as moved, warnings.catch_warnings():
         warnings.simplefilter("ignore", mg.MechgraphWarning)  # the summary has them
@@ -331,6 +332,7 @@ def respond(
     passive: Annotated[
         Literal["free", "held"] | None, typer.Option(help="Whether passive freedoms move freely, or are held at rest.")
     ] = None,
+    friction: opt.Dry = None,
     engine: opt.MotionEngine = "auto",
     over_time: opt.OverTime = False,
     json: opt.AsJson = False,
@@ -345,7 +347,7 @@ def respond(
     or input error. Ctrl-C keeps what was computed. Files are written atomically.
     """
     opt.check_out(out, mechanism, FORMATS)
-    m = opt.loaded(mechanism)
+    m = opt.loaded(mechanism, friction)
     begin = opt.values_of(m, start, "--start")
     rates = opt.values_of(m, rate, "--rate")
     declared = m.units.get("time", "s")
@@ -585,6 +587,7 @@ def report(
     out: Annotated[Path, opt.option("--out -o", "The page: one file, without network.", "FILE.html")],
     drive: opt.Drives = None,
     actuate: opt.Actuate = None,
+    friction: opt.Dry = None,
     method: opt.Method = "loop_wrench",
     redundant: opt.Redundant = "nan",
     on_reach: opt.OnReach = "flag",
@@ -603,7 +606,7 @@ def report(
     Example: mechgraph report four-bar -o four-bar.html
     """
     opt.check_out(out, mechanism, PAGES)
-    m = opt.loaded(mechanism)
+    m = opt.loaded(mechanism, friction)
     motions = opt.drives_of(m, drive or ())
     stored = bool(m.drives) and all(d.motion is not None for d in m.drives)
     s, failure = None, None

@@ -32,6 +32,7 @@ import mechgraph as mg
 from mechgraph.document import Document, to_text
 from mechgraph.errors import INTERRUPTED, MechgraphError, MechgraphWarning, did_you_mean, near_names, shortened, visible
 from mechgraph.exchange.files import READERS, compare
+from mechgraph.fields import TEXT
 from mechgraph.files import Format, format_of, formats_text, writable
 from mechgraph.kinematics.prescribed import coordinate
 from mechgraph.model.mechanism import Mechanism
@@ -441,6 +442,8 @@ Actuate = Annotated[Texts, option("--actuate", ACTUATE, "FREEDOM", freedom_names
 Out = Annotated[Path | None, file_option("Write a table, one row per position; ", FORMATS)]
 Include = Annotated[Texts, option("--include", f"More columns for --out (repeat): {', '.join(MORE)}.", "WHAT")]
 TRANSMISSION = "Also print transmission and deviation angle of this output (repeat)."
+FRICTION = "Dry friction in a pair, beside the declared loads: B:mu=0.1,radius=0.01 (repeat); the fields of mg.Friction, flank=15deg."
+Dry = Annotated[Texts, option("--friction", FRICTION, "PAIR:mu=NUMBER[,FIELD=VALUE]")]
 Outputs = Annotated[Texts, option("--transmission", TRANSMISSION, "FREEDOM", freedom_names)]
 Compare = Annotated[bool, typer.Option("--compare", help="Compare with results stored in a FreeCAD assembly (.asmt).")]
 OVER_TIME = "Also peak, mean, RMS and work of drivers, and shaking, over time or a whole cycle."
@@ -474,10 +477,28 @@ def in_plane(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-def loaded(name: str) -> mg.Mechanism:
-    """A mechanism by its name on the command line, in its plane where that is asked for."""
+def loaded(name: str, dry: Texts = None) -> mg.Mechanism:
+    """A mechanism by its name on the command line, in its plane where that is asked for, with the friction that was typed."""
     m = _found(name)
-    return m.to_planar() if FLATTENED.get() else m
+    m = m.to_planar() if FLATTENED.get() else m
+    return m.replace(loads=[*m.loads, *map(parse_friction, dry)]) if dry else m
+
+
+def parse_friction(text: str) -> mg.Friction:
+    """The friction of ``B:mu=0.1,radius=0.01,flank=15deg``."""
+    where, known = f"--friction {text!r}", mg.Friction.formats
+    of, _, rest = text.partition(":")
+    found: dict[str, Any] = {}
+    for part in filter(None, rest.split(",")):
+        name, value = named_value(part, "--friction")
+        if name not in known or name == "of":
+            near = did_you_mean(near_names(name, known)) or f"expected one of {', '.join(list(known)[1:])}"
+            refuse(where, f"{name} is no field of friction; {near}")
+        is_text = known[name].kind is TEXT
+        found[name] = value if is_text else _values([value], known[name].degrees, where)[0]
+    if "mu" not in found:
+        refuse(where, "expected PAIR:mu=NUMBER, e.g. B:mu=0.1,radius=0.01")
+    return mg.Friction(of, **found)
 
 
 def _found(name: str) -> mg.Mechanism:

@@ -15,7 +15,7 @@ from mechgraph.document import LISTED, Block, Bullets, Document, Heading, Paragr
 from mechgraph.errors import counted
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.quantities import FORCE, PRESSURE, force_hint, unit_of
+from mechgraph.quantities import FORCE, POWER, PRESSURE, force_hint, unit_of
 from mechgraph.result.contacts import LiftOff, Overlap, contacts_of, lift_offs, overlaps
 from mechgraph.result.trajectory import Trajectory
 from mechgraph.result.values import (
@@ -473,6 +473,7 @@ class _SummaryText(PositionLabels):
         if largest > 0 or found.loose.any() or own.loose.any():
             yield from self.effort_tables()
             yield from self.reaction_table()
+            yield from self.friction()
             yield from self.contacts()
             yield from self.redundant()
         else:
@@ -558,6 +559,41 @@ class _SummaryText(PositionLabels):
         if found.best[k] <= SHOWN_AS_ZERO * scale:
             return ["0" + mark, ""]
         return [number(found.best[k]) + mark, self.name(int(found.at[k]))]
+
+    def friction(self) -> Iterator[Block]:
+        """What friction costs in every pair, how much of the drives' power it leaves, and between which efforts it holds at rest."""
+        lost = {name: self.flat(power) for name, power in self.values.losses().items()}
+        if not lost:
+            return
+        total, brought = np.sum([*lost.values()], axis=0), np.zeros(self.status.size)
+        held: list[tuple[str, ...]] = []
+        for k, j in map(self.values.whole.freedom, self.values.actuated):
+            ends = self.values.effort_range(k)[..., j, :].reshape(-1, 2)
+            brought += self.flat((self.values.efforts(k)[0] * self.values.coordinates(k, 1))[..., j])
+            name = self.values.whole.pairs[k].freedom_names[j]
+            held += [
+                (name + bracket(self.effort_unit(name)), self.name(int(i)), *map(number, ends[i]))
+                for i in np.flatnonzero(ends[:, 0] < ends[:, 1])
+            ]
+        if total.any():
+            rows = []
+            for name, power in {**lost, "all": total}.items():
+                k = self.values.whole.place_of_pair(name) if name in lost else -1
+                normal = self.values.normal_forces(k) if k >= 0 else np.zeros(0)
+                at = int(np.nanargmax(power))
+                largest = number(np.nanmax(normal)) if np.isfinite(normal).any() else ""
+                rows.append((name, largest, number(power[at]), self.name(at), number(np.nanmean(power))))
+            force, power_unit = bracket(self.force_unit), bracket(unit_of(self.m.units, POWER))
+            yield Heading("Friction", 2)
+            heads = (f"greatest normal force{force}", f"greatest power lost{power_unit}", "at", "mean")
+            yield Table(("pair", *heads), (*rows[:LISTED], *rows[LISTED:][-1:]), align="lrrrr")
+        if (brought > 0).any():
+            left = 1.0 - total[brought > 0] / brought[brought > 0]
+            parts = dict.fromkeys(map(number, (np.nanmin(left), np.nanmax(left))))
+            yield Paragraph(f"Of the power that the drives bring friction leaves {' to '.join(parts)}.")
+        if held:
+            yield Heading("Efforts between which friction holds at rest", 2)
+            yield Table(("driver", "at", "from", "to"), tuple(held[:LISTED]), align="lrrr")
 
     def contacts(self) -> Iterator[Block]:
         """Range of the normal force of every contact, its greatest sliding speed and pressure; where it would have to pull."""

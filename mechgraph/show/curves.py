@@ -17,7 +17,7 @@ from mechgraph.kinematics.system import indexed
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import RANKS
 from mechgraph.pairs.journal import Journal
-from mechgraph.quantities import LENGTH, door, shown, unit_of
+from mechgraph.quantities import LENGTH, POWER, door, shown, unit_of
 from mechgraph.response.respond import Response
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import MaterialPoint
@@ -635,6 +635,54 @@ def film_orbit(s: Solution, pair: str, journal: Journal | None = None, *, ax: Ax
     ax.set_xlabel("eccentricity ratio along x of the marker", color=INK)
     ax.set_ylabel("along y", color=INK)
     ax.tick_params(colors=MUTED)
+    return ax
+
+
+def friction_losses(s: Solution, *, ax: Axes = None) -> Any:
+    """Draw the power that friction takes in every pair: a bar for the mean over the positions, a dot for the greatest.
+
+    Parameters
+    ----------
+    s : Solution
+        A solution with forces, and friction among its loads.
+    ax : Axes, optional
+        Axes of matplotlib. Default: new ones.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    DeclarationError
+        No friction, or no position with forces.
+    MissingExtraError
+        Without matplotlib.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> from mechgraph import show
+    >>> m = mg.load("four-bar")
+    >>> rough = [mg.Friction(name, mu=0.1, radius=0.01) for name in "ABCD"]
+    >>> ax = show.friction_losses(
+    ...     mg.solve(m, {"A": mg.Motion([0.0, 0.5, 1.0], velocity=10.0)}, loads=[*m.loads, *rough])
+    ... )
+    """
+    lost = {name: np.ravel(power) for name, power in (s.losses if s.has_forces else {}).items()}
+    if not any(np.isfinite(power).any() for power in lost.values()):
+        about = "needs forces at some position, and friction: solve(..., loads=[..., mg.Friction(...)])"
+        raise DeclarationError(f"losses of {s.mechanism.name!r}", [about])
+    ax = new_axes((6.4, 1.3 + 0.34 * len(lost))) if ax is None else ax
+    for i, power in enumerate(lost.values()):
+        ax.barh(i, np.nanmean(power), height=0.56, color=PALETTE[0], zorder=2)
+        ax.plot(np.nanmax(power), i, "o", ms=6, mfc="white", mec=INK, mew=1.2, zorder=4)
+    ax.set_yticks(range(len(lost)), map(said, lost))
+    ax.invert_yaxis()
+    ax.set_xlim(left=0.0)
+    ax.set_xlabel(axis_label("power lost: mean (bar), greatest (dot)", unit_of(s.mechanism.units, POWER)), color=INK)
+    plain(ax)
+    ax.tick_params(axis="y", length=0)
     return ax
 
 

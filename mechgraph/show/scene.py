@@ -17,6 +17,7 @@ from mechgraph.kinematics.assembly import assembled
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Array
+from mechgraph.model.friction import Friction
 from mechgraph.model.loads import Effort, Law, Wrench
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
@@ -544,16 +545,47 @@ def reactions(stage: DrawnPose, solution: Solution, positions: Any) -> tuple[lis
     lost = tuple(name for name, force in values.items() if np.isnan(force).any())
     longest = max((float(np.nanmax(np.linalg.norm(v, axis=1), initial=0.0)) for v in values.values()), default=0.0)
     scale = LONGEST_ARROW * stage.size / longest if longest else 0.0
-    out = []
+    out: list[DrawnPart] = []
+    rubbing = {load.of for load in stage.m.loads if isinstance(load, Friction)}
     for pair in stage.m.pairs:
         force = values[pair.name]
         length = np.linalg.norm(force, axis=1) * scale
         length = np.where(length > FLAT_THICKNESS * stage.size, length, np.nan)
         at = stage.points[pair.name, pair.b]
+        if pair.name in rubbing:
+            off, spin = _aside(stage, solution, pair, force, positions)
+            out += _friction_circle(stage, pair.name, at, off, spin, force)
+            at = at + np.nan_to_num(off)
         width = np.minimum(0.36 * stage.symbol, 0.2 * length)
         stage.frames[f"reaction:{pair.name}"] = stretched(np.nan_to_num(force), at, length, width)
         out.append(DrawnPart("reaction", pair.name, pair.b, f"reaction:{pair.name}", shapes.arrow()))
     return out, lost, scale
+
+
+def _aside(stage: DrawnPose, solution: Solution, pair: Pair, force: Array, positions: Any) -> tuple[Array, Array]:
+    """How far ``(T, 3)`` friction in the turns of a pair moves the line of its force aside, ``F x M / F^2``, and its couple M."""
+    friction = solution[pair.name].friction.reshape(-1, pair.type.f)[positions]
+    M = np.zeros_like(force)
+    for j in (j for j, freedom in enumerate(pair.type.freedoms) if freedom.turns):
+        _, _, line, frame = stage.freedom(pair.freedom_names[j])
+        M += (stage.frames[frame][:, :, :3] @ line.direction) * friction[:, j, None]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.cross(force, M) / (force**2).sum(axis=1, keepdims=True), M
+
+
+def _friction_circle(
+    stage: DrawnPose, name: str, at: Array, off: Array, spin: Array, force: Array
+) -> Iterator[DrawnPart]:
+    """The circle to which the force of a pair with friction is tangent, and its line of action."""
+    radius = np.linalg.norm(off, axis=1)
+    radius = np.where(radius > 0, radius, np.nan)
+    line = LONGEST_ARROW * stage.size * np.where(radius > 0, 1.0, np.nan)
+    for what, along, middle, size, shape in (
+        ("circle", spin, at, radius, shapes.polyline(shapes.ring(1.0))),
+        ("line", force, at + np.nan_to_num(off), line, shapes.polyline([(0, 0, -1), (0, 0, 1)])),
+    ):
+        stage.frames[f"friction {what}:{name}"] = stretched(np.nan_to_num(along), middle, size, size)
+        yield DrawnPart("axis", f"{name} friction {what}", "", f"friction {what}:{name}", shape)
 
 
 def known_force(stage: DrawnPose, solution: Solution, pair: Pair, positions: Any, along: Array | None) -> Array:

@@ -101,7 +101,8 @@ def draw_skeleton(
     labels : bool
         Names of pairs (with their type) and links.
     forces : bool
-        Arrows of the reaction forces of link a on link b; hatched if the force is indeterminate.
+        Arrows of the reaction forces of link a on link b; hatched if the force is indeterminate. Where a journal rubs its friction circle
+        and the line of the force, tangent to it.
     centers : bool
         Mass centers.
     highlight : sequence

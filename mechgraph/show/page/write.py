@@ -29,7 +29,7 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.toml import written
 from mechgraph.quantities import door, wrong
 from mechgraph.result.solution import Solution
-from mechgraph.show.curves import effort_curve, reaction_ranges
+from mechgraph.show.curves import effort_curve, friction_losses, reaction_ranges
 from mechgraph.show.diagrams import draw_graph, study_histogram, study_tornado
 from mechgraph.show.page.content import view_data
 from mechgraph.show.skeleton import draw_skeleton
@@ -139,6 +139,12 @@ def stills(m: Mechanism, s: Solution | None) -> Pictures:
     out = [(m.name, _picture(lambda: draw_skeleton(m if s is None else s, labels=len(m.pairs) <= 40)))]
     if s is None or not s.has_forces:
         return out
+    if s.losses:
+        name = "Forces at the first position, tangent to the friction circles where journals rub"
+        out.append(
+            (name, _picture(lambda: draw_skeleton(s, ghosts=0, traces=False, forces=True, labels=len(m.pairs) <= 40)))
+        )
+        out.append(("Power lost by friction", _picture(lambda: friction_losses(s))))
     if s.mechanism.drives:
         out.append(("Efforts of the drivers", _picture(lambda: effort_curve(s))))
     out.append(("Reaction forces, hatched where not unique", _picture(lambda: reaction_ranges(s))))
