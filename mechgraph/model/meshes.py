@@ -63,8 +63,8 @@ class Mesh(LineCoupling):
     ...     couplings=[mg.Mesh("m", "p", "w")],
     ...     drives=["p"],
     ... )
-    >>> mg.solve(m, {"p": 0.0}, loads=[mg.Effort("w", -3.0)]).coupling("m").force.round(3)
-    array([ 27.298, -75.   ,  -0.   ])
+    >>> mg.solve(m, {"p": 0.0}, loads=[mg.Effort("w", -3.0)]).coupling("m").force[:2].round(3)
+    array([ 27.298, -75.   ])
     """
 
     kind: ClassVar[str] = "mesh"

@@ -29,7 +29,7 @@ from mechgraph.result.values import (
     number,
     with_unit,
 )
-from mechgraph.result.views import UNASKED, PositionLabels, misfits_left_out
+from mechgraph.result.views import UNASKED, PositionLabels, losses, misfits_left_out
 
 
 class Greatest:
@@ -562,7 +562,7 @@ class _SummaryText(PositionLabels):
 
     def friction(self) -> Iterator[Block]:
         """What friction costs in every pair, how much of the drives' power it leaves, and between which efforts it holds at rest."""
-        lost = {name: self.flat(power) for name, power in self.values.losses().items()}
+        lost = {name: self.flat(power) for name, power in losses(self.values).items()}
         if not lost:
             return
         total, brought = np.sum([*lost.values()], axis=0), np.zeros(self.status.size)
@@ -578,8 +578,7 @@ class _SummaryText(PositionLabels):
         if total.any():
             rows = []
             for name, power in {**lost, "all": total}.items():
-                k = self.values.whole.place_of_pair(name) if name in lost else -1
-                normal = self.values.normal_forces(k) if k >= 0 else np.zeros(0)
+                normal = self.values.at_places("normals", name)
                 at = int(np.nanargmax(power))
                 largest = number(np.nanmax(normal)) if np.isfinite(normal).any() else ""
                 rows.append((name, largest, number(power[at]), self.name(at), number(np.nanmean(power))))

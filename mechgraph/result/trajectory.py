@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import copy
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from mechgraph.force.block import BlockForces, hold_names, is_idle
 from mechgraph.force.elastic import displacement, seats_of, strains
 from mechgraph.force.loads import Site, inertia_wrenches, kinetic_energy, user_poses, user_twists
 from mechgraph.force.reactions import PairFrames, given_effort_loads, user_state, user_wrench
+from mechgraph.kernel.tables import Records
 from mechgraph.kinematics.motion_path import Status, in_blocks
 from mechgraph.kinematics.rates import PassiveMotion, Rates, Velocities
 from mechgraph.kinematics.state import Configuration
@@ -77,20 +78,6 @@ KEPT = (
 """Fields of ``BlockForces`` that are kept for every position."""
 KEPT_OF_FRICTION = ("normals", "factor", "teeth", "rubbing", "growth", "speeds")
 """Fields of ``Rubbed`` that are kept for every position; efforts and what pairs take up without those of teeth."""
-
-
-class KernelRecords(Protocol):
-    """All positions at once, by the names of what is kept."""
-
-    @property
-    def largest(self) -> Array:
-        """The largest wrench and power ``(2,)``."""
-
-    def __contains__(self, name: str) -> bool:
-        """Whether there is a part of that name."""
-
-    def __getitem__(self, name: str) -> Array:
-        """That part, component axes first and positions last."""
 
 
 TOGETHER = 300_000
@@ -184,7 +171,7 @@ class Trajectory:
         known = self._kept.setdefault("accuracy", np.zeros(self._count))
         known[places] = np.maximum(known[places], error)
 
-    def take(self, records: KernelRecords, forces: bool) -> None:
+    def take(self, records: Records, forces: bool) -> None:
         """Keep all positions from the records of a compiled solution."""
         self._solved[:] = True
         self._kept |= {
