@@ -119,6 +119,18 @@ def test_a_stage_on_balls_loses_what_one_on_hinges_does() -> None:
             assert abs(s.checks.equilibrium) < 1e-12
 
 
+def test_the_equations_hold_with_friction() -> None:
+    """The printed equations of a state give the reactions and efforts of the solution."""
+    dry = [mg.Friction("t", mu=0.1), *(mg.Friction(k, mu=0.15, radius=0.008, length=0.03) for k in "pw")]
+    m = stage()
+    s = moved(m, 4.0, mg.Effort("w", LOAD), *dry)
+    f = mg.formulate(m, "minimal")
+    found = dict(zip((u.name for u in f.unknowns), f.solve(s.state()), strict=True))
+    told = {f"{k}.{name}": float(value) for k in "pw" for name, value in s[k].components.items()}
+    for value in (*told.values(), float(s["p"].effort[0])):
+        assert min(abs(value - other) for other in found.values()) < 1e-9 * max(map(abs, found.values()))
+
+
 def test_gears_in_series_multiply_their_efficiencies() -> None:
     pairs = shafts(a=0.0, b=0.06, c=0.12)
     gears = [mg.Gear(n, n, z, (x, 0, h), Z, module=0.002) for n, z, x, h in (("a", 20, 0.0, 0.0), ("b", 40, 0.06, 0.0))]

@@ -186,12 +186,8 @@ def forces_of_block(
     site.collect(task.loads)
     given, applied, inertia = site.scaled_efforts(), site.applied(), inertia_wrenches(here, rates)
     loads = applied + inertia
-    held: Array | None = None
-    holds = hold_terms = np.zeros((0, here.T))
-    if task.passive:
-        passive = f.motions() if task.idle is None else f.sensitivity()[:, task.idle]
-        held, holds, hold_terms = hold(here, task.passive, passive, loads, given, site.largest)
-        loads = loads + held
+    held, holds, hold_terms = _held(here, task, f, applied + inertia, given, site.largest)
+    loads = applied + inertia if held is None else applied + inertia + held
     first = pretensioned(here, METHODS[task.method](ForceProblem(here, loads, given, task.driven, f)), f)
     lines = ContactLines(here)
     found, flank = _least_on_flanks(here, on_their_flanks(here, first, lines), f, task, lines)
@@ -203,6 +199,8 @@ def forces_of_block(
         solve = _FrictionProblem(here, task, f, first, lines, (found, flank), dry)
         ranges = solve.at_rest(dq, given)
         found, rubs, flank = solve.forces(dq)
+        held, holds, hold_terms = _held(here, task, f, applied + inertia, given + rubs.efforts, site.largest)
+        loads = loads if held is None else applied + inertia + held
         given = given + rubs.efforts - rubs.teeth
         found = replace(found, coupled=found.coupled + rubs.teeth)
     own = np.zeros_like(found.efforts)
@@ -240,6 +238,16 @@ def forces_of_block(
         range=ranges,
         unborne=found.unborne,
     )
+
+
+def _held(
+    here: Configuration, task: ForceTask, f: FactoredClosure, loads: Array, efforts: Array, largest: float
+) -> tuple[Array | None, Array, Array]:
+    """What keeps the passive bodies of a task at rest (see ``hold``); None where it has none."""
+    if not task.passive:
+        return None, np.zeros((0, here.T)), np.zeros((0, here.T))
+    passive = f.motions() if task.idle is None else f.sensitivity()[:, task.idle]
+    return hold(here, task.passive, passive, loads, efforts, largest)
 
 
 @dataclass(frozen=True)
@@ -388,8 +396,9 @@ class _FrictionProblem:
 
     def _answer(self, efforts: Array) -> dict[str, Array]:
         """Forces under given efforts ``(F, T)`` alone."""
-        here = self.here
-        problem = ForceProblem(here, np.zeros((6, len(here.system.m.links), here.T)), efforts, self.task.driven, self.f)
+        here, none = self.here, np.zeros((6, len(self.here.system.m.links), self.here.T))
+        held, _, _ = _held(here, self.task, self.f, none, efforts, 0.0)
+        problem = ForceProblem(here, none if held is None else held, efforts, self.task.driven, self.f)
         wrenches = pretensioned(here, METHODS[self.task.method](problem), self.f, part=0.0)
         one = self._least(wrenches)
         return {name: getattr(one, name) for name in ("reactions", "efforts", "multipliers", "coupled")}

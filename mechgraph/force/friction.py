@@ -455,18 +455,21 @@ def _grown(a: Array, B: Array, C: Array, starts: Index) -> tuple[Array, int, flo
     grow there.
     """
     n, _ = _newton(a, B, C, starts, 0.0, np.zeros(B.shape[1]))
-    k, step = 0.0, 1 / 64
-    while k < 1.0:
+    k, step, scale = 0.0, 1 / 16, max(float(np.abs(a).max(initial=0.0)), 1e-300)
+    # how often a part is tried: bends that need more are not told from ends
+    for _ in range(400):
         ahead = min(1.0, k + step)
         new, met = _newton(a, B, C, starts, ahead, n)
         near = np.abs(new - n).max() <= 0.5 * np.abs(new).max() or not new.any()
         if met and near and (new >= 0).all() and _rises(a, B, C, starts, ahead, new):
-            k, n, step = ahead, new, min(2 * step, 1 / 64)
-            continue
-        step /= 2
-        if step < 1e-9:  # far below what tells friction from friction
+            k, n, step = ahead, new, min(2 * step, 1 / 16)
+            if k == 1.0:
+                return n, 3 if _others(a, B, C, starts, n) else 0, np.nan, 0.0 * n
+        else:
+            step /= 2
+        if step < 1e-9 or n.max() > 1e8 * scale:  # far below what tells friction from friction
             return _ended(a, B, C, starts, k, n)
-    return n, 3 if _others(a, B, C, starts, n) else 0, np.nan, 0.0 * n
+    return n, 3, np.nan, 0.0 * n
 
 
 def _rises(a: Array, B: Array, C: Array, starts: Index, k: float, n: Array) -> bool:

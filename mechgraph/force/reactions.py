@@ -402,12 +402,12 @@ def _pair_totals(f: Formulation, state: State, u: Array) -> tuple[Array, Array]:
     return out.reshape(len(f.mechanism.pairs), 6, *u.shape[1:]).swapaxes(0, 1), u[multipliers]
 
 
-def given_effort_loads(here: Configuration, efforts: Array) -> Array:
-    """What given efforts do to the links: ``+E tau`` on b, ``-E tau`` on a, ``(6, N, T)``."""
+def given_effort_loads(here: Configuration, efforts: Array, more: Array | float = 0.0) -> Array:
+    """What given efforts and ``more`` wrenches ``(6, P, T)`` do to the links: ``+E tau`` on b, ``-E tau`` on a, ``(6, N, T)``."""
     s = here.system
     out = np.zeros((6, len(s.m.links), here.T))
     if efforts.any():
-        pair = here.pair_sums(here.E * efforts)
+        pair = here.pair_sums(here.E * efforts) + more
         add_at(out, s.b, pair)
         add_at(out, s.a, -pair)
     return out

@@ -178,13 +178,17 @@ class ContactLines:
             out.append(acting.reshape(6, *(1,) * (value.ndim - 1), self.here.T) * value)
         return out
 
-    def through(self, multipliers: Array, flank: Array) -> Array:
-        """What would pass through the pairs on the way between gears that do not touch each other, ``s_j F``, ``(6, P, ..., T)``."""
-        out = np.zeros((6, len(self.here.system.m.pairs), *multipliers.shape[1:]))
-        for (_, contact), F in zip(self.contacts, self.on_gear(multipliers, flank), strict=True):
+    def on_ways(self, wrenches: Array) -> Array:
+        """Wrenches on gears b ``(6, n, ..., T)`` passed through the pairs on the way from gears a, ``s_j F``, ``(6, P, ..., T)``."""
+        out = np.zeros((6, len(self.here.system.m.pairs), *wrenches.shape[2:]))
+        for g, contact in self.contacts:
             for step in contact.steps:
-                out[:, step.pair] += step.sense * F
+                out[:, step.pair] += step.sense * wrenches[:, g]
         return out
+
+    def through(self, multipliers: Array, flank: Array) -> Array:
+        """What would pass through the pairs on the way between gears that do not touch each other, ``(6, P, ..., T)``."""
+        return self.on_ways(self.on_gears(multipliers, flank))
 
     def relief(self, multipliers: Array, flank: Array) -> Array:
         """What is taken off the wrenches of all pairs ``(6, P, ..., T)`` for multipliers ``(n, ..., T)`` of all couplings."""

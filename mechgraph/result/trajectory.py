@@ -469,7 +469,9 @@ class Trajectory:
         if self.has_forces:
             acting = self._of("given")[:, [flat]].copy()
             acting[own:] += self._of("efforts")[own:, [flat]]  # what moves points and links is a load on these
-            loads = self._of("loads")[:, :, [flat]] + given_effort_loads(block.here, acting)
+            more = [self._kept[name][..., [flat]] for name in ("taken", "rubbing") if name in self._kept]
+            rubs = more[0] + ContactLines(block.here).on_ways(more[1]) if more else 0.0
+            loads = self._of("loads")[:, :, [flat]] + given_effort_loads(block.here, acting, rubs)
             held = self._kept["hold"][:, :, [flat]] if "hold" in self._kept else 0.0
             applied = loads - inertia_wrenches(block.here, block.rates) - held
         flank = self._of("multipliers")[:, [flat]] if self.has_forces else np.ones((len(self.whole.couplings), 1))

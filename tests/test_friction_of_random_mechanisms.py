@@ -1,0 +1,100 @@
+"""Friction in every pair of random mechanisms: power balance; where it is not determined two splits of the self-stress prove it."""
+
+import warnings
+
+import numpy as np
+import pytest
+from strategies import motions, solvable
+
+import mechgraph as mg
+
+SEEDS = range(200)
+
+
+def rough(m: mg.Mechanism, rng: np.random.Generator) -> list[mg.Friction]:
+    """Friction in every pair that takes it, with the arguments that it takes."""
+    dry = []
+    for pair in m.pairs:
+        more = {"mu": float(rng.uniform(0.01, 0.06))}
+        sizes = {"radius": 0.3 if pair.type.takes_pitch else 0.02, "length": 0.2, "width": 0.04}
+        for given in (
+            sizes,
+            {"length": 0.2, "width": 0.04},
+            {"radius": 0.02, "length": 0.2},
+            {"radius": sizes["radius"]},
+            {},
+        ):
+            one = mg.Friction(pair.name, **more, **given)
+            try:
+                m.replace(loads=[one])
+            except mg.DeclarationError:
+                continue
+            dry.append(one)
+            break
+    return dry
+
+
+@pytest.mark.slow
+def test_power_in_is_power_out_and_what_is_lost() -> None:
+    """Drives, loads and losses make the rate of kinetic energy, in a hundred mechanisms; nothing gains power from friction."""
+    solved = 0
+    for seed in SEEDS:
+        if solved == 100:
+            break
+        m = solvable(seed, loops=1)
+        if m is None:
+            continue
+        loads = [*(load for load in m.loads if load.by_position), *rough(m, np.random.default_rng(seed))]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", mg.MechgraphWarning)
+            s = mg.solve(m, motions(m, seed, np.array([0.3, 0.6])), loads=loads, on_reach="flag")
+        good = s.status == "ok"
+        if not good.any():
+            continue
+        solved += 1
+        assert np.abs(s.checks.power[good]).max() < 1e-10, seed
+        assert np.abs(s.checks.equilibrium[good]).max() < 1e-10, seed
+        brought = sum((s[p.name].effort * s[p.name].velocity).sum(axis=-1) for p in m.pairs)
+        outer = sum(s.load(i).power for i, load in enumerate(loads) if not isinstance(load, mg.Friction))
+        lost = sum(s.losses.values())
+        size = np.abs(brought[good]).max() + np.abs(lost[good]).max()
+        assert all((one[good] >= -1e-12 * size).all() for one in s.losses.values()), seed
+        held = s.passive_effort
+        if not held:
+            t = 1e-4
+            smooth = [load for load in loads if not isinstance(load, mg.Friction)]
+            around = (motions(m, seed, np.array([at - t, at + t])) for at in (0.3, 0.6))
+            near = [mg.solve(m, given, loads=smooth, on_reach="flag") for given in around]
+            change = np.array([float(one.kinetic_energy[1] - one.kinetic_energy[0]) / (2 * t) for one in near])
+            assert np.allclose((brought + outer - lost)[good], change[good], rtol=1e-5, atol=1e-5 * size), seed
+    assert solved == 100
+
+
+def bearings(seed: int) -> mg.Mechanism:
+    """A shaft in three hinges or more, at random places, pulled across at random."""
+    rng = np.random.default_rng(seed)
+    places = np.sort(rng.uniform(0.0, 1.0, 3 + seed % 3))
+    pairs = [mg.Pair(f"B{i}", "R", "frame", "shaft", point=(0, 0, z), axis=(0, 0, 1)) for i, z in enumerate(places)]
+    pull = mg.Wrench("shaft", force=(*rng.normal(size=2) * 100, 0.0), point=(0, 0, float(rng.uniform())))
+    dry = [mg.Friction(p.name, mu=0.2, radius=0.02) for p in pairs]
+    return mg.Mechanism("shaft", pairs=pairs, drives=["B0"], loads=[pull, *dry])
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_two_splits_prove_that_friction_is_not_determined(seed: int) -> None:
+    """NaN, and two sets of seats, one of them off its place, that split the reactions in two ways, with two efforts."""
+    m = bearings(seed)
+    given = {"B0": mg.Motion(0.0, velocity=1.0)}
+    s = mg.solve(m, given)
+    assert s.status == "friction not determined"
+    assert np.isnan(s["B0"].effort).all()
+    found = []
+    seat = dict.fromkeys(("Fx", "Fy", "Fz"), 1e7) | {"Mx": 0, "My": 0}
+    for off in (0.0, 1e-4):
+        soft = m.replace(pairs=[p.replace(stiffness=seat, misfit={"Fx": off * (p.name == "B1")}) for p in m.pairs])
+        t = mg.solve(soft, given, redundant="elastic")
+        sizes = [np.hypot(t[p.name].components["Fx"], t[p.name].components["Fy"]) for p in m.pairs]
+        assert t["B0"].effort[0] == pytest.approx(0.02 * np.sin(np.arctan(0.2)) * sum(sizes), rel=1e-9)
+        assert abs(t.checks.power) < 1e-12
+        found.append(float(t["B0"].effort[0]))
+    assert abs(found[1] - found[0]) > 1e-3 * abs(found[0])
