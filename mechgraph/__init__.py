@@ -30,17 +30,16 @@ from mechgraph.kinetostatics import Transmission, assemble, kinematics, least_pr
 from mechgraph.maths import inertia
 from mechgraph.maths.tolerances import Tolerances
 from mechgraph.model import parts
-from mechgraph.model.belts import BeltDrive, Pulley
+from mechgraph.model.belts import BeltDrive
 from mechgraph.model.couplings import Belt, BevelGears, Coupling, Rack, SpurGears, WormGear
 from mechgraph.model.friction import Friction
-from mechgraph.model.gear_facts import mesh_facts
-from mechgraph.model.gears import BevelGear, Gear, GearRack, Worm, WormWheel
+from mechgraph.model.gear_facts import mesh_facts, planet_places
+from mechgraph.model.gears import BevelGear, Gear, GearRack, Pulley, Worm, WormWheel
 from mechgraph.model.loads import Damper, Effort, ForceLaw, ForceTable, Gravity, Spring, TorsionSpring, Wrench
 from mechgraph.model.mechanism import Mechanism, chain
 from mechgraph.model.meshes import Mesh
 from mechgraph.model.motion import Drive, Motion
-from mechgraph.model.pair import Link, Marker, Pair
-from mechgraph.model.planets import planet_places
+from mechgraph.model.pair import Link, Marker, Misfit, Pair, Stiffness
 from mechgraph.model.response_setup import Event, ResponseSetup, Stop
 from mechgraph.model.toml import library_names as library
 from mechgraph.pairs.cam_laws import CamLaw, Segment, cam_laws
@@ -50,7 +49,6 @@ from mechgraph.pairs.curves import Curve
 from mechgraph.pairs.factors import Bookkeeping, Component, Freedom
 from mechgraph.pairs.journal import Journal
 from mechgraph.pairs.pair_type import PairType, pair_types
-from mechgraph.pairs.seats import Misfit, Stiffness
 from mechgraph.pairs.surfaces import Surface
 from mechgraph.pairs.travelling import cutter_path  # noqa: F401  # by methods
 from mechgraph.quantities import with_clear_calls

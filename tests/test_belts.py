@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
-from mechgraph.model.belts import angle, course, span
+from mechgraph.model.belts import course, span
+from mechgraph.model.gears import angle
 
 Z = (0, 0, 1)
 UP = np.array(Z, dtype=float)[:, None, None]

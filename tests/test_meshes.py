@@ -8,7 +8,7 @@ import pytest
 
 import mechgraph as mg
 from mechgraph.model import meshes as kinds
-from mechgraph.model.lines import LinePlaces
+from mechgraph.model.gears import LinePlaces
 
 X, Y, Z = np.eye(3)
 RAD = np.deg2rad

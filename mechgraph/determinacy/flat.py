@@ -23,13 +23,12 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Array
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair import Marker, Pair
+from mechgraph.model.pair import SEATS, Marker, Pair, Stiffness
 from mechgraph.model.plane import dropped, lifted
 from mechgraph.pairs.contact_types import row_of
 from mechgraph.pairs.factors import Component
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.pairs.plane import held_in_plane, in_plane, instead_of
-from mechgraph.pairs.seats import SEATS, Stiffness
 from mechgraph.quantities import is_numeric, unknown, wrong
 
 LEVEL = 1e-9

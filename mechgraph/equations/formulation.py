@@ -55,7 +55,7 @@ from mechgraph.equations.terms import (
 from mechgraph.errors import counted
 from mechgraph.files import Format, format_of, write_whole
 from mechgraph.graph.linkgraph import LinkGraph, link_graph
-from mechgraph.model.lines import moving_lines
+from mechgraph.model.gears import moving_lines
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Pair
 from mechgraph.pairs.factors import ConstantScrew

@@ -22,7 +22,7 @@ from mechgraph.kinematics.system import CouplingRows, System
 from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Array, Index, compose, identity, inverse, rotate
 from mechgraph.memo import carried
-from mechgraph.model.lines import moving_lines
+from mechgraph.model.gears import moving_lines
 from mechgraph.model.loads import (
     Damper,
     Effort,

@@ -19,7 +19,7 @@ import scipy
 
 from mechgraph.maths.linear import COMPLEX_STEP
 from mechgraph.maths.se3 import Array, Index, cross, rotate
-from mechgraph.model.lines import LineCoupling, LinePlaces, LinesAt, Relation
+from mechgraph.model.gears import LineCoupling, LinePlaces, LinesAt, Relation
 
 
 class LineRows:

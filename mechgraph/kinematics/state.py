@@ -31,7 +31,7 @@ from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import LeastNorm
 from mechgraph.maths.se3 import Array, Index, Mask, compose, cross, cross_twist, finite_twist, move_twist, multiplied
 from mechgraph.maths.tolerances import PATH, RANKS
-from mechgraph.model.lines import moving_lines
+from mechgraph.model.gears import moving_lines
 from mechgraph.pairs import pair_type as evaluation
 
 ROUNDINGS = 20

@@ -28,7 +28,7 @@ from mechgraph.kinematics.lines import LineRows, RowsInOrder
 from mechgraph.maths.linear import Place, compact
 from mechgraph.maths.se3 import Array, Index, turn_between, turn_tangent, turned
 from mechgraph.memo import graph_cached
-from mechgraph.model.lines import moving_lines
+from mechgraph.model.gears import moving_lines
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Parameters, coupling_places, parameters
 from mechgraph.pairs import pair_type as evaluation

@@ -21,7 +21,7 @@ from mechgraph.kinematics.lines import LineRows
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Array, Index, Mask, cross
 from mechgraph.model.couplings import Axes, BaseCoupling, Contact, Lines, fitting_of
-from mechgraph.model.lines import LineCoupling, moving_lines
+from mechgraph.model.gears import LineCoupling, moving_lines
 
 
 def strayed(here: Configuration) -> str | None:

@@ -29,21 +29,27 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from mechgraph.fields import (
-    DIRECTION,
     FLAG,
     INTEGER,
-    LINK_NAME,
     NAMES,
     NUMBER,
-    POINT,
     POSITIVE,
     TEXT,
-    Described,
-    second_direction,
 )
 from mechgraph.maths.se3 import Array, cross, identity
-from mechgraph.model.couplings import OF_BELTS, MeshStep, are_placed, fitting_of, motion_of
-from mechgraph.model.lines import LineCoupling, LinePlaces, LinesAt, LinkPlace, Relation, meeting, pose_along, way
+from mechgraph.model.couplings import OF_BELTS, MeshStep, are_placed, fitting_of, meeting, motion_of, way
+from mechgraph.model.gears import (
+    LineCoupling,
+    LinePlaces,
+    LinesAt,
+    LinkPlace,
+    Pulley,
+    Relation,
+    angle,
+    dot,
+    place_of,
+    pose_along,
+)
 from mechgraph.quantities import FORCE, LENGTH, shown, unknown, wrong
 
 
@@ -56,32 +62,19 @@ class Span(NamedTuple):
     end: Array
 
 
-def _dot(a: Array, b: Array) -> Array:
-    return np.asarray((a * b).sum(axis=0))
-
-
 def span(ca: Array, cb: Array, z: Array, wa: Array, wb: Array) -> Span:
     """The common tangent of circles about centers ``ca, cb (3, ..., T)`` with signed radii, in the plane across ``z`` through ``ca``.
 
     NaN where a circle is within the other (of equal senses) or both overlap (of opposite ones).
     """
     d = cb - ca
-    d = d - z * _dot(d, z)
-    off, square = wb - wa, _dot(d, d)
+    d = d - z * dot(d, z)
+    off, square = wb - wa, dot(d, d)
     rest = square - off * off
     length = np.sqrt(np.where(rest.real > 0.0, rest, np.nan))
     u = (length * d - off * cross(z, d)) / square
     start = ca - wa * cross(z, u)
     return Span(length, u, start, start + length * u)
-
-
-def angle(u: Array, m: Array, z: Array) -> Array:
-    """Angles about ``z`` from directions ``u`` to ``m``, at right angles to it, in (-pi, pi]; analytic in all of them."""
-    y, x = _dot(cross(u, m), z), _dot(u, m)
-    out = np.arctan2(y.real, x.real)
-    if not (np.iscomplexobj(y) or np.iscomplexobj(x)):
-        return np.asarray(out)
-    return np.asarray(out + 1j * (x.real * y.imag - y.real * x.imag) / (x.real**2 + y.real**2))
 
 
 class BeltCourse(NamedTuple):
@@ -108,61 +101,6 @@ def course(centers: Array, z: Array, w: Array) -> BeltCourse:
     return BeltCourse(
         spans, wrap, spans.length.sum(axis=0) + (np.abs(w) * wrap).sum(axis=0), (sense * wrap).sum(axis=0) / (2 * np.pi)
     )
-
-
-@dataclass(frozen=True)
-class Pulley(Described):
-    """Declare a pulley or sprocket: a place on a link, for ``Mechanism(gears=[...])`` and the belts over it.
-
-    Give ``radius``, to the middle of the belt, or ``teeth`` and ``pitch``: ``r = teeth pitch / (2 pi)``.
-
-    Examples
-    --------
-    >>> import mechgraph as mg
-    >>> mg.Pulley("p1", "shaft", (0, 0, 0), (0, 0, 1), teeth=20, pitch=0.005).pitch_radius
-    0.015915494309189534
-    """
-
-    kind: ClassVar[str] = "pulley"
-    name: Annotated[str, TEXT("differs from all pulleys")]
-    link: Annotated[str, LINK_NAME("the link on which it is")]
-    point: Annotated[Any, POINT("its center, in the plane of the belt", LENGTH)]
-    axis: Annotated[
-        Any,
-        DIRECTION(
-            "its axis; all pulleys of a belt have the same direction", normal=True, default="in a plane its normal"
-        ),
-    ] = None
-    radius: Annotated[float | None, POSITIVE("to the middle of the belt", LENGTH, default="by teeth")] = None
-    teeth: Annotated[int | None, INTEGER("number of teeth", default="none")] = None
-    pitch: Annotated[float | None, POSITIVE("of the teeth, along the belt", LENGTH, default="none")] = None
-
-    def __post_init__(self) -> None:
-        self.read_numbers()
-
-    @property
-    def pitch_radius(self) -> float:
-        """The radius to the middle of the belt."""
-        if self.radius is not None:
-            return float(self.radius)
-        return float(self.teeth * self.pitch / (2 * np.pi))  # type: ignore[operator]
-
-    def value_faults(self, where: str) -> list[str]:
-        """See ``Described``."""
-        found = super().value_faults(where)
-        if self.axis is None:
-            found.append(f"{where}axis: is missing; give a direction, e.g. (0, 0, 1) (planar=True needs none)")
-        given = self.radius is not None, self.teeth is not None and self.pitch is not None
-        if not found and (sum(given) != 1 or (self.teeth is None) != (self.pitch is None) or self.teeth == 0):
-            found.append(
-                f"{where}radius = {shown(self.radius)}, teeth = {shown(self.teeth)}, pitch = {shown(self.pitch)}: "
-                "expected the radius, or teeth (1 or more) and their pitch"
-            )
-        return found
-
-
-GEARS: dict[str, type[Pulley]] = {Pulley.kind: Pulley}
-"""What stands in ``gears=``, by the name of its kind in files."""
 
 
 class Laid(NamedTuple):
@@ -401,7 +339,7 @@ class BeltDrive(LineCoupling):
             laid.w[before, None],
             laid.w[behind, None],
         )
-        beside = _dot(
+        beside = dot(
             laid.centers - direct.start, cross(np.broadcast_to(laid.axes[:, :1], direct.along.shape), direct.along)
         )
         far = self.senses * beside[:, 0] > np.abs(laid.w)
@@ -515,11 +453,6 @@ def _pulley_names(m: Any) -> frozenset[str]:
     return frozenset(p.name for p in m.gears if isinstance(p, Pulley) and isinstance(p.name, str))
 
 
-def place_of(p: Pulley) -> LinkPlace:
-    """The place of a pulley on its link."""
-    return LinkPlace(p.link, p.point, p.axis, second_direction(p.axis))
-
-
 def tangent(a: LinePlaces, b: LinePlaces, numbers: Array) -> LinesAt:
     """Value and line of a span between pulleys with the signed radii ``numbers (2, n, T)``: ``l + w_b alpha_b - w_a alpha_a``, with the
     angles alpha of their marks against the span in (-pi, pi].
@@ -554,8 +487,8 @@ def chordal(a: LinePlaces, b: LinePlaces, numbers: Array, *, pitches: tuple[floa
                 (place.point + R * (np.cos(off) * across + np.sin(off) * cross(z, across)), w * (turned - off))
             )
         (start, arc_a), (end, arc_b) = rollers
-        end = end - z * _dot(end - start, z)
-        length = np.sqrt(_dot(end - start, end - start))
+        end = end - z * dot(end - start, z)
+        length = np.sqrt(dot(end - start, end - start))
         made = Span(length, (end - start) / length, start, end)
     return LinesAt(made.length + arc_b - arc_a, made.end, made.along)
 

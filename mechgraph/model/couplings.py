@@ -355,43 +355,34 @@ class Contact(BaseCoupling):
             f"{self.a!r} and {self.b!r} have no link in common that could carry both gears, and no pairs R about the axis of one of them "
             "connect them; gears need a common carrier"
         )
-        reached: dict[str, tuple[str, int] | None] = dict.fromkeys((m.pairs[first].a, m.pairs[first].b))
-        queue, goal = list(reached), {m.pairs[last].a, m.pairs[last].b}
-        for link in queue:
-            if link in goal:
-                break
-            for k, other in m.once(_turns).get(link, ()):
-                if k not in (first, last) and other not in reached:
-                    reached[other] = (link, k)
-                    queue.append(other)
-        else:
+        turning, ends = m.once(turning_pairs), [(m.pairs[k].a, m.pairs[k].b) for k in (first, last)]
+        ways = ((a, way(m, turning, a, b, (first, last)), b) for a in ends[0] for b in ends[1])
+        found = min(
+            ((a, steps, b) for a, steps, b in ways if steps is not None), key=lambda one: len(one[1]), default=None
+        )
+        if found is None:
             return alone
-        back, middle = link, []
-        while (before := reached[back]) is not None:
-            middle.append((before[0], before[1]))
-            back = before[0]
-        ways = [
-            (m.pairs[first].b if back == m.pairs[first].a else m.pairs[first].a, first),
-            *reversed(middle),
-            (link, last),
-        ]
-        return tuple(MeshStep(k, 1.0 if m.pairs[k].a == start else -1.0) for start, k in ways)
+        a, steps, b = found
+        return (
+            MeshStep(first, 1.0 if m.pairs[first].b == a else -1.0),
+            *steps,
+            MeshStep(last, 1.0 if m.pairs[last].a == b else -1.0),
+        )
 
     def _axes(self, m: Any, steps: tuple[MeshStep, ...]) -> _OnCarrier | str:
         """The gears seen from their carrier in the declared configuration: between gear a and it pairs turn about the axis of a, between
         it and gear b about that of b; or what is wrong with them.
         """
-        fitting = fitting_of(m)
-        p, z, senses_a, off = _turned_about(m, steps[:-1], fitting)
-        back = tuple(MeshStep(step.pair, -step.sense) for step in reversed(steps[1 + len(senses_a) :]))
-        q, w, senses_b, _ = _turned_about(m, back, fitting)
+        fitting, back = fitting_of(m), tuple(MeshStep(step.pair, -step.sense) for step in reversed(steps))
+        p, z, senses_a, off = followed(m, steps[1:-1], *_axis_behind(m, steps[0]), fitting)
+        q, w, senses_b, _ = followed(m, back[1 : -1 - len(senses_a)], *_axis_behind(m, back[0]), fitting)
         if len(senses_a) + len(senses_b) < len(steps) - 2:
             stray = m.pairs[steps[1 + len(senses_a)].pair].name
             return (
                 f"pair {stray!r} between the gears is not about the axis of {self.a!r} (off by {off:.3g}); {self.a!r} and "
                 f"{self.b!r} need a common carrier"
             )
-        return _OnCarrier(Axes(p, z, q, w), senses_a, senses_b[::-1])
+        return _OnCarrier(Axes(p[:, None], z[:, None], q[:, None], w[:, None]), senses_a, senses_b[::-1])
 
     def axes_in(self, m: Any) -> Axes:
         """The axes of the gears on their carrier, in a mechanism without faults."""
@@ -443,26 +434,6 @@ class _OnCarrier(NamedTuple):
     senses_b: list[float]
 
 
-def _turned_about(m: Any, steps: tuple[MeshStep, ...], fitting: float) -> tuple[Array, Array, list[float], float]:
-    """The axis of the pair of a gear, point and direction, in the last frame to which pairs about it lead on a way, with their senses, and
-    by how much the next one is off it.
-    """
-    pairs: list[Pair] = [m.pairs[step.pair] for step in steps]
-    senses: list[float] = []
-    p, z = _line(_marker(pairs[0], steps[0], behind=True))
-    for pair, step in zip(pairs[1:], steps[1:], strict=True):
-        q, w = _line(_marker(pair, step, behind=False))
-        off = float(np.abs(cross(q - p, z)).max())
-        if np.abs(cross(z, w)).max() > fitting or off > fitting * max(1.0, float(np.abs(q - p).max())):
-            return p, z, senses, off
-        senses.append(float(np.sign((z * w).sum())))
-        along = ((p - q) * z).sum()
-        p, w = _line(_marker(pair, step, behind=True))
-        z = senses[-1] * w
-        p = p + along * z
-    return p, z, senses, 0.0
-
-
 def fitting_of(m: Any) -> float:
     """Part of a length, or angle, by which gears may miss their place in a mechanism."""
     return max(SHAPES.met, 2.0 * sound_tol(m.tol))
@@ -471,21 +442,6 @@ def fitting_of(m: Any) -> float:
 def are_placed(m: Any) -> bool:
     """Whether every pair says where it sits, without faults."""
     return all(pair.has_geometry and not pair.faults() for pair in m.pairs)
-
-
-def _turns(m: Any) -> dict[str, list[tuple[int, str]]]:
-    """The pairs on every link whose only freedom is a turn: their places, and the links at their other ends."""
-    found: dict[str, list[tuple[int, str]]] = {}
-    for k, pair in enumerate(m.pairs):
-        if (
-            isinstance(pair.type, PairType)
-            and isinstance(pair.a, str)
-            and isinstance(pair.b, str)
-            and motion_of(pair) == "turn"
-        ):
-            for link, other in ((pair.a, pair.b), (pair.b, pair.a)):
-                found.setdefault(link, []).append((k, other))
-    return found
 
 
 def motion_of(pair: Pair) -> str:
@@ -499,13 +455,103 @@ def motion_of(pair: Pair) -> str:
     return plain.get(tuple(freedoms[0].twist), "") if single else ""
 
 
-def _marker(pair: Pair, step: MeshStep, *, behind: bool) -> Marker:
-    """The marker of a pair on the link before it on the way, or on the link behind it."""
-    return pair.markers[int((step.sense > 0) == behind)]
+def meeting(m: Any) -> dict[str, list[tuple[int, str]]]:
+    """The pairs on every link: their places, and the links at their other ends."""
+    return _meeting(m, ("turn", "slide", ""))
+
+
+def plain_pairs(m: Any) -> dict[str, list[tuple[int, str]]]:
+    """Those of them whose only freedom is a turn or a slide."""
+    return _meeting(m, ("turn", "slide"))
+
+
+def turning_pairs(m: Any) -> dict[str, list[tuple[int, str]]]:
+    """Those of them whose only freedom is a turn."""
+    return _meeting(m, ("turn",))
+
+
+def _meeting(m: Any, motions: tuple[str, ...]) -> dict[str, list[tuple[int, str]]]:
+    found: dict[str, list[tuple[int, str]]] = {}
+    for k, pair in enumerate(m.pairs):
+        if (
+            isinstance(pair.a, str)
+            and isinstance(pair.b, str)
+            and isinstance(pair.type, PairType)
+            and motion_of(pair) in motions
+        ):
+            for link, other in ((pair.a, pair.b), (pair.b, pair.a)):
+                found.setdefault(link, []).append((k, other))
+    return found
+
+
+def way(
+    m: Any, neighbors: Mapping[str, list[tuple[int, str]]], a: str, b: str, without: tuple[int, ...] = ()
+) -> tuple[MeshStep, ...] | None:
+    """The pairs of a shortest way from link a to link b, ``without`` some; None where there is none.
+
+    Searched from both ends, the one with fewer pairs ahead first, so that the frame of many links is hardly ever gone through.
+    """
+    came: tuple[dict[str, tuple[int, str] | None], ...] = ({a: None}, {b: None})
+    fronts = [[a], [b]]
+    meet = a if a == b else None
+    while meet is None:
+        cost = [sum(len(neighbors.get(link, ())) for link in front) for front in fronts]
+        if not all(fronts):
+            return None
+        i = int(cost[1] < cost[0])
+        ahead: list[str] = []
+        for link in fronts[i]:
+            for k, other in neighbors.get(link, ()):
+                if other not in came[i] and k not in without:
+                    came[i][other] = (k, link)
+                    ahead.append(other)
+                    if other in came[1 - i]:
+                        meet = other
+                        break
+            if meet is not None:
+                break
+        fronts[i] = ahead
+    halves: list[list[tuple[int, str]]] = []
+    for known in came:
+        link, half = meet, []
+        while (before := known[link]) is not None:
+            half.append(before)
+            link = before[1]
+        halves.append(half)
+    steps = [MeshStep(k, 1.0 if m.pairs[k].a == start else -1.0) for k, start in reversed(halves[0])]
+    return (*steps, *(MeshStep(k, -1.0 if m.pairs[k].a == start else 1.0) for k, start in halves[1]))
+
+
+def followed(
+    m: Any, steps: tuple[MeshStep, ...], p: Array, z: Array, fitting: float, motion: str = "turn"
+) -> tuple[Array, Array, list[float], float]:
+    """The axis through ``p`` along the unit direction ``z`` on the first link of a way, in the last frame to which pairs that turn about
+    it (``motion`` a slide: the one that slides along it) lead, with their senses, and by how much the next one is off it.
+    """
+    senses: list[float] = []
+    for step in steps[: 1 if motion == "slide" else None]:
+        pair: Pair = m.pairs[step.pair]
+        before, behind = (pair.markers[int((step.sense > 0) == later)] for later in (False, True))
+        q, w = _line(before)
+        off = 0.0 if motion == "slide" else float(np.abs(cross(q - p, z)).max())
+        lean = float(np.abs(cross(z, w)).max())
+        if motion_of(pair) != motion or lean > fitting or off > fitting * max(1.0, float(np.abs(q - p).max())):
+            return p, z, senses, off
+        senses.append(float(np.sign(z @ w)))
+        along, (p, w) = (p - q) @ z, _line(behind)
+        z = senses[-1] * w
+        p = p + along * z
+    return p, z, senses, 0.0
 
 
 def _line(marker: Marker) -> tuple[Array, Array]:
-    return np.array(marker.point, dtype=float)[:, None], unit(np.array(marker.axis, dtype=float)[:, None])
+    z = np.array(marker.axis, dtype=float)
+    return np.array(marker.point, dtype=float), z / np.linalg.norm(z)
+
+
+def _axis_behind(m: Any, step: MeshStep) -> tuple[Array, Array]:
+    """The axis of a pair on the link behind it on the way."""
+    return _line(m.pairs[step.pair].markers[int(step.sense > 0)])
 
 
 _TEETH = TWO_WHOLE("numbers of teeth of both gears")

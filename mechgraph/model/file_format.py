@@ -22,7 +22,7 @@ from mechgraph.model.loads import ForceTable
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.meshes import Mesh
 from mechgraph.model.motion import Drive, Motion
-from mechgraph.model.pair import Link, Marker, Pair
+from mechgraph.model.pair import Link, Marker, Misfit, Pair, Stiffness
 from mechgraph.model.response_setup import Event, ResponseSetup, Stop
 from mechgraph.pairs.cam_laws import CamLaw, Segment
 from mechgraph.pairs.contact_types import Hertz
@@ -30,7 +30,6 @@ from mechgraph.pairs.factors import Bookkeeping, Component, Freedom
 from mechgraph.pairs.given import CURVES, Function
 from mechgraph.pairs.journal import Journal
 from mechgraph.pairs.pair_type import PairType
-from mechgraph.pairs.seats import Misfit, Stiffness
 from mechgraph.pairs.surfaces import SURFACES, ByFunction
 from mechgraph.quantities import BASE_UNITS, LENGTH
 

@@ -1,4 +1,12 @@
-"""Gears as places on links, and meshes between them.
+"""Gears and pulleys as places on links, and the lines along which they act.
+
+A coupling along a line knows that from the poses of both links: its relation ``phi`` is dual to its force. With the point P and the unit
+direction n of the force on link b,
+
+    d phi / dt = n . (v_b - v_a) at P = sum_j s_j G . S_j q'_j,   G = (P x n, n),
+
+over the freedoms j of the pairs on a way from a to b, passed in the sense ``s_j``. So the multiplier is the force, whatever the bearings
+of the links are.
 
 Cylindrical gears on parallel axes: with e the unit direction from axis a to axis b, t = z x e, their distance d, base radii k_a, k_b
 (negative with teeth inside), k = k_a + k_b and the working angle cos w = |k| / d, a flank of side s (1: a positive turn of gear a drives
@@ -17,11 +25,11 @@ gear pairs.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from math import atan, cos, pi, tan
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -37,12 +45,120 @@ from mechgraph.fields import (
     Described,
     second_direction,
 )
-from mechgraph.maths.se3 import Array, cross
-from mechgraph.model.belts import GEARS as PULLEYS
-from mechgraph.model.belts import angle
-from mechgraph.model.couplings import FULL, PRESSURE, tooth_angle
-from mechgraph.model.lines import LinePlaces, LinesAt, LinkPlace
-from mechgraph.quantities import LENGTH, PURE, wrong
+from mechgraph.maths.se3 import Array, compose, cross, identity, inverse
+from mechgraph.model.couplings import FULL, PRESSURE, BaseCoupling, MeshStep, tooth_angle
+from mechgraph.pairs import pair_type as evaluation
+from mechgraph.quantities import LENGTH, PURE, shown, wrong
+
+# --- couplings along lines ------------------------------------------------------------------------------------------
+
+
+class LinePlaces(NamedTuple):
+    """Places on links: points, unit axes, and unit directions at right angles to these, ``(3, n, T)`` each."""
+
+    point: Array
+    axis: Array
+    mark: Array
+
+
+class LinesAt(NamedTuple):
+    """Values ``phi (n, T)``, lengths, and the lines of the forces on b: points and unit directions ``(3, n, T)``."""
+
+    value: Array
+    point: Array
+    along: Array
+
+
+Relation = Callable[[LinePlaces, LinePlaces, Array], LinesAt]
+"""What places on links a and b and lengths ``(k, n, T)`` of the coupling make: analytic in the places."""
+
+
+class LinkPlace(NamedTuple):
+    """A link by its name with a point, an axis and a direction at right angles to it, in the link's frame."""
+
+    link: str
+    point: tuple[float, ...]
+    axis: tuple[float, ...]
+    mark: tuple[float, ...]
+
+    def seen(self, pose: Array) -> LinePlaces:
+        """The place on a link with that pose ``(3, 4)``, as ``(3, 1, 1)`` each."""
+        R, vectors = pose[:, :3], (np.asarray(self.point), np.asarray(self.axis), np.asarray(self.mark))
+        point, axis, mark = ((R @ v)[:, None, None] for v in vectors)
+        return LinePlaces(point + pose[:, 3][:, None, None], axis, mark)
+
+
+class LineCoupling(BaseCoupling):
+    """What couplings share whose force acts along a line between the links of two places.
+
+    ``linear``: whether the relation is one of freedoms with constant coefficients, so that it is solved as that; else it is evaluated
+    from the poses. ``numbers``: its lengths. ``period``: by what its value grows from tooth to tooth, where the residue tells as much.
+    ``other``: the relation of the other flank of teeth, which negative multipliers press on, its line reversed so that the sense of the
+    relation stays. ``longer``: by how much the closed row is above its value at the start. ``turning``: which of both turn
+    about their axes; a rack slides along its own.
+    """
+
+    ends: tuple[LinkPlace, LinkPlace]
+    relation: Relation
+    other: Relation | None = None
+    numbers: tuple[float, ...] = ()
+    period: float = float("inf")
+    longer: float = 0.0
+    linear: bool = False
+    turning: tuple[bool, bool] = (True, True)
+    is_force = True
+
+    @property
+    def text(self) -> str:
+        """The linear relation, or what stands for it."""
+        return super().text if self.linear else "n . (v_b - v_a) = 0 along its line"
+
+    def whole_turns(self, along: Array, a: LinePlaces, b: LinePlaces, turned: Callable[[str], Array]) -> Array | None:
+        """What whole turns add to the value ``(T,)`` of a row with the direction ``along (3, 1, T)`` between two places, by how much
+        freedoms have grown since the start, ``turned(name) (T,)``; None where its residue modulo ``period`` tells as much.
+        """
+        return None
+
+    def strayed(self, a: LinePlaces, b: LinePlaces, a0: LinePlaces, b0: LinePlaces) -> Array | None:
+        """By how much ``(n, T)`` the places are out of those that its relation is about, radians and lengths, where they were ``a0, b0``
+        ``(3, n, 1)`` at the start; None where it holds wherever they are.
+        """
+        return None
+
+    def _put(self, m: Any, steps: tuple[MeshStep, ...], coefficients: Mapping[str, float] | None, **known: Any) -> Self:
+        """The same with what it has in a mechanism; ``coefficients`` by freedom where the relation is linear."""
+        out = self.replace()
+        names = [name for step in steps for name in m.pairs[step.pair].freedom_names]
+        terms = tuple(coefficients.items()) if coefficients is not None else tuple((name, 1.0) for name in names)
+        vars(out).update(known, terms=terms, steps=steps, linear=coefficients is not None)
+        return out
+
+
+def moving_lines(m: Any) -> tuple[str, ...]:
+    """Names of the couplings whose rows are evaluated from poses."""
+    return tuple(c.name for c in m.couplings if isinstance(c, LineCoupling) and not c.linear)
+
+
+def pose_along(m: Any, steps: tuple[MeshStep, ...]) -> Array:
+    """The pose ``(3, 4)`` of the link at the end of a way in the frame of the first one, at the start of a mechanism."""
+    out = identity()
+    for step in steps:
+        pair = m.pairs[step.pair]
+        q = np.array([getattr(m, "start", {}).get(name, 0.0) for name in pair.freedom_names], dtype=float)[
+            :, None, None
+        ]
+        if pair.on_a is None and not q.any():
+            continue
+        x = evaluation.coordinates_to_state(pair.type, q)
+        pitch = np.full((1, 1), pair.pitch_per_radian)
+        moved = evaluation.frames_of(pair.type, pitch, x)[-1][:, :, 0, 0]
+        A, B = (marker.pose() for marker in pair.markers)
+        there = compose(compose(A, moved), inverse(B))
+        out = compose(out, there if step.sense > 0 else inverse(there))
+    return out
+
+
+# --- relations -----------------------------------------------------------------------------------------------------------
 
 
 def involute(a: Any) -> Any:
@@ -55,7 +171,13 @@ def dot(a: Array, b: Array) -> Array:
     return np.asarray((a * b).sum(axis=0))
 
 
-# --- relations -----------------------------------------------------------------------------------------------------------
+def angle(u: Array, m: Array, z: Array) -> Array:
+    """Angles about ``z`` from directions ``u`` to ``m``, at right angles to it, in (-pi, pi]; analytic in all of them."""
+    y, x = dot(cross(u, m), z), dot(u, m)
+    out = np.arctan2(y.real, x.real)
+    if not (np.iscomplexobj(y) or np.iscomplexobj(x)):
+        return np.asarray(out)
+    return np.asarray(out + 1j * (x.real * y.imag - y.real * x.imag) / (x.real**2 + y.real**2))
 
 
 def _middle(h: Array, half_a: Array, half_b: Array) -> Array:
@@ -338,8 +460,64 @@ class WormWheel(_Toothed):
     mark: Annotated[Any, _MARK] = None
 
 
+@dataclass(frozen=True)
+class Pulley(Described):
+    """Declare a pulley or sprocket: a place on a link, for ``Mechanism(gears=[...])`` and the belts over it.
+
+    Give ``radius``, to the middle of the belt, or ``teeth`` and ``pitch``: ``r = teeth pitch / (2 pi)``.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> mg.Pulley("p1", "shaft", (0, 0, 0), (0, 0, 1), teeth=20, pitch=0.005).pitch_radius
+    0.015915494309189534
+    """
+
+    kind: ClassVar[str] = "pulley"
+    name: Annotated[str, TEXT("differs from all pulleys")]
+    link: Annotated[str, LINK_NAME("the link on which it is")]
+    point: Annotated[Any, POINT("its center, in the plane of the belt", LENGTH)]
+    axis: Annotated[
+        Any,
+        DIRECTION(
+            "its axis; all pulleys of a belt have the same direction", normal=True, default="in a plane its normal"
+        ),
+    ] = None
+    radius: Annotated[float | None, POSITIVE("to the middle of the belt", LENGTH, default="by teeth")] = None
+    teeth: Annotated[int | None, INTEGER("number of teeth", default="none")] = None
+    pitch: Annotated[float | None, POSITIVE("of the teeth, along the belt", LENGTH, default="none")] = None
+
+    def __post_init__(self) -> None:
+        self.read_numbers()
+
+    @property
+    def pitch_radius(self) -> float:
+        """The radius to the middle of the belt."""
+        if self.radius is not None:
+            return float(self.radius)
+        return float(self.teeth * self.pitch / (2 * np.pi))  # type: ignore[operator]
+
+    def value_faults(self, where: str) -> list[str]:
+        """See ``Described``."""
+        found = super().value_faults(where)
+        if self.axis is None:
+            found.append(f"{where}axis: is missing; give a direction, e.g. (0, 0, 1) (planar=True needs none)")
+        given = self.radius is not None, self.teeth is not None and self.pitch is not None
+        if not found and (sum(given) != 1 or (self.teeth is None) != (self.pitch is None) or self.teeth == 0):
+            found.append(
+                f"{where}radius = {shown(self.radius)}, teeth = {shown(self.teeth)}, pitch = {shown(self.pitch)}: "
+                "expected the radius, or teeth (1 or more) and their pitch"
+            )
+        return found
+
+
+def place_of(p: Pulley) -> LinkPlace:
+    """The place of a pulley on its link."""
+    return LinkPlace(p.link, p.point, p.axis, second_direction(p.axis))
+
+
 TOOTHED: dict[str, type[_Toothed]] = {kind.kind: kind for kind in (Gear, GearRack, BevelGear, Worm, WormWheel)}
-GEARS: dict[str, type[Described]] = {**PULLEYS, **TOOTHED}
+GEARS: dict[str, type[Described]] = {Pulley.kind: Pulley, **TOOTHED}
 """What stands in ``gears=``, by the name of its kind in files."""
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import combinations
 from math import atan, cos, pi, sin, tan
 from typing import Annotated, Any, ClassVar, Self
 
@@ -15,7 +16,6 @@ from mechgraph.fields import (
     TEXT,
 )
 from mechgraph.maths.se3 import Array, cross, identity
-from mechgraph.model.belts import angle
 from mechgraph.model.couplings import (
     OF_TEETH,
     Axes,
@@ -23,23 +23,32 @@ from mechgraph.model.couplings import (
     MeshStep,
     WormGear,
     fitting_of,
+    followed,
+    meeting,
     motion_of,
+    plain_pairs,
     teeth_lines,
+    way,
 )
 from mechgraph.model.gears import (
     CROSSING,
     CYLINDRICAL,
     RACKED,
+    Gear,
     GearRack,
+    LineCoupling,
+    LinePlaces,
+    LinesAt,
+    LinkPlace,
+    Relation,
     Worm,
+    angle,
     dot,
     gears_by_name,
     involute,
+    pose_along,
     tip_radius,
 )
-from mechgraph.model.lines import LineCoupling, LinePlaces, LinesAt, LinkPlace, Relation, meeting, pose_along, way
-from mechgraph.model.pair import Pair
-from mechgraph.pairs.pair_type import PairType
 from mechgraph.quantities import LENGTH, shown, unknown
 
 FLANKS = ("auto", "forward", "backward")
@@ -169,9 +178,11 @@ class Mesh(LineCoupling):
         """Coefficients by freedom where every pair on the way turns about the axis of one of the gears, or slides along a rack."""
         P, n = line.point[:, 0, 0], line.along[:, 0, 0]
         racks = [isinstance(gear, GearRack) for gear in self.pair_of(m)]
-        forward = on_line(m, steps, ends[0], racks[0], fitting_of(m))
+        axes = [(np.asarray(end.point, dtype=float), np.asarray(end.axis)) for end in ends]
+        motions = ["slide" if rack else "turn" for rack in racks]
+        forward = followed(m, steps, *axes[0], fitting_of(m), motions[0])[2]
         back = tuple(MeshStep(step.pair, -step.sense) for step in reversed(steps[len(forward) :]))
-        backward = on_line(m, back, ends[1], racks[1], fitting_of(m))
+        backward = followed(m, back, *axes[1], fitting_of(m), motions[1])[2]
         if len(forward) + len(backward) < len(steps):
             return None
         met, powers = self.seen(m), []
@@ -205,35 +216,6 @@ class Mesh(LineCoupling):
     def converted(self, base: tuple[float, float, float], turns: Any) -> Self:
         """See ``BaseCoupling``."""
         return self.in_units(base)
-
-
-def plain_pairs(m: Any) -> dict[str, list[tuple[int, str]]]:
-    """The pairs on every link whose only freedom is a turn or a slide: their places, and the links at their other ends."""
-    found: dict[str, list[tuple[int, str]]] = {}
-    for k, pair in enumerate(m.pairs):
-        if isinstance(pair.type, PairType) and motion_of(pair):
-            for link, other in ((pair.a, pair.b), (pair.b, pair.a)):
-                found.setdefault(link, []).append((k, other))
-    return found
-
-
-def on_line(m: Any, steps: tuple[MeshStep, ...], place: LinkPlace, slides: bool, fitting: float) -> list[float]:
-    """Senses of the first pairs on a way from the link of a gear that turn about its axis (of a rack: the one that slides along it)."""
-    p, z = np.asarray(place.point, dtype=float), np.asarray(place.axis)
-    senses: list[float] = []
-    for step in steps[: 1 if slides else None]:
-        pair: Pair = m.pairs[step.pair]
-        before, behind = (pair.markers[int((step.sense > 0) == later)] for later in (False, True))
-        axis = np.asarray(before.axis, dtype=float)
-        w, q = axis / np.sqrt(axis @ axis), np.asarray(before.point, dtype=float)
-        off = 0.0 if slides else np.abs(cross(q - p, z)).max() / max(1.0, np.abs(q - p).max())
-        if motion_of(pair) != ("slide" if slides else "turn") or max(off, np.abs(cross(z, w)).max()) > fitting:
-            break
-        senses.append(float(np.sign(z @ w)))
-        axis = np.asarray(behind.axis, dtype=float)
-        along, z = (p - q) @ z, senses[-1] * axis / np.sqrt(axis @ axis)
-        p = np.asarray(behind.point, dtype=float) + along * z
-    return senses
 
 
 def _reached(m: Any) -> set[str]:
@@ -655,3 +637,88 @@ _KINDS: dict[tuple[str, str], Any] = {
 
 def _words_of_kinds(kind: str) -> str:
     return " or ".join(f"a {b}" for a, b in _KINDS if a == kind)
+
+
+# --- what is doubtful -----------------------------------------------------------------------------------------------
+
+
+def gear_doubts(m: Any) -> list[str]:
+    """What is doubtful about the places of gears, pulleys and planets; nothing without geometry."""
+    return [*_off_axis(m), *planet_faults(m)] if m.has_geometry else []
+
+
+def _off_axis(m: Any) -> Iterator[str]:
+    """Gears and pulleys beside the axis about which their link turns."""
+    near, turning, fitting = m.once(meeting), m.once(plain_pairs), fitting_of(m)
+    for gear in m.gears:
+        pairs = [m.pairs[k] for k, _ in turning.get(gear.link, ())]
+        if gear.link == m.frame or isinstance(gear, GearRack) or len(pairs) < len(near[gear.link]):
+            continue
+        away = {}
+        for pair in pairs:
+            marker, z = pair.markers[int(pair.b == gear.link)], np.asarray(gear.axis) / np.linalg.norm(gear.axis)
+            d = np.subtract(marker.point, gear.point)
+            if motion_of(pair) == "turn" and np.abs(np.cross(z, marker.axis)).max() <= fitting * np.linalg.norm(
+                marker.axis
+            ):
+                away[pair.name] = float(np.linalg.norm(np.cross(d, z))), fitting * max(1.0, float(np.abs(d).max()))
+        if away and all(off > least for off, least in away.values()):
+            name = min(away, key=away.__getitem__)
+            yield (
+                f"{gear.kind} {gear.name!r} is {away[name][0]:.6g} beside the axis of pair {name!r}, about which its link turns: it runs "
+                "eccentrically; move its point onto that axis if it should not"
+            )
+
+
+def planet_faults(m: Any) -> list[str]:
+    """Planets between the same two gears that cannot be put in, or overlap, at the declared places.
+
+    The value of a mesh with the first gear less that with the second one leaves the turn of the planet out; modulo the base pitch it is
+    the same for all that fit.
+    """
+    meshes = [c for c in m.couplings if isinstance(c, Mesh)]
+    of_gear: dict[str, list[Mesh]] = {}
+    for c in meshes:
+        for name in (c.a, c.b):
+            of_gear.setdefault(name, []).append(c)
+    groups: dict[tuple[str, str], list[tuple[str, float, Gear]]] = {}
+    period = {}
+    for name, own in of_gear.items():
+        if len(own) != 2 or not any(getattr(g, "internal", False) for c in own for g in c.pair_of(m)):
+            continue
+        met = [c.seen(m) for c in own]
+        if not all(isinstance(one, Parallel) for one in met):
+            continue
+        values, mates = [], []
+        for c, one in zip(own, met, strict=True):
+            value = float(one.flanks(True)[0](one.a, one.b, np.array(one.numbers)[:, None, None]).value[0, 0])
+            values.append(value * np.sign(one.one.base_radius))
+            mates.append(c.b if c.a == name else c.a)
+        order = np.argsort(mates)
+        key = mates[order[0]], mates[order[1]]
+        gear = next(g for g in (met[0].one, met[0].two) if g.name == name)
+        groups.setdefault(key, []).append((name, values[order[0]] - values[order[1]], gear))
+        period[key] = met[0].period
+    return [fault for key, planets in groups.items() for fault in _group_faults(m, key, planets, period[key])]
+
+
+def _group_faults(m: Any, key: tuple[str, str], planets: list[tuple[str, float, Gear]], period: float) -> Iterator[str]:
+    """See ``planet_faults``, for the planets between two gears."""
+    first, tolerance = planets[0], max(1e-6, 10 * fitting_of(m))
+    for name, value, _ in planets[1:]:
+        off = (value - first[1]) / period
+        if abs(off - round(off)) > tolerance:
+            yield (
+                f"planets {first[0]!r} and {name!r} between {key[0]!r} and {key[1]!r} cannot both be put in: their teeth are off by "
+                f"{abs(off - round(off)):.4g} of a tooth; mg.planet_places gives places that fit"
+            )
+    for (one, _, gear), (two, _, other) in combinations(planets, 2):
+        # planets on one carrier keep their distance
+        apart = float(np.linalg.norm(np.subtract(gear.point, other.point)))
+        if m.once(_as_assembled) and gear.link != other.link and apart < tip_radius(gear) + tip_radius(other):
+            yield f"planets {one!r} and {two!r} overlap: {apart:.6g} apart; expected more than {tip_radius(gear) + tip_radius(other):.6g}"
+
+
+def _as_assembled(m: Any) -> bool:
+    """Whether all places are in one frame."""
+    return all(pair.on_a is None for pair in m.pairs)

@@ -33,7 +33,7 @@ from mechgraph.maths.newton import Work
 from mechgraph.maths.se3 import Array, Index, cross, rotate, rotate_back, shift_wrench
 from mechgraph.maths.tolerances import MOTIONS, PATH, STRESSES
 from mechgraph.model.friction import Friction
-from mechgraph.model.lines import moving_lines
+from mechgraph.model.gears import moving_lines
 from mechgraph.model.loads import Law, Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.pairs.pair_type import PairType

@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mechgraph.maths.se3 import Array
-from mechgraph.model.belts import BeltDrive, Pulley, course, place_of
+from mechgraph.model.belts import BeltDrive, course
 from mechgraph.model.couplings import Axes, Belt, BevelGears, Contact, Rack, SpurGears, WormGear
-from mechgraph.model.gears import Gear, GearRack, Worm
+from mechgraph.model.gears import Gear, GearRack, Pulley, Worm, place_of
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.meshes import Mesh
 from mechgraph.show.shapes import Shape, polyline

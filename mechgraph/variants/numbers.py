@@ -27,7 +27,7 @@ from mechgraph.fields import POINT, XYZ, Described, FieldFormat, PerCase
 from mechgraph.maths.inertia import physical
 from mechgraph.maths.se3 import Array
 from mechgraph.model.belts import BeltDrive
-from mechgraph.model.lines import LineCoupling
+from mechgraph.model.gears import LineCoupling
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import NUMBERS_OF_CHAIN, Mechanism, chain_numbers, markers_of_chain
 from mechgraph.model.pair import Link, Marker, Pair
