@@ -1,6 +1,6 @@
-"""What meshes of gears amount to: ratios, angles, circles, contact ratios, backlash; places of planets.
+"""What meshes of gears amount to: ratios, angles, circles, contact ratios, backlash.
 
-Source: ISO 21771:2007, Cylindrical involute gears and gear pairs; G. Niemann and H. Winter, Maschinenelemente II, 2003, chapters 21 to 23.
+Source: ISO 21771:2007, Cylindrical involute gears and gear pairs; G. Niemann and H. Winter, Maschinenelemente II, 2003, chapters 21, 22.
 """
 
 from __future__ import annotations
@@ -14,11 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mechgraph.errors import DeclarationError
-from mechgraph.maths.se3 import Array
 from mechgraph.model.couplings import Axes, BaseCoupling, BevelGears, Rack, SpurGears
 from mechgraph.model.gears import Gear, tip_radius
 from mechgraph.model.meshes import Bevels, Mesh, Parallel, WithRack
-from mechgraph.quantities import door, shown
+from mechgraph.quantities import door
 
 if TYPE_CHECKING:
     from mechgraph.model.mechanism import Mechanism
@@ -98,51 +97,6 @@ def mesh_facts(m: Mechanism) -> dict[str, MeshFacts]:
     if not m.has_geometry:
         raise DeclarationError(f"mechanism {m.name!r}", ["has no geometry; meshes have facts at their places"])
     return {c.name: _facts(m, c) for c in m.couplings if isinstance(c, Mesh)}
-
-
-@door
-def planet_places(sun: int, ring: int, n: int) -> Array:
-    """Return the angles ``(n,)`` [rad] at which ``n`` planets between a sun and a ring can be put in, as evenly as teeth allow.
-
-    The planets have ``(ring - sun) / 2`` teeth. Even places need ``(sun + ring) / n`` whole; others are multiples of ``2 pi / (sun +
-    ring)``. Neighbors need ``(sun + planet) sin(pi / n) > planet + 2``.
-
-    Parameters
-    ----------
-    sun, ring, n : int
-        Teeth of the sun and of the ring; number of planets.
-
-    Raises
-    ------
-    DeclarationError
-        Planets that would overlap, or whose teeth are no whole number.
-
-    Examples
-    --------
-    >>> import mechgraph as mg
-    >>> import numpy as np
-    >>> np.rad2deg(mg.planet_places(20, 54, 3)).round(4)
-    array([  0.    , 121.6216, 238.3784])
-    """
-    faults = [
-        f"{name} = {shown(value)}: expected a whole number above 0"
-        for name, value in (("sun", sun), ("ring", ring), ("n", n))
-        if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < 1
-    ]
-    if not faults and (ring - sun < 2 or (ring - sun) % 2):
-        faults.append(f"sun = {sun}, ring = {ring}: planets have half the difference, a whole number above 0")
-    if not faults:
-        planet, steps = (ring - sun) // 2, np.round(np.arange(n) * (sun + ring) / n)
-        found = 2 * pi * steps / (sun + ring)
-        gaps = np.diff(np.append(found, 2 * pi))
-        room = float((sun + planet) * np.sin(min(gaps.min(), pi) / 2)) if n > 1 else np.inf
-        if room <= planet + 2:
-            faults.append(
-                f"n = {n}: neighbors overlap, ({sun} + {planet}) sin(half their angle) = {room:.6g}; expected more than {planet + 2}"
-            )
-    if faults:
-        raise DeclarationError("planet_places", faults)
-    return np.asarray(found)
 
 
 def _facts(m: Mechanism, mesh: Mesh) -> MeshFacts:

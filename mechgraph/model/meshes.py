@@ -1,4 +1,7 @@
-"""Meshes between gears: what fits, the relation of every kind of axes, and how it stands in a mechanism (see ``model.gears``)."""
+"""Meshes between gears: what fits, the relation of every kind of axes, and how it stands in a mechanism (see ``model.gears``); planets.
+
+Source: G. Niemann and H. Winter, Maschinenelemente II, 2003, chapter 23 (planetary gears: conditions of assembly and of neighbors).
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,7 @@ from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 
+from mechgraph.errors import DeclarationError
 from mechgraph.fields import (
     NUMBER,
     TEXT,
@@ -49,7 +53,7 @@ from mechgraph.model.gears import (
     pose_along,
     tip_radius,
 )
-from mechgraph.quantities import LENGTH, shown, unknown
+from mechgraph.quantities import LENGTH, door, shown, unknown
 
 FLANKS = ("auto", "forward", "backward")
 
@@ -639,7 +643,52 @@ def _words_of_kinds(kind: str) -> str:
     return " or ".join(f"a {b}" for a, b in _KINDS if a == kind)
 
 
-# --- what is doubtful -----------------------------------------------------------------------------------------------
+# --- planets, and what is doubtful -----------------------------------------------------------------------------------------------
+
+
+@door
+def planet_places(sun: int, ring: int, n: int) -> Array:
+    """Return the angles ``(n,)`` [rad] at which ``n`` planets between a sun and a ring can be put in, as evenly as teeth allow.
+
+    The planets have ``(ring - sun) / 2`` teeth. Even places need ``(sun + ring) / n`` whole; others are multiples of ``2 pi / (sun +
+    ring)``. Neighbors need ``(sun + planet) sin(pi / n) > planet + 2``.
+
+    Parameters
+    ----------
+    sun, ring, n : int
+        Teeth of the sun and of the ring; number of planets.
+
+    Raises
+    ------
+    DeclarationError
+        Planets that would overlap, or whose teeth are no whole number.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> import numpy as np
+    >>> np.rad2deg(mg.planet_places(20, 54, 3)).round(4)
+    array([  0.    , 121.6216, 238.3784])
+    """
+    faults = [
+        f"{name} = {shown(value)}: expected a whole number above 0"
+        for name, value in (("sun", sun), ("ring", ring), ("n", n))
+        if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < 1
+    ]
+    if not faults and (ring - sun < 2 or (ring - sun) % 2):
+        faults.append(f"sun = {sun}, ring = {ring}: planets have half the difference, a whole number above 0")
+    if not faults:
+        planet, steps = (ring - sun) // 2, np.round(np.arange(n) * (sun + ring) / n)
+        found = 2 * pi * steps / (sun + ring)
+        gaps = np.diff(np.append(found, 2 * pi))
+        room = float((sun + planet) * np.sin(min(gaps.min(), pi) / 2)) if n > 1 else np.inf
+        if room <= planet + 2:
+            faults.append(
+                f"n = {n}: neighbors overlap, ({sun} + {planet}) sin(half their angle) = {room:.6g}; expected more than {planet + 2}"
+            )
+    if faults:
+        raise DeclarationError("planet_places", faults)
+    return np.asarray(found)
 
 
 def gear_doubts(m: Any) -> list[str]:

@@ -24,7 +24,7 @@ from mechgraph.maths.tolerances import SHAPES
 from mechgraph.model.couplings import BaseCoupling, Rack, SpurGears
 from mechgraph.model.gears import Gear
 from mechgraph.model.loads import Effort, Load, Spring
-from mechgraph.model.meshes import Mesh
+from mechgraph.model.meshes import Mesh, planet_places
 from mechgraph.model.pair import Link, Pair
 from mechgraph.quantities import (
     Count,
@@ -160,6 +160,14 @@ class _Given:
             self.faults.append(wrong(axis, "axis", f"a direction at right angles to {what}"))
         return out
 
+    def pin(self, axis: Any, along: Array) -> Array | None:
+        """The axis of the pins at both ends, None for balls; z where points have two numbers."""
+        return (
+            None
+            if axis is None and not self.flat
+            else self.across(PLANE_NORMAL if axis is None else axis, along, "p-q")
+        )
+
     def end(self) -> None:
         """Raise the faults, if there are any."""
         if self.faults:
@@ -170,8 +178,24 @@ PURE = ("axis", "axis_a", "axis_b", "direction", "phase", "pressure_angle", "hel
 """Arguments of parts that are no lengths, masses or forces."""
 
 
+FIRST = "    Parameters\n    ----------\n"
+LAST = """    Returns
+    -------
+    Parts
+
+    Raises
+    ------
+    DeclarationError
+        With every fault.
+
+"""
+"""What the docstrings of all parts share."""
+
+
 def _part(make: Callable[P, Parts]) -> Callable[P, Parts]:
     """A door that makes a part; of quantities of pint it is made in SI units, and its numbers are quantities then."""
+    doc = (make.__doc__ or "").replace(FIRST, f"{FIRST}    name : str\n        Name of the part.\n")
+    make.__doc__ = doc.replace("    Examples\n", f"{LAST}    Examples\n")
 
     @door
     @functools.wraps(make)
@@ -275,8 +299,6 @@ def cylinder(
 
     Parameters
     ----------
-    name : str
-        Name of the part.
     a, b : str
         Links at the eye of the tube and at that of the rod.
     p, q : (3,) or (2,) array_like
@@ -289,15 +311,6 @@ def cylinder(
         Diameter of the piston [length]: tube and rod have the inertia of solid cylinders of it.
     pressure : float, optional
         Pressure on the piston, positive outward: an effort ``pressure pi bore^2 / 4`` in the stroke. Needs ``bore``.
-
-    Returns
-    -------
-    Parts
-
-    Raises
-    ------
-    DeclarationError
-        With every fault.
 
     Examples
     --------
@@ -313,9 +326,7 @@ def cylinder(
     along, _ = given.between(start, end, "p and q")
     masses = given.masses(mass, 2)
     size = None if bore is None else given.number(bore, "bore", positive=True)
-    pin = (
-        None if axis is None and not given.flat else given.across(PLANE_NORMAL if axis is None else axis, along, "p-q")
-    )
+    pin = given.pin(axis, along)
     if pressure is not None and bore is None:
         given.faults.append(f"pressure = {shown(pressure)}: needs bore=, the diameter of the piston")
     given.end()
@@ -357,8 +368,6 @@ def rod(
 
     Parameters
     ----------
-    name : str
-        Name of the part.
     a, b : str
         Links at its ends.
     p, q : (3,) or (2,) array_like
@@ -367,15 +376,6 @@ def rod(
         Axis of the pins, at right angles to the rod. Default: balls; z if the points have two numbers.
     mass : float
         Mass; the rod is a slender bar.
-
-    Returns
-    -------
-    Parts
-
-    Raises
-    ------
-    DeclarationError
-        With every fault.
 
     Examples
     --------
@@ -387,9 +387,7 @@ def rod(
     start, end = given.point(p, "p"), given.point(q, "q")
     along, _ = given.between(start, end, "p and q")
     weight = given.number(mass, "mass")
-    pin = (
-        None if axis is None and not given.flat else given.across(PLANE_NORMAL if axis is None else axis, along, "p-q")
-    )
+    pin = given.pin(axis, along)
     given.end()
     link = f"{name}.rod"
     pairs = (_eye(f"{name}.a", a, link, start, pin), _eye(f"{name}.b", link, b, end, pin))
@@ -414,8 +412,6 @@ def spring_strut(
 
     Parameters
     ----------
-    name : str
-        Name of the part.
     a, b, p, q, axis, mass
         As of ``cylinder``.
     stiffness : float
@@ -424,15 +420,6 @@ def spring_strut(
         Distance of the eyes without force [length]. Default: the declared distance.
     damping : float
         Force per velocity.
-
-    Returns
-    -------
-    Parts
-
-    Raises
-    ------
-    DeclarationError
-        With every fault.
 
     Examples
     --------
@@ -468,8 +455,6 @@ def bearings(
 
     Parameters
     ----------
-    name : str
-        Name of the part.
     housing, shaft : str
         Links.
     points : sequence of (3,) array_like
@@ -478,15 +463,6 @@ def bearings(
         Direction of the shaft.
     fixed : int
         Place of the locating bearing among the points.
-
-    Returns
-    -------
-    Parts
-
-    Raises
-    ------
-    DeclarationError
-        With every fault.
 
     Examples
     --------
@@ -538,8 +514,6 @@ def screw_drive(
 
     Parameters
     ----------
-    name : str
-        Name of the part.
     a, b : str
         Links at the housing and at the nut.
     p, q : (3,) array_like
@@ -548,15 +522,6 @@ def screw_drive(
         Advance per turn [length], right-hand positive; not zero.
     mass : float or (3,) array_like
         Mass of housing, screw and nut together, shared equally, or of each; slender bars.
-
-    Returns
-    -------
-    Parts
-
-    Raises
-    ------
-    DeclarationError
-        With every fault.
 
     Examples
     --------
@@ -610,8 +575,6 @@ def cardan_shaft(
 
     Parameters
     ----------
-    name : str
-        Name of the part.
     a, b : str
         The shafts.
     p, q : (3,) array_like
@@ -622,15 +585,6 @@ def cardan_shaft(
         Angle between the inner forks [rad].
     mass : float or (2,) array_like
         Mass of the cardan shaft, half of it each in front and rear, or of both; slender bars.
-
-    Returns
-    -------
-    Parts
-
-    Raises
-    ------
-    DeclarationError
-        With every fault.
 
     Examples
     --------
@@ -686,8 +640,6 @@ def rack_and_pinion(
 
     Parameters
     ----------
-    name : str
-        Name of the part.
     base : str
         Link on which both are.
     point : (3,) or (2,) array_like
@@ -700,15 +652,6 @@ def rack_and_pinion(
         Pitch radius of the pinion [length].
     pressure_angle : float
         Of the flanks [rad]. Default: 20 degrees.
-
-    Returns
-    -------
-    Parts
-
-    Raises
-    ------
-    DeclarationError
-        With every fault.
 
     Examples
     --------
@@ -750,8 +693,6 @@ def gear_stage(
 
     Parameters
     ----------
-    name : str
-        Name of the part.
     base : str
         Link on which both gears are.
     p, q : (3,) or (2,) array_like
@@ -762,15 +703,6 @@ def gear_stage(
         Numbers of teeth of pinion and wheel.
     module, helix_angle, internal
         As of ``SpurGears``.
-
-    Returns
-    -------
-    Parts
-
-    Raises
-    ------
-    DeclarationError
-        With every fault; that the gears do not fit their distance, from ``Mechanism``.
 
     Examples
     --------
@@ -819,8 +751,6 @@ def planetary(
 
     Parameters
     ----------
-    name : str
-        Name of the part.
     sun, planet, ring : int
         Numbers of teeth, ``ring = sun + 2 planet``.
     planets : int
@@ -840,15 +770,6 @@ def planetary(
     helix_angle : float
         Of the sun, right-hand positive [rad].
 
-    Returns
-    -------
-    Parts
-
-    Raises
-    ------
-    DeclarationError
-        With every fault: teeth that do not fit, planets that touch each other.
-
     Examples
     --------
     >>> import mechgraph as mg
@@ -864,14 +785,10 @@ def planetary(
         given.faults.append(
             f"ring = {ring}: expected sun + 2 planet = {sun + 2 * planet}; other numbers take profile shifts: declare the gears one by one"
         )
-    turns = [2 * np.pi * round(i * (sun + ring) / planets) / (sun + ring) for i in range(planets)]
-    apart = float(np.diff([*turns, 2 * np.pi]).min())
-    if planets > 1 and (sun + planet) * np.sin(apart / 2) <= planet + 2:
-        least = (sun + planet) * np.sin(apart / 2)
-        given.faults.append(
-            f"planets = {planets}: the tips of neighbors touch, (sun + planet) sin(half their angle) = {least:.4g}; expected more than "
-            f"planet + 2 = {planet + 2}"
-        )
+    try:
+        turns = planet_places(sun, ring, planets).tolist()
+    except DeclarationError as error:
+        given.faults += error.faults
     given.end()
     x = np.array(second_direction(z))
     distance = m * (sun + planet) / 2 / np.cos(helix_angle)
@@ -911,8 +828,6 @@ def four_bar(
 
     Parameters
     ----------
-    name : str
-        Name of the part.
     base : str
         Link on which A and D are.
     points : sequence of four (3,) or (2,) array_like
@@ -921,15 +836,6 @@ def four_bar(
         Axis of all pairs. Default: z.
     mass : float or (3,) array_like
         Mass of all three links, shared equally, or of each; slender bars.
-
-    Returns
-    -------
-    Parts
-
-    Raises
-    ------
-    DeclarationError
-        With every fault.
 
     Examples
     --------
@@ -969,8 +875,6 @@ def slider_crank(
 
     Parameters
     ----------
-    name : str
-        Name of the part.
     base : str
         Link on which the crank turns and the slider slides.
     points : sequence of three (3,) or (2,) array_like
@@ -981,15 +885,6 @@ def slider_crank(
         Axis of the turning pairs. Default: z.
     mass : float or (3,) array_like
         Mass of all three links, shared equally, or of each; bars, the slider a point.
-
-    Returns
-    -------
-    Parts
-
-    Raises
-    ------
-    DeclarationError
-        With every fault.
 
     Examples
     --------

@@ -430,7 +430,7 @@ def _of_spline(spline: Any) -> LawPieces:
     return LawPieces(np.append(made.x[kept], made.x[kept[-1] + 1]), made.c[::-1, kept].T, np.zeros((len(kept), 3)))
 
 
-class Factors(NamedTuple):
+class LawFactors(NamedTuple):
     """Part of ``CamLaw.factors`` and ``cam_laws()``: largest rates ``s' over / rise``, ``s'' over^2 / rise``, ``s''' over^3 / rise``."""
 
     Cv: float
@@ -609,7 +609,7 @@ class CamLaw(Described, Once, Shown):
         return tuple(out)
 
     @cached_property
-    def factors(self) -> tuple[Factors, ...]:
+    def factors(self) -> tuple[LawFactors, ...]:
         """Largest slope, bend and jerk of every segment, over its rise and angle; infinite where the derivative before jumps."""
         out = []
         for i, (one, part) in enumerate(zip(self.segments, self.parts, strict=True)):
@@ -736,24 +736,24 @@ def _columns(path: Path) -> dict[str, Array]:
         raise FileError(path, f"is not a table of numbers below a line of names: {error}") from None
 
 
-def _factors(part: LawPieces, rise: float, over: float, at_ends: Sequence[bool]) -> Factors:
+def _factors(part: LawPieces, rise: float, over: float, at_ends: Sequence[bool]) -> LawFactors:
     """Factors of a segment; ``at_ends``: of position and derivatives, whether each jumps where it begins or ends."""
     if not rise:
-        return Factors(0.0, 0.0, 0.0)
+        return LawFactors(0.0, 0.0, 0.0)
     found = []
     for order in (1, 2, 3):
         jumps = [at_ends[k] or part.jumps(k) for k in range(order)]
         found.append(math.inf if any(jumps) else part.largest(order) * over**order / abs(rise))
-    return Factors(*found)
+    return LawFactors(*found)
 
 
-class CamLaws(Mapping[str, Factors], Shown):
+class CamLaws(Mapping[str, LawFactors], Shown):
     """The factors of the standard laws by name; prints as a table."""
 
     _every_method_is_a_door = False  # a Mapping has KeyErrors
 
     @cached_property
-    def _rows(self) -> dict[str, Factors]:
+    def _rows(self) -> dict[str, LawFactors]:
         shapes = {name: rise_of(name) for name in (*SCCA, *RISES)}
         shapes["scca (1/3, 1/3, 1/3)"] = of_scca(1 / 3, 1 / 3, 1 / 3)
         shapes["scca (1/5, 0, 3/5)"] = of_scca(0.2, 0.0, 0.6)
@@ -766,7 +766,7 @@ class CamLaws(Mapping[str, Factors], Shown):
             )
         return dict(sorted(out.items(), key=lambda item: item[1].Ca))
 
-    def __getitem__(self, name: str) -> Factors:
+    def __getitem__(self, name: str) -> LawFactors:
         return self._rows[name]
 
     def __iter__(self) -> Iterator[str]:

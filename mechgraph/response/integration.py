@@ -229,7 +229,7 @@ class Stage(Protocol):
 
 
 @dataclass(frozen=True)
-class Segment:
+class StepSpan:
     """One accepted step from ``begin`` to ``end``; ``work`` was done before the stage began."""
 
     begin: float
@@ -272,13 +272,13 @@ class Integration:
     max_step: float = np.inf
     breaks: tuple[float, ...] = ()
     apart: float = np.inf
-    segments: list[Segment] = field(default_factory=list)
+    segments: list[StepSpan] = field(default_factory=list)
     done: float = 0.0
     """Work done since the start."""
     work: Count = field(default_factory=Count)
     _told: bool = False
 
-    def run(self, stage: Stage, begin: float, end: float, first: float | None = None) -> Iterator[Segment]:
+    def run(self, stage: Stage, begin: float, end: float, first: float | None = None) -> Iterator[StepSpan]:
         """Follow the motion from a stage, behind what was followed before; yields every accepted step. ``first``: longest first step.
 
         Raises
@@ -310,7 +310,7 @@ class Integration:
                         h = 0.25 * (stepper.t - t)
                         break
                     self.work.steps += 1
-                    self.segments.append(Segment(t, stepper.t, stage, stepper.dense_output(), work))
+                    self.segments.append(StepSpan(t, stepper.t, stage, stepper.dense_output(), work))
                     # the step goes on with its length, which a multistep method finds anew, and any behind a break
                     h = None if self.method in ("BDF", "LSODA") or stepper.t == goal else stepper.t - t
                     t, y, self.done = stepper.t, stepper.y, work + float(stepper.y[-1])
