@@ -293,6 +293,6 @@ PATHS: dict[type, Any] = {
     Rack: lambda m, c: (np.nan, np.nan, 1.0),
     Parallel: _path_of_parallel,
     WithRack: _path_of_rack,
-    Bevels: lambda m, met: _path_of_bevel(m, met.bevels, met.axes),
+    Bevels: lambda m, met: _path_of_bevel(m, met.short, met.axes),
 }
 """Where teeth touch, of gears that do not slide at their pitch point."""

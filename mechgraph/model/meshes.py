@@ -272,6 +272,16 @@ class Meeting(ABC):
         """What is wrong with the gears and their places, and what would fit."""
         return self.faults
 
+    @property
+    def in_order(self) -> tuple[Any, Any]:
+        """Both gears as their short form names them."""
+        return self.one, self.two
+
+    @property
+    def short(self) -> Any:
+        """The short form of the coupling, where that says as much, else None."""
+        return None
+
     def _base_pitches(self, fitting: float) -> Iterator[str]:
         one, two = self.one, self.two
         if abs(one.base_pitch - two.base_pitch) > fitting * one.base_pitch:
@@ -557,8 +567,8 @@ class Bevels(Still):
     held = (True, True)
 
     @property
-    def bevels(self) -> BevelGears:
-        """The same as gears on pairs of their own."""
+    def short(self) -> BevelGears:
+        """See ``Meeting``."""
         one, two = self.one, self.two
         return BevelGears(
             "", one.name, two.name, (one.teeth, two.teeth), one.module, one.pressure_angle, one.spiral_angle
@@ -576,10 +586,10 @@ class Bevels(Still):
 
     def misfits(self, fitting: float) -> list[str]:
         """See ``Meeting``."""
-        found = self.faults or self.bevels.misfits(self.axes, fitting)
+        found = self.faults or self.short.misfits(self.axes, fitting)
         if found:
             return found
-        apex = self.bevels._apex(self.axes)[0]
+        apex = self.short._apex(self.axes)[0]
         ea, eb = (
             z * np.sign(dot(p - apex, z)) for p, z in ((self.axes.pa, self.axes.za), (self.axes.pb, self.axes.zb))
         )
@@ -593,7 +603,7 @@ class Bevels(Still):
 
     def lines(self) -> tuple[Array, Array]:
         """See ``Still``."""
-        return self.bevels.lines(self.axes)
+        return self.short.lines(self.axes)
 
 
 class Worms(Still):
@@ -609,23 +619,29 @@ class Worms(Still):
         return 1.0 if isinstance(self.one, Worm) else -1.0
 
     @property
-    def _pair(self) -> tuple[WormGear, Axes]:
-        x, swapped = self.axes, Axes(self.axes.pb, self.axes.zb, self.axes.pa, self.axes.za)
-        worm, wheel = (self.one, self.two) if self._sign > 0 else (self.two, self.one)
-        made = WormGear(
-            "", worm.name, wheel.name, (worm.teeth, wheel.teeth), worm.radius, worm.pressure_angle, worm.left_hand
-        )
-        return made, x if self._sign > 0 else swapped
+    def in_order(self) -> tuple[Any, Any]:
+        """See ``Meeting``."""
+        return (self.one, self.two) if self._sign > 0 else (self.two, self.one)
+
+    @property
+    def short(self) -> WormGear:
+        """See ``Meeting``."""
+        worm, wheel = self.in_order
+        teeth = worm.teeth, wheel.teeth
+        return WormGear("", worm.name, wheel.name, teeth, worm.radius, worm.pressure_angle, worm.left_hand)
+
+    @property
+    def _ordered(self) -> Axes:
+        x = self.axes
+        return x if self._sign > 0 else Axes(x.pb, x.zb, x.pa, x.za)
 
     def misfits(self, fitting: float) -> list[str]:
         """See ``Meeting``."""
-        pair, axes = self._pair
-        return pair.misfits(axes, fitting)
+        return self.short.misfits(self._ordered, fitting)
 
     def lines(self) -> tuple[Array, Array]:
         """See ``Still``."""
-        pair, axes = self._pair
-        P, n = pair.lines(axes)
+        P, n = self.short.lines(self._ordered)
         return P, self._sign * n
 
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +18,7 @@ import numpy as np
 from mechgraph.maths.se3 import Array
 from mechgraph.model.belts import BeltDrive, course
 from mechgraph.model.couplings import Axes, Belt, BevelGears, Contact, Rack, SpurGears, WormGear
-from mechgraph.model.gears import Gear, GearRack, Pulley, Worm, place_of
+from mechgraph.model.gears import Gear, GearRack, Pulley, place_of
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.meshes import Mesh
 from mechgraph.show.shapes import Shape, polyline
@@ -360,8 +359,9 @@ def gears_of(m: Mechanism, poses: Mapping[str, Array]) -> tuple[list[Wheel], lis
             one, two = c.pair_of(m)
             ends = [end.seen(poses[end.link]) for end in c.ends]
             P = c.relation(ends[0], ends[1], np.array(c.numbers)[:, None, None]).point[:, 0, 0]
-            if (both := MET.get((one.kind, two.kind))) is not None:
-                for gear, wheel in zip(*both(one, two, P, seats), strict=True):
+            if (said := (met := c.seen(m)).short) is not None:  # the size of one follows from the other
+                drawn = DRAWN[type(said)](said, P, *(seats[gear.name] for gear in met.in_order))
+                for gear, wheel in zip(met.in_order, drawn, strict=True):
                     named[gear.name] = number(replace(wheel, name=gear.name, marked=gear.mark is not None))
             meshes.append(
                 _mesh(named[c.a], named[c.b], P, next(seats[g.name] for g in (one, two) if not isinstance(g, GearRack)))
@@ -429,35 +429,6 @@ def _pulley(g: Any, seat: WheelSeat) -> Wheel:
 
 PLACED: dict[type[Any], Callable[[Any, WheelSeat], Wheel]] = {Gear: _cylindrical, GearRack: _in_a_row, Pulley: _pulley}
 """Wheels of gears that say all of themselves."""
-
-
-def _bevels(one: Any, two: Any, P: Array, seats: Mapping[str, WheelSeat]) -> tuple[tuple[Any, Any], Iterator[Wheel]]:
-    said = SimpleNamespace(
-        name="",
-        teeth=(one.teeth, two.teeth),
-        module=one.module,
-        pressure_angle=one.pressure_angle,
-        spiral_angle=one.spiral_angle,
-    )
-    return (one, two), _bevel(said, P, seats[one.name], seats[two.name])
-
-
-def _worms(one: Any, two: Any, P: Array, seats: Mapping[str, WheelSeat]) -> tuple[tuple[Any, Any], Iterator[Wheel]]:
-    worm, wheel = (one, two) if isinstance(one, Worm) else (two, one)
-    said = SimpleNamespace(
-        name="",
-        teeth=(worm.teeth, wheel.teeth),
-        radius=worm.radius,
-        pressure_angle=worm.pressure_angle,
-        left_hand=worm.left_hand,
-    )
-    return (worm, wheel), _worm(said, P, seats[worm.name], seats[wheel.name])
-
-
-MET: dict[tuple[str, str], Callable[..., tuple[tuple[Any, Any], Iterator[Wheel]]]] = {
-    ("bevel", "bevel"): _bevels, ("worm", "worm_wheel"): _worms, ("worm_wheel", "worm"): _worms,
-}  # fmt: skip
-"""Wheels of gears of which the size follows from the other one."""
 
 
 def _seat(m: Mechanism, poses: Mapping[str, Array], freedom: str, link: str) -> WheelSeat:
