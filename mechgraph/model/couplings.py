@@ -251,6 +251,15 @@ class Axes(NamedTuple):
         d = self.pb - self.pa
         return d - self.za * (d * self.za).sum(axis=0)
 
+    @property
+    def perpendicular(self) -> tuple[Array, Array, Array]:
+        """The point of axis a nearest to axis b, the unit direction ``(3, T)`` across both, and how far along it b passes a, ``(T,)``."""
+        n, d = cross(self.za, self.zb), self.pb - self.pa
+        square = (n * n).sum(axis=0)
+        foot = self.pa + self.za * ((cross(d, self.zb) * n).sum(axis=0) / square)
+        w = n / np.sqrt(square)
+        return foot, w, (d * w).sum(axis=0)
+
 
 Lines = tuple[Array, Array]
 """Points and unit directions ``(3, 2, T)`` of the force on gear b, for both flanks or strands; along each it acts in one sense only."""
@@ -719,19 +728,12 @@ class BevelGears(Contact):
         """``N_b / N_a``."""
         return self.teeth[1] / self.teeth[0]
 
-    def _apex(self, axes: Axes) -> tuple[Array, float]:
-        """The point of axis a nearest to axis b, and how far the axes pass by each other."""
-        n = cross(axes.za, axes.zb)
-        square = (n * n).sum(axis=0)
-        d = axes.pb - axes.pa
-        along = (cross(d, axes.zb) * n).sum(axis=0) / square
-        return axes.pa + along * axes.za, float(np.abs((d * n).sum(axis=0) / np.sqrt(square)).max())
-
     def misfits(self, axes: Axes, fitting: float) -> list[str]:
         """See ``Contact``."""
         if np.abs(cross(axes.za, axes.zb)).max() < 1e-3:
             return ["the axes are parallel; bevel gears are on axes that intersect"]
-        apex, off = self._apex(axes)
+        apex, _, apart = axes.perpendicular
+        off = float(np.abs(apart).max())
         size = max(float(np.abs(p - apex).max()) for p in (axes.pa, axes.pb))
         if off > fitting * max(size, self.module):
             return [f"the axes pass each other at {off:.4g}; bevel gears are on axes that intersect"]
@@ -745,7 +747,7 @@ class BevelGears(Contact):
 
     def _cone(self, axes: Axes) -> tuple[Array, Array, Array, Array]:
         """The apex, the axes towards both gears, and half the angle of the pitch cone of a."""
-        apex, _ = self._apex(axes)
+        apex = axes.perpendicular[0]
         ea, eb = (z * np.sign(((p - apex) * z).sum(axis=0)) for p, z in ((axes.pa, axes.za), (axes.pb, axes.zb)))
         cosine = (ea * eb).sum(axis=0)
         return apex, ea, eb, np.arctan2(np.sqrt(1.0 - cosine**2), self.teeth[1] / self.teeth[0] + cosine)
@@ -803,22 +805,15 @@ class WormGear(Contact):
             return [
                 f"the axes cross at {np.rad2deg(np.arccos(min(cosine, 1.0))):.5g} degrees; a worm and its wheel at 90"
             ]
-        distance = float(np.abs((self._apart(axes)[1]).max()))
+        distance = float(np.abs(axes.perpendicular[2]).max())
         if distance <= self.radius:
             return [f"the axes are {distance:.7g} apart; expected more than the radius of the worm, {self.radius:g}"]
         return []
 
-    def _apart(self, axes: Axes) -> tuple[Array, Array]:
-        """Unit direction from the worm's axis to that of the wheel, and their distance ``(T,)``."""
-        n = cross(axes.za, axes.zb)
-        off = ((axes.pb - axes.pa) * n).sum(axis=0)
-        return n * np.sign(off), np.abs(off)
-
     def lines(self, axes: Axes) -> Lines:
         """See ``Contact``."""
-        away, distance = self._apart(axes)
-        d, r = axes.pb - axes.pa, self.radius / axes.unit
-        foot = axes.pa + axes.za * (d * axes.za).sum(axis=0)
+        (foot, w, off), r = axes.perpendicular, self.radius / axes.unit
+        away, distance = w * np.sign(off), np.abs(off)
         t = cross(axes.za, away) * (-1.0 if self.left_hand else 1.0)
         lead = np.arctan2((distance - r) * self.teeth[0], self.teeth[1] * r)
         return teeth_lines(foot + r * away, away, np.cos(lead) * t + np.sin(lead) * axes.za, self.pressure_angle)

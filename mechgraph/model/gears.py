@@ -226,19 +226,22 @@ def racked(side: float, sign: float, a: LinePlaces, b: LinePlaces, numbers: Arra
     return LinesAt(value, P, sign * n)
 
 
+def feet(a: LinePlaces, b: LinePlaces) -> tuple[Array, Array, Array]:
+    """Points of both axes where they are nearest to each other, and the unit direction across both."""
+    w, d = cross(a.axis, b.axis), b.point - a.point
+    square = dot(w, w)
+    on_a, on_b = (p.point + p.axis * (dot(cross(d, q.axis), w) / square) for p, q in ((a, b), (b, a)))
+    return on_a, on_b, w / np.sqrt(square)
+
+
 def between_axes(side: float, a: LinePlaces, b: LinePlaces, numbers: Array) -> LinesAt:
     """Axes that cross or intersect: the line stands still in the frame of a's axis, the common perpendicular and what is across both.
 
     ``numbers``: a length u, the point from the foot of the perpendicular on axis a, u times the direction of side 1, and of side -1.
     """
     u, P, n = numbers[0], numbers[1:4], (numbers[4:7] if side > 0 else numbers[7:10]) / numbers[0]
-    za, zb, d = a.axis, b.axis, b.point - a.point
-    w = cross(za, zb)
-    square = dot(w, w)
-    foot_a = a.point + za * (dot(cross(d, zb), w) / square)
-    foot_b = b.point + zb * (dot(cross(d, za), w) / square)
-    w = w / np.sqrt(square)
-    frame = (za, w, cross(za, w))
+    foot_a, foot_b, w = feet(a, b)
+    frame = (a.axis, w, cross(a.axis, w))
     at = foot_a + sum(x * v for x, v in zip(P, frame, strict=True))
     along = sum(x * v for x, v in zip(n, frame, strict=True))
     value = 0.0 * u

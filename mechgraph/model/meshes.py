@@ -48,6 +48,7 @@ from mechgraph.model.gears import (
     Worm,
     angle,
     dot,
+    feet,
     gears_by_name,
     involute,
     pose_along,
@@ -206,10 +207,9 @@ class Mesh(LineCoupling):
             return np.asarray(np.sqrt(dot(lean, lean)))
         places = []
         for p, q in ((a, b), (a0, b0)):
-            w, d = cross(p.axis, q.axis), q.point - p.point
-            square = dot(w, w)
-            feet = [dot(cross(d, axis), w) / square for axis in (q.axis, p.axis)]
-            places.append((dot(p.axis, q.axis), dot(d, w) / np.sqrt(square), *feet))
+            foot_a, foot_b, w = feet(p, q)
+            apart = dot(q.point - p.point, w)
+            places.append((dot(p.axis, q.axis), apart, dot(foot_a - p.point, p.axis), dot(foot_b - q.point, q.axis)))
         found = [now - then for now, then, held in zip(*places, (True, True, *self.held), strict=True) if held]
         return np.asarray(np.abs(found).max(axis=0))
 
@@ -482,10 +482,7 @@ class Still(Meeting):
         """Points and directions ``(3, 2, 1)`` of the force on b, for both flanks."""
 
     def _lay(self, P: Array, n: Array) -> None:
-        za, zb, d = self.axes.za[:, 0], self.axes.zb[:, 0], (self.axes.pb - self.axes.pa)[:, 0]
-        w = np.cross(za, zb)
-        foot = self.axes.pa[:, 0] + za * (np.cross(d, zb) @ w) / (w @ w)
-        w /= np.linalg.norm(w)
+        za, (foot, w) = self.axes.za[:, 0], (part[:, 0] for part in self.axes.perpendicular[:2])
         frame, at = np.stack([za, w, np.cross(za, w)]), P[:, 0, 0]
         push = [n[:, i, 0] for i in range(2)]
         powers = [float(v @ np.cross(za, at - foot)) for v in push]
@@ -505,11 +502,9 @@ class Crossed(Still):
 
     def _laid(self) -> tuple[Array, float, Array, float]:
         """From axis a to axis b, their distance, the teeth of a where they touch, and the helix angle of b that fits these."""
-        za, zb = self.axes.za[:, 0], self.axes.zb[:, 0]
-        w = np.cross(za, zb)
-        w /= np.linalg.norm(w)
-        off = float((self.axes.pb - self.axes.pa)[:, 0] @ w)
-        away = w * (1.0 if off >= 0 else -1.0)
+        za, zb, (_, w, apart) = self.axes.za[:, 0], self.axes.zb[:, 0], self.axes.perpendicular
+        off = float(apart[0])
+        away = w[:, 0] * (1.0 if off >= 0 else -1.0)
         trace = cos(self.one.helix_angle) * za + sin(self.one.helix_angle) * np.cross(za, away)
         x, y = float(trace @ zb), float(trace @ np.cross(zb, -away))
         return away, abs(off), trace, atan(y / x) if x else pi / 2
@@ -536,10 +531,7 @@ class Crossed(Still):
     def lines(self) -> tuple[Array, Array]:
         """See ``Still``."""
         away, _, trace, _ = self._laid()
-        za, zb, d = self.axes.za[:, 0], self.axes.zb[:, 0], (self.axes.pb - self.axes.pa)[:, 0]
-        w = np.cross(za, zb)
-        foot = self.axes.pa[:, 0] + za * (np.cross(d, zb) @ w) / (w @ w)
-        P = foot + away * (self.one.radius + self.one.module * self.one.shift)
+        P = self.axes.perpendicular[0][:, 0] + away * (self.one.radius + self.one.module * self.one.shift)
         return teeth_lines(P[:, None], away[:, None], trace[:, None], self.one.pressure_angle)
 
 
@@ -589,7 +581,7 @@ class Bevels(Still):
         found = self.faults or self.short.misfits(self.axes, fitting)
         if found:
             return found
-        apex = self.short._apex(self.axes)[0]
+        apex = self.axes.perpendicular[0]
         ea, eb = (
             z * np.sign(dot(p - apex, z)) for p, z in ((self.axes.pa, self.axes.za), (self.axes.pb, self.axes.zb))
         )
