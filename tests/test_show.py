@@ -294,7 +294,9 @@ def test_forces_are_tangent_to_friction_circles() -> None:
     ax = show.draw_skeleton(s, forces=True, ghosts=0, traces=False)
     lines = []
     for p in pins:
-        (circle,), (line,) = (drawn(ax, f"axis {p.name} friction {what}") for what in ("circle", "line"))
+        (circle,), (line,) = (
+            drawn(ax, f"{what} {p.name} friction {of}") for what, of in (("drive", "circle"), ("axis", "line"))
+        )
         ring, ends = circle.get_segments()[0], line.get_segments()[0]
         center, rho = 0.5 * (ring.min(axis=0) + ring.max(axis=0)), 0.5 * np.ptp(ring[:, 0])
         assert rho == pytest.approx(radius * np.sin(np.arctan(mu)), rel=1e-3)

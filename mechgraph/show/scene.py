@@ -34,6 +34,7 @@ from mechgraph.show.stage import (
     DrawnPlace,
     DrawnPose,
     Label,
+    Role,
     distinct,
     is_profile,
     slide_of,
@@ -580,12 +581,13 @@ def _friction_circle(
     radius = np.linalg.norm(off, axis=1)
     radius = np.where(radius > 0, radius, np.nan)
     line = LONGEST_ARROW * stage.size * np.where(radius > 0, 1.0, np.nan)
-    for what, along, middle, size, shape in (
-        ("circle", spin, at, radius, shapes.polyline(shapes.ring(1.0))),
-        ("line", force, at + np.nan_to_num(off), line, shapes.polyline([(0, 0, -1), (0, 0, 1)])),
+    role: Role
+    for role, what, along, middle, size, shape in (
+        ("drive", "circle", spin, at, radius, shapes.polyline(shapes.ring(1.0))),
+        ("axis", "line", force, at + np.nan_to_num(off), line, shapes.polyline([(0, 0, -1), (0, 0, 1)])),
     ):
         stage.frames[f"friction {what}:{name}"] = stretched(np.nan_to_num(along), middle, size, size)
-        yield DrawnPart("axis", f"{name} friction {what}", "", f"friction {what}:{name}", shape)
+        yield DrawnPart(role, f"{name} friction {what}", "", f"friction {what}:{name}", shape)
 
 
 def known_force(stage: DrawnPose, solution: Solution, pair: Pair, positions: Any, along: Array | None) -> Array:
