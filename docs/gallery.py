@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 import mechgraph as mg
-from mechgraph.quantities import FORCE, MOMENT, unit_of
+from mechgraph.quantities import FORCE, LENGTH, MOMENT, POWER, unit_of
 from mechgraph.show.scene import scene
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -193,6 +193,51 @@ def cam() -> mg.Solution:
     return mg.solve(m, {"A": mg.Motion(u, velocity=30.0)})
 
 
+def page(name: str, blocks: int) -> dict[str, Any]:
+    """What the first blocks of a page of the manual declare."""
+    text = (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
+    found: dict[str, Any] = {}
+    for block in text.split("```python\n")[1 : blocks + 1]:
+        code = block.partition("```")[0]
+        exec("\n".join(line for line in code.splitlines() if "show." not in line and "print(" not in line), found)
+    return found
+
+
+def press() -> mg.Solution:
+    """The toggle press of the tutorial, with friction in its pins and its guide."""
+    told = page("tutorials/press", 1)
+    rough = [mg.Friction(name, mu=0.12, radius=0.03) for name in "ABCDEF"] + [mg.Friction("G", mu=0.12, length=0.2)]
+    m = told["m"].replace(loads=[*told["m"].loads, *rough], description="Toggle press with friction in all pairs")
+    return mg.solve(m, {"A": mg.Motion(np.deg2rad(np.linspace(-120, -5, 73)), velocity=2.0)})
+
+
+def bearing() -> mg.Solution:
+    """The engine of the page on oil films, its big-end bearing with a film."""
+    told = page("how-to/oil-film", 1)
+    film = mg.Journal(radius=0.024, length=0.03, clearance=30e-6, viscosity=0.01)
+    m = told["m"]
+    m = m.replace(
+        pairs=[p.replace(film=film) if p.name == "big end" else p for p in m.pairs],
+        description="Engine with an oil film in its big-end bearing",
+    )
+    return mg.solve(m, {"turn.Rz": mg.Motion(told["angle"], velocity=told["w"])}, loads=[told["push"]])
+
+
+def table() -> mg.Solution:
+    """A table on four elastic feet, one of them short: it leans, and lifts off where the load asks for it."""
+    z, at = (0, 0, 1), [(0.5, 0.4), (-0.5, 0.4), (-0.5, -0.4), (0.5, -0.4)]
+    feet = [
+        mg.Pair(f"foot {i + 1}", "Sp", "floor", "table", point=(x, y, 0), axis=z, stiffness={"Fz": 2e6}, closed="force",
+                misfit={"Fz": -1e-3 * (i == 0)})
+        for i, (x, y) in enumerate(at)
+    ]  # fmt: skip
+    guide = mg.Pair("guide", "Fr", "floor", "table", point=(0, 0, 0), axis=z)
+    links, drives = [mg.Link("floor"), mg.Link("table", 40.0, (0.1, -0.06, 0.7))], ["guide.Tx", "guide.Ty", "guide.Rz"]
+    about = "Table on four elastic feet, one of them 1 mm short"
+    m = mg.Mechanism("table", links, [*feet, guide], drives, [mg.Gravity((0, 0, -9.81))], units=SI, description=about)
+    return mg.solve(m, dict.fromkeys(drives, np.zeros(1)), redundant="elastic")
+
+
 ENTRIES = [
     Entry("Four-bar", library("four-bar"), "../tutorials/crank-rocker.md"),
     Entry("Slider-crank", library("slider-crank"), "../tutorials/slider-crank.md"),
@@ -211,6 +256,9 @@ ENTRIES = [
     Entry("Planetary set with a floating sun", floating_sun, "../how-to/gears.md"),
     Entry("Belt drive with a tensioner", tensioner, "../how-to/belts.md"),
     Entry("Engine in the plane", engine, "../how-to/planar.md"),
+    Entry("Toggle press with friction", press, "../tutorials/press.md"),
+    Entry("Con-rod bearing of an engine", bearing, "../how-to/oil-film.md"),
+    Entry("Table on four feet", table, "../how-to/misfits.md"),
     Entry("Planetary train", example("14", "planetary", turn("S", 10.0, 1260.0), 1), "../how-to/gears.md"),
     Entry("Excavator", dig, "../tutorials/excavator.md"),
     Entry("Five-rod suspension", ride),
@@ -423,6 +471,18 @@ def numbers(s: mg.Solution) -> str:
             unit = unit_of(m.units, MOMENT if turns else FORCE)
             ends = " to ".join(dict.fromkeys((f"{effort.min():.3g}", f"{effort.max():.3g}")))
             text += f" Driver {'torque' if turns else 'force'} {ends} {unit}".rstrip() + "."
+    if s.has_forces and s.losses:
+        power = np.sum([np.nanmean(lost) for lost in s.losses.values()])
+        text += f" Friction takes {power:.3g} {unit_of(m.units, POWER)} on average."
+    for p in m.pairs if s.has_forces else ():
+        if p.film is not None:
+            film = s.film(p.name)
+            text += f" Least film in {p.name} {film.min:.3g} {unit_of(m.units, LENGTH)} at {film.at}."
+        if p.misfit is not None and any(p.misfit.by_component.values()):
+            bears = ", ".join(
+                f"{q.name} {round(s[q.name].components['Fz'][0], 6) + 0.0:.3g}" for q in m.pairs if q.closed == "force"
+            )
+            text += f" Forces: {bears} {unit_of(m.units, FORCE)}."
     return text
 
 
