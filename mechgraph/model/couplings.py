@@ -15,7 +15,7 @@ Gears, racks and belts: the kinds of contact, each with what a designer gives: t
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
@@ -663,39 +663,6 @@ class SpurGears(Contact):
         t = cross(axes.za, unit(out - axes.za * (out * axes.za).sum(axis=0)))
         trace = np.cos(self.helix_angle) * axes.za + np.sin(self.helix_angle) * t
         return teeth_lines(P, away, trace, self.pressure_angle)
-
-
-def rim_faults(couplings: Iterable[BaseCoupling], m: Any) -> Iterator[str]:
-    """Gears that would have two modules, because the distances of the axes ask for it, or two helices, among couplings without faults.
-
-    The meshes of one rim are compared with the first that leaves the module to the axes: the time is proportional to their number.
-    """
-    rims: dict[tuple[str, float], list[tuple[SpurGears, str, float]]] = {}
-    for gears in couplings:
-        if isinstance(gears, SpurGears):
-            for q, teeth, helix in gears.rims:
-                rims.setdefault((m.full_name(q), teeth), []).append((gears, q, helix))
-    for (_, teeth), meshes in rims.items():
-        first = next((i for i, (gears, *_) in enumerate(meshes) if not gears.module), len(meshes))
-        for i in range(len(meshes)) if first < len(meshes) else ():
-            if i == first:
-                continue
-            (one, q, helix), (two, _, other) = (meshes[k] for k in sorted((i, first)))
-            # radians by which the helix angles of one gear in two meshes may differ: more than
-            # tolerances, less than another hand
-            if abs(helix - other) > 0.02:
-                yield (
-                    f"couplings {one.name!r} and {two.name!r}: the {teeth:g} teeth on {q!r} would have the helix angle {helix:.7g} "
-                    f"in one and {other:.7g} in the other (gear b has the opposite of helix_angle, in an internal pair the same); "
-                    "change one, or give module= in both where the gear has two rims"
-                )
-            mine, yours = one.module_in(m), two.module_in(m)
-            if abs(mine - yours) > fitting_of(m) * max(mine, yours):
-                yield (
-                    f"couplings {one.name!r} and {two.name!r}: the {teeth:g} teeth on {q!r} would have the module {mine:.7g} in one "
-                    f"and {yours:.7g} in the other, as the distances of the axes ask for; change the teeth or the places, or give "
-                    "module= in both where the gear has two rims"
-                )
 
 
 @dataclass(frozen=True)

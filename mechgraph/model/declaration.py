@@ -38,7 +38,7 @@ from mechgraph.maths.se3 import IN_PLANE, IN_SPACE, Array
 from mechgraph.maths.tolerances import SHAPES
 from mechgraph.memo import Once, of_graph
 from mechgraph.model.belts import BeltDrive
-from mechgraph.model.couplings import BaseCoupling, rim_faults
+from mechgraph.model.couplings import BaseCoupling, SpurGears, fitting_of
 from mechgraph.model.friction import LOADS
 from mechgraph.model.gears import GEARS
 from mechgraph.model.loads import Load
@@ -517,7 +517,7 @@ def _coupling_faults(m: DeclaredParts) -> list[str]:
         return []
     own = [coupling.faults(m) for coupling in m.couplings]
     faults = [fault for found in own for fault in found]
-    faults += rim_faults([c for c, found in zip(m.couplings, own, strict=True) if not found], m)
+    faults += _rim_faults([c for c, found in zip(m.couplings, own, strict=True) if not found], m)
     names = [c.name for c in m.couplings if isinstance(c.name, str) and c.name]
     shared = [name for name in dict.fromkeys(names) if name in m.pair_index]
     faults += [f"coupling {name!r}: a pair has that name; names must differ" for name in shared]
@@ -546,3 +546,36 @@ def flat_start(m: DeclaredParts, start: Mapping[str, Any]) -> tuple[dict[str, fl
             else:
                 faults.append(wrong(number, f"start {name!r}", "a finite number"))
     return flat, faults
+
+
+def _rim_faults(couplings: Iterable[BaseCoupling], m: Any) -> Iterator[str]:
+    """Gears that would have two modules, because the distances of the axes ask for it, or two helices, among couplings without faults.
+
+    The meshes of one rim are compared with the first that leaves the module to the axes: the time is proportional to their number.
+    """
+    rims: dict[tuple[str, float], list[tuple[SpurGears, str, float]]] = {}
+    for gears in couplings:
+        if isinstance(gears, SpurGears):
+            for q, teeth, helix in gears.rims:
+                rims.setdefault((m.full_name(q), teeth), []).append((gears, q, helix))
+    for (_, teeth), meshes in rims.items():
+        first = next((i for i, (gears, *_) in enumerate(meshes) if not gears.module), len(meshes))
+        for i in range(len(meshes)) if first < len(meshes) else ():
+            if i == first:
+                continue
+            (one, q, helix), (two, _, other) = (meshes[k] for k in sorted((i, first)))
+            # radians by which the helix angles of one gear in two meshes may differ: more than
+            # tolerances, less than another hand
+            if abs(helix - other) > 0.02:
+                yield (
+                    f"couplings {one.name!r} and {two.name!r}: the {teeth:g} teeth on {q!r} would have the helix angle {helix:.7g} "
+                    f"in one and {other:.7g} in the other (gear b has the opposite of helix_angle, in an internal pair the same); "
+                    "change one, or give module= in both where the gear has two rims"
+                )
+            mine, yours = one.module_in(m), two.module_in(m)
+            if abs(mine - yours) > fitting_of(m) * max(mine, yours):
+                yield (
+                    f"couplings {one.name!r} and {two.name!r}: the {teeth:g} teeth on {q!r} would have the module {mine:.7g} in one "
+                    f"and {yours:.7g} in the other, as the distances of the axes ask for; change the teeth or the places, or give "
+                    "module= in both where the gear has two rims"
+                )
