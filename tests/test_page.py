@@ -334,6 +334,17 @@ def test_what_is_not_unique_is_never_drawn_as_known(redundant: Any) -> None:
         assert named == (loose if redundant == "nan" else set())
 
 
+def test_friction_has_its_table_and_its_pictures() -> None:
+    m = mg.load("four-bar").to_planar()
+    rough = m.replace(loads=[*m.loads, *(mg.Friction(p.name, mu=0.1, radius=0.01) for p in m.pairs)])
+    s = mg.solve(rough, {"A": mg.Motion([0.3, 0.9], velocity=10.0)})
+    page = report_page(rough, s)
+    assert "Power lost by friction" in page
+    assert "tangent to the friction circles" in page
+    assert f"{np.nanmax(s.losses['A']):.5g}" in page
+    assert "Power lost by friction" not in report_page(m, mg.solve(m, {"A": [0.3]}))
+
+
 def test_declaration_and_its_hash_stand_in_the_page(tmp_path: Path) -> None:
     m = mg.load("four-bar")
     mg.save(m, tmp_path / "m.toml")
