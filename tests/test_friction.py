@@ -477,8 +477,8 @@ def test_faults_and_files(tmp_path) -> None:
         with pytest.raises(mg.DeclarationError, match=words):
             m.replace(loads=[mg.Friction(given.pop("of"), **given)])
     heavy = m.replace(links=[mg.Link("frame"), mg.Link("nut", 1.0, (0, 0, 0), np.eye(3))], drives=[])
-    with pytest.raises(mg.MechgraphError, match="solve and study alone"):
-        mg.respond(heavy, (0, 0.1), start={"A": 0.0})
+    with pytest.raises(mg.MechgraphError, match="pass loads= without it here"):
+        mg.equilibrium(heavy)
     with pytest.raises(mg.DeclarationError):
         mg.compile(m)
     weld = mg.Pair("A", "W", "frame", "b", point=(0, 0, 0))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -177,24 +177,30 @@ class ForceTask:
 
 
 def forces_of_block(
-    task: ForceTask, rates: Rates, f: FactoredClosure, coordinates: Array, places: Index
+    task: ForceTask, rates: Rates, f: FactoredClosure, coordinates: Array, places: Index, rubs: Rubbed | None = None
 ) -> BlockForces:
-    """Forces at positions with user coordinates ``(F, T)`` that stand at the ``places`` of the flat batch."""
+    """Forces at positions with user coordinates ``(F, T)`` that stand at the ``places`` of the flat batch.
+
+    ``rubs``: the friction, where it is known.
+    """
     here = rates.here
     site = Site(here, rates, coordinates, task.batch, places, task.t)
     site.solves_friction = True
     site.collect(task.loads)
     given, applied, inertia = site.scaled_efforts(), site.applied(), inertia_wrenches(here, rates)
     loads = applied + inertia
+    if rubs is not None:
+        given = given + rubs.efforts
     held, holds, hold_terms = _held(here, task, f, applied + inertia, given, site.largest)
     loads = applied + inertia if held is None else applied + inertia + held
     first = pretensioned(here, METHODS[task.method](ForceProblem(here, loads, given, task.driven, f)), f)
     lines = ContactLines(here)
     found, flank = _least_on_flanks(here, on_their_flanks(here, first, lines), f, task, lines)
     dry = rubbing_loads(here.system.m, task.loads, site.number)
-    rubs: Rubbed | None = None
     ranges: Array | None = None
-    if dry:
+    if rubs is not None:
+        found = replace(found, reactions=found.reactions - rubs.taken)
+    elif dry:
         dq = moving_rates(rates.dq, rates.ddq)
         solve = _FrictionProblem(here, task, f, first, lines, (found, flank), dry)
         ranges = solve.at_rest(dq, given)
@@ -360,9 +366,35 @@ def _undetermined(found: _FreeForces, rubs: Rubbed, places: Mask) -> _FreeForces
     return replace(found, reactions=reactions, efforts=efforts, multipliers=multipliers, coupled=coupled)
 
 
+def unique_reactions(problem: ForceProblem) -> Array:
+    """Reactions ``(6, P, T)`` at the pair points, or impulses where loads and efforts are such; NaN where self-stresses may change them."""
+    here, f = problem.here, problem.solver
+    task = ForceTask("loop_wrench", (), problem.driven, (), (here.T,), None, "nan")
+    lines = ContactLines(here)
+    wrenches = on_their_flanks(here, METHODS[task.method](problem), lines)
+    found, _ = _least_on_flanks(here, wrenches, f, task, lines)
+    stress = np.abs(at_pair_points(here, found.stress.wrenches)).max(axis=2, initial=0.0)
+    return np.where(stress > STRESSES.unique, np.nan, at_pair_points(here, found.reactions))
+
+
+def rubbed_in_motion(
+    problem: ForceProblem, dry: Sequence[Friction], dq: Array, yields: Callable[[Array], Array]
+) -> Rubbed:
+    """Friction in a motion in the directions ``dq (F, T)`` whose accelerations it changes.
+
+    ``problem`` is that without friction; ``yields`` gives the inertia wrenches ``(6, N, T)`` with which the links yield to efforts.
+    """
+    here, f = problem.here, problem.solver
+    task = ForceTask("loop_wrench", (), problem.driven, (), (here.T,), None, "nan")
+    first = pretensioned(here, METHODS[task.method](problem), f)
+    lines = ContactLines(here)
+    smooth = _least_on_flanks(here, on_their_flanks(here, first, lines), f, task, lines)
+    return _FrictionProblem(here, task, f, first, lines, smooth, dry, yields).forces(dq)[1]
+
+
 class _FrictionProblem:
     """Reactions with friction beside those without it, ``smooth``, for any directions of motion, from total ``wrenches`` on the first
-    flanks of teeth.
+    flanks of teeth. ``yields``: the inertia wrenches with which links yield to efforts; where it is left out the motion is given.
     """
 
     def __init__(
@@ -374,7 +406,9 @@ class _FrictionProblem:
         lines: ContactLines,
         smooth: tuple[_FreeForces, Array],
         dry: Sequence[Friction],
+        yields: Callable[[Array], Array] | None = None,
     ) -> None:
+        self.yields = yields
         self.here, self.task, self.f, self.wrenches, self.lines, self.dry = here, task, f, wrenches, lines, dry
         self.found, self.flank = self.smooth = smooth
         # with friction a split by stiffness holds what only pushes as if it could pull; where it would, nothing is determined
@@ -398,7 +432,9 @@ class _FrictionProblem:
         """Forces under given efforts ``(F, T)`` alone."""
         here, none = self.here, np.zeros((6, len(self.here.system.m.links), self.here.T))
         held, _, _ = _held(here, self.task, self.f, none, efforts, 0.0)
-        problem = ForceProblem(here, none if held is None else held, efforts, self.task.driven, self.f)
+        loads = none if held is None else held
+        loads = loads if self.yields is None else loads + self.yields(efforts)
+        problem = ForceProblem(here, loads, efforts, self.task.driven, self.f)
         wrenches = pretensioned(here, METHODS[self.task.method](problem), self.f, part=0.0)
         one = self._least(wrenches)
         return {name: getattr(one, name) for name in ("reactions", "efforts", "multipliers", "coupled")}
@@ -503,13 +539,15 @@ def _elastic(here: Configuration, found: _FreeForces, held: bool) -> _FreeForces
 def _found(here: Configuration, totals: Array, multipliers: Array, stress: Stress) -> _FreeForces:
     """What total wrenches are made of."""
     efforts = pair_power(here, totals)
+    # in the freedom in which a contact opens a presses on b: that is a reaction
+    efforts[here.system.gaps] = 0.0
     coupled = row_efforts(here, multipliers[:, None])[:, 0]
     return _FreeForces(reaction_part(here, totals, efforts), efforts, stress, multipliers, coupled)
 
 
 def _acting(here: Configuration, task: ForceTask) -> Index:
     """The freedoms with efforts: driven, coupled."""
-    return np.union1d(task.driven, here.system.coupled_freedoms)
+    return np.setdiff1d(np.union1d(task.driven, here.system.coupled_freedoms), here.system.gaps)
 
 
 def _stress(here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: ForceTask) -> Stress:
@@ -566,7 +604,7 @@ def _balance(
     add_at(left, s.a, -totals)
     left[:, s.graph.frame] = 0.0
     residual = np.abs(left).max(axis=(0, 1), initial=0.0)
-    work = np.abs(pair_power(here, reactions)).max(axis=0, initial=0.0)
+    work = np.abs(np.delete(pair_power(here, reactions), s.gaps, axis=0)).max(axis=0, initial=0.0)
     return np.maximum(residual, work), max(_largest(part) for part in (totals, *parts) if part is not None)
 
 

@@ -15,7 +15,7 @@ Mathematical Programming 58, 1993; F. Pfeiffer and Ch. Glocker, Multibody Dynami
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -39,6 +39,7 @@ class Place:
     of a pair, or behind these the force on gear b) about the internal origin, friction wrench on link b ``D (6, T)`` for a unit of its
     size and ``K (6, d, T)`` linear in it, ``preload (T,)`` (internal units), ``speed (T,)`` of sliding. The wrench would pass through the
     pairs ``way``, in these senses; between teeth it passes them by. ``follows``: whether its directions depend on the reactions.
+    ``signed``: of what presses one way alone the size is the one component of its normal vector, below zero where it would pull.
     """
 
     of: str
@@ -50,6 +51,7 @@ class Place:
     preload: Array
     speed: Array
     follows: bool = False
+    signed: bool = False
 
     def between_teeth(self, pairs: int) -> bool:
         """Whether it is one of a coupling, with so many pairs."""
@@ -175,6 +177,15 @@ def _touching(x: _Rubbing) -> Iterator[Place]:
     )
 
 
+def _opening(x: _Rubbing) -> Iterator[Place]:
+    """A point that may open, which presses along the freedom in which it does."""
+    assert x.row.gap is not None
+    at, n = x.frame(x.row.gap)[:, 3], x.S[3:, x.row.gap]
+    u, speed = _unit(x.twist[3:] + cross(x.twist[:3], at), x.rolls_below)
+    pushes = x.place(_rows(np.zeros((1, 3, x.T)), n[None]), -x.mu(speed) * _force_at(at, u), speed)
+    yield replace(pushes, signed=True)
+
+
 def _plane(x: _Rubbing) -> Iterator[Place]:
     """A plane, at the center of pressure, where the force has no moment in it: ``p + z x M / F_z``."""
     z, w = x.frame(0)[:, 2], x.w
@@ -248,6 +259,7 @@ def _along(x: _Rubbing, u: Array, w: Array, v: Array) -> Iterator[Place]:
 
 
 _MAKERS = (
+    (lambda row: row.opens, _opening),
     (rubs_as_contact, _touching),
     (rubs_as_plane, _plane),
     (rubs_as_ball, _ball),
@@ -336,7 +348,12 @@ def rubbed(here: Configuration, places: Sequence[Place], base: Array, unit: dict
     split = [[_passed_on(here, place.way, W) for W in (place.D[:, None], place.K)] for place in places]
     preload = np.array([np.broadcast_to(place.preload, T) for place in places])
     a, B, C = _linear(places, split, starts, base, unit)
-    n, V, outcome, factor, growth = _normals(a + np.einsum("dnt,nt->dt", B, preload), B, C, starts)
+    a = a + np.einsum("dnt,nt->dt", B, preload)
+    signed = [t for t, place in enumerate(places) if place.signed]
+    C[:, starts[signed]] += B[:, signed]
+    B[:, signed] = 0.0
+    n, V, outcome, factor, growth = _normals(a, B, C, starts)
+    n[signed] = V[starts[signed]]
     for t, place in enumerate(places):
         loose = np.einsum("dct,cst->dst", place.A, stress[:, place.reads])
         if loose.size and (size := np.sqrt((loose**2).sum(axis=(0, 1)))).max(initial=0.0) > STRESSES.unique:

@@ -375,6 +375,12 @@ class System(States):
         return np.unique(np.array([self.first_column[pair] + freedom for pair, freedom in places], dtype=np.intp))
 
     @cached_property
+    def gaps(self) -> Index:
+        """Freedoms in which contacts open."""
+        found = [(k, pair.type.gap) for k, pair in enumerate(self.m.pairs)]
+        return np.array([self.first_column[k] + gap for k, gap in found if gap is not None], dtype=np.intp)
+
+    @cached_property
     def carrying(self) -> NDArray[np.bool_]:
         """Which freedoms ``(F,)`` are slides that stand in no closure row: they carry what is behind them, and leave the rows alone."""
         out = self.is_length.copy()

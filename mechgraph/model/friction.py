@@ -36,7 +36,8 @@ class Friction(Load):
     the contact from the pitch point against their relative turn, or what leaves ``efficiency`` of the power that goes in. A flat belt:
     a limit alone, ``T1 / T2 <= e^(mu wrap)`` (Euler, Eytelwein); ``preload`` is a tension more in its strands.
 
-    Solved in ``solve`` and ``study``. Sources: J. E. Shigley and J. J. Uicker, Theory of Machines and Mechanisms, 1995, chapter 13
+    Solved in ``solve`` and ``study``; in ``respond`` for pairs of one freedom. Sources: J. E. Shigley and J. J. Uicker, Theory of
+    Machines and Mechanisms, 1995, chapter 13
     (friction circle); G. Niemann and H. Winter, Maschinenelemente II, 2003, chapter 21 (teeth).
 
     Examples
@@ -106,7 +107,7 @@ class Friction(Load):
             raise DeclarationError(
                 self.where.removesuffix(": "),
                 [
-                    "friction follows the reactions, and is solved with them in solve and study alone; pass loads= without it here"
+                    "friction follows the reactions, and is solved with them in solve, study and respond; pass loads= without it here"
                 ],
             )
         for name in site.freedoms_of(self.of) if self.viscous else ():
@@ -281,7 +282,7 @@ def rubs_as_plane(row: PairType) -> bool:
 
 def rubs_as_contact(row: PairType) -> bool:
     """Whether its elements touch at a place."""
-    return row.touching is not None
+    return row.touching is not None or row.opens
 
 
 def _is(freedom: Any, *, turn: bool) -> bool:

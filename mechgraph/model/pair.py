@@ -352,6 +352,11 @@ class Pair(Described):
         Of a contact: ``"form"`` holds b on both sides; with ``"force"`` a can only push b (along the axis of a plane, along
         ``second`` of a groove), and the solution reports loss of contact. Default: held; an open profile (cam, two curves) with
         tensile contact force warns.
+    restitution : float, optional
+        Coefficient of restitution, from 0 to 1, of a contact ``closed="force"`` that touches at a point of a plane: in ``respond`` it
+        opens where it would have to pull, and lands. Elsewhere, and if left out, it stays closed.
+    gap : float
+        By how much it is open [length] where ``respond`` starts; its coordinate there is ``"name.gap"``.
     radius : float, optional
         Radius [length] of the ball or cylinder on link b.
     hertz : Hertz, optional
@@ -422,6 +427,15 @@ class Pair(Described):
             default='as `"form"`; an open profile that would have to pull asks for it',
         ),
     ] = ""
+    restitution: Annotated[
+        float | None,
+        NUMBER(
+            '0 to 1: in `respond` the contact, `closed = "force"`, opens, and lands so',
+            minimum=0.0,
+            default="it stays closed",
+        ),
+    ] = None
+    gap: Annotated[float, NUMBER("by how much it is open where `respond` starts", LENGTH, minimum=0.0)] = 0.0
     radius: Annotated[float | None, POSITIVE("of the ball or cylinder of a contact, on b", LENGTH)] = None
     hertz: Annotated[Hertz | None, NESTED("materials of a contact, for its pressure", table="hertz")] = None
     curve: Annotated[Curve | None, NESTED("curve on link a along which the marker travels", table="curve")] = None
@@ -527,6 +541,8 @@ class Pair(Described):
             self.film,
             self.stiffness,
             self.misfit,
+            self.restitution,
+            self.gap or None,
             *self.curves.values(),
         )
         return any(one is not None for one in said) or self.closed is not Pair.closed

@@ -103,6 +103,8 @@ class Event(Described):
 class Stop(Described):
     """Declare limits of a freedom for ``respond``: impact at ``lower`` and ``upper`` with a coefficient of restitution.
 
+    In place of a freedom the coordinate ``"link.point.Tx"`` of a named point in the axes of the frame.
+
     Examples
     --------
     >>> import mechgraph as mg
@@ -119,9 +121,15 @@ class Stop(Described):
     upper: Annotated[float | None, NUMBER("upper limit", default="none", **POSITION)] = None
     restitution: Annotated[float, NUMBER("coefficient of restitution, 0 to 1", minimum=0.0)] = 0.0
 
+    def point(self, m: Any) -> tuple[str, str] | None:
+        """Link and name of the point of which it limits a coordinate, ``"rod.tip.Tx"``; None where it limits a freedom."""
+        name, _, along = str(self.freedom).rpartition(".")
+        known = [(one.name, point) for one in m.links for point in one.points if name == f"{one.name}.{point}"]
+        return known[0] if known and along in ("Tx", "Ty", "Tz") else None
+
     def faults(self, m: Nameable) -> list[str]:
         """What is wrong with it."""
-        fault = m.freedom_fault(self.freedom, single=True)
+        fault = None if self.point(m) is not None else m.freedom_fault(self.freedom, single=True)
         found = [fault] if fault else []
         limits = {name: value for name in ("lower", "upper") if (value := getattr(self, name)) is not None}
         found += [wrong(v, name, "a finite number") for name, v in limits.items() if not is_numeric(v, ())]

@@ -28,7 +28,7 @@ from mechgraph.pairs.factors import Touching
 from mechgraph.pairs.pair_type import TABLE, PairType, table_row
 from mechgraph.pairs.surfaces import Surface
 from mechgraph.pairs.travelling import AlongCurve, Beside, OnSurface, X, Z
-from mechgraph.quantities import LENGTH, PRESSURE, PURE, is_numeric, wrong
+from mechgraph.quantities import LENGTH, PRESSURE, PURE, is_numeric, shown, wrong
 
 
 @dataclass(frozen=True)
@@ -405,7 +405,8 @@ _SYMBOLS = {
 def row_of(type: Any, curve: Any, surface: Any = None) -> Any:
     """The row of a pair of a type (a symbol or a row) with or without a curve or surface; what is no type is kept."""
     bent = curve is not None or surface is not None
-    symbol = type.symbol if isinstance(type, PairType) and (bent or travels(type)) else type
+    own = isinstance(type, PairType) and (type.opens or not (bent or travels(type)))
+    symbol = type.symbol if isinstance(type, PairType) and not own else type
     if not isinstance(symbol, str):
         return symbol
     rows = _WITH_SURFACE if surface is not None else _WITH_CURVE if bent else _BY_SYMBOL
@@ -609,6 +610,14 @@ def pressed_along_line(force: Array, off: Array, length: float, curvature: Array
 def contact_faults(pair: Any, where: str) -> Iterator[str | None]:
     """What is wrong with what it says as a contact of two elements."""
     yield pair.formats["closed"].fault(pair.closed, f"{where}closed")
+    opens = pair.restitution is not None
+    if opens and not (pair.type.can_open and pair.closed == "force"):
+        yield f"{where}restitution: is for contacts that one force keeps in touch (Sp, Ps, Rg, Kc); give closed='force'"
+    elif opens and not (is_numeric(pair.restitution, ()) and 0.0 <= pair.restitution <= 1.0):
+        yield wrong(pair.restitution, f"{where}restitution", "a number from 0 to 1")
+    yield pair.formats["gap"].fault(pair.gap, f"{where}gap")
+    if pair.gap and not opens:
+        yield f"{where}gap = {shown(pair.gap)}: the contact stays closed; give its restitution too"
     form, given = pair.type.touching, {"radius": pair.radius, "hertz": pair.hertz}
     if form is None:
         said = [name for name, value in given.items() if value is not None]

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate, pairwise, starmap
 from typing import Any
@@ -341,6 +341,7 @@ class PairType:
     pushed: tuple[int, ...] = field(init=False, default=())
     normal: int | None = field(init=False, default=None)
     spatial: PairType | None = field(init=False, default=None)
+    opens: bool = field(init=False, default=False)
 
     def __post_init__(self) -> None:
         tried = self.efforts is None
@@ -406,6 +407,45 @@ class PairType:
             *book.along,
         )
         return any(part.scaled(2.0) is not part for part in parts)
+
+    @property
+    def gap(self) -> int | None:
+        """The freedom in which a contact opens; None where it does not."""
+        return next((j for j, freedom in enumerate(self.freedoms) if self.opens and freedom.name == "gap"), None)
+
+    @property
+    def can_open(self) -> bool:
+        """Whether one force alone keeps it in touch, so that there is a row in which it opens."""
+        form = self.touching
+        return form is not None and len(form.forces) == 1 and form.tilting is None and self.reactions is not None
+
+    def opened(self, side: float) -> PairType:
+        """The row in which the contact may open: a slide ``gap`` to a ``side`` along its normal stands in place of the normal force."""
+        row = self.spatial or self
+        assert row.touching is not None
+        normal = next(c for c in row.reactions or () if c.name in row.touching.forces)
+        k, force = normal.frame, (0.0, 0.0, 0.0, *(side * v for v in normal.wrench[3:]))
+        steps = list(row.steps)
+        steps.insert([columns[0] for columns in row.factors].index(k), ConstantScrew(Freedom("gap", force)))
+        behind = {c: replace(c, frame=c.frame + (c.frame >= k)) for c in (*(row.reactions or ()), *row.efforts)}
+        efforts = [behind[c] for c in row.efforts]
+        efforts.insert(k, Component("gap", force, k))
+        out = copy(row)
+        for name in ("factors", "nx", "has_lengths", "takes_pitch"):
+            vars(out).pop(name, None)
+        before = [start + (start >= k) for start in row.frame_before]
+        vars(out).update(
+            steps=tuple(steps),
+            freedoms=tuple(freedom for step in steps for freedom in step.freedoms),
+            frame_before=(*before[:k], k, *before[k:]),
+            reactions=tuple(behind[c] for c in row.reactions or () if c is not normal),
+            efforts=tuple(efforts),
+            computed_efforts=True,
+            computed_reactions=True,
+            touching=None,
+            opens=True,
+        )
+        return out
 
     @property
     def f(self) -> int:

@@ -51,7 +51,7 @@ def _projected(row: PairType, normal: int) -> PairType | None:
         reactions = tuple(moved(c) for c in row.reactions if _side(c.wrench, c.per_pitch, normal))
         if len(reactions) != 3 - len(kept):
             return None
-    if row.bears and len(kept) == 3:
+    if row.bears and len(kept) == 3 and not row.opens:
         return None
     out = copy(row)
     for name in ("factors", "nx", "has_lengths", "takes_pitch"):

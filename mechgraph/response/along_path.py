@@ -70,7 +70,8 @@ class AlongTerms:
     def __init__(self, system: System, loads: Loads) -> None:
         self.system, m = system, system.m
         parts = [loads.stored, loads.rest]
-        self.smooth = Loads(*(tuple(load for load in some if load.smooth) for some in parts))
+        stored, rest = (tuple(load for load in some if load.smooth) for some in parts)
+        self.smooth = Loads(stored, rest)
         self.stored, self.rest = (tuple(load for load in some if not load.smooth) for some in parts)
         others = (*self.stored, *self.rest)
         named = dict.fromkeys(name for load in others for name in load.freedoms)
@@ -542,9 +543,10 @@ class PathStage:
     """Implements ``integration.Stage`` along an arc, from a place ``u`` with rate ``v`` at a time."""
 
     jacobian = None
+    trouble: Stopped | None = None
 
     def __init__(self, arc: Arc, t: float, u: float, v: float) -> None:
-        self.arc, self.task, self._first = arc, arc.task, np.array([u, v, 0.0])
+        self.arc, self.task, self._first = arc, arc.task, np.array([u, v, 0.0, 0.0])
         self.engine = self.task.engine if self.task.library is None else COMPILED
         self._piece: SeriesPiece | None = None
         self._turns = 0.0
@@ -589,14 +591,14 @@ class PathStage:
         terms = self._terms(u)
         mass, stored, p1, p2 = terms[:OF_LOADS].tolist()
         if not mass > 0.0:
-            return np.full(3, np.nan)
+            return np.full(4, np.nan)
         size = math.sqrt(mass / self._mass)
         v = w / size
         rest = p1 + v * p2
         if len(terms) > OF_LOADS:
             by_stored, by_rest = self._forces(terms, v, np.array([t]))
             stored, rest = stored + float(by_stored[0]), rest + float(by_rest[0])
-        return np.array([v, (stored + rest) / (size * self._mass), v * rest])
+        return np.array([v, (stored + rest) / (size * self._mass), 0.0, v * rest])
 
     def by_time(self, t: float, y: Array) -> tuple[Callable[[Array], Array], Array] | None:
         """See ``Stage``."""

@@ -25,7 +25,8 @@ import scipy
 from mechgraph.by_kernel import COMPILED
 from mechgraph.determinacy.mobility import free_motion
 from mechgraph.errors import DeclarationError
-from mechgraph.force.block import ForceTask, forces_of_block
+from mechgraph.force.block import BlockForces, ForceTask, forces_of_block
+from mechgraph.force.friction import OUTCOMES
 from mechgraph.force.loads import Site, kinetic_energy
 from mechgraph.kinematics.motion_path import in_blocks
 from mechgraph.kinematics.rates import PassiveMotion, Rates, Velocities
@@ -331,6 +332,12 @@ class _Known:
         return system.advance(self.x[:, None], self.dq[:, None] * h + 0.5 * self.ddq[:, None] * (h * h))
 
 
+def no_force(task: Task, kind: str, t: float, at: float | None = None) -> Stopped:
+    """That friction has no solution at a time, or none alone; ``at``: see ``Stopped``."""
+    names = ", ".join(dict.fromkeys(load.of for load in task.loads.dry))
+    return Stopped(f"friction of {names} at t = {t:.6g}: {kind}; no force is returned from there on", kind, at)
+
+
 class ChartStage:
     """Implements ``integration.Stage`` from a closed state ``x (nx,)`` with rates ``dq (F,)`` at a time."""
 
@@ -338,12 +345,13 @@ class ChartStage:
         self.task = task
         self.chart = task.chart(x)
         self.n = len(self.chart.free)
-        self._first = np.concatenate([np.zeros(self.n), dq[self.chart.moving], [0.0]])
+        self._first = np.concatenate([np.zeros(self.n), dq[self.chart.moving], np.zeros(2)])
         self._sizes = len(x), len(dq)
         self._last = _Known(t, np.concatenate([x, dq, np.zeros_like(dq)]), *self._sizes)
         self._path = [self._last]
         self._of_time = tuple(load for some in (task.loads.stored, task.loads.rest) for load in some if load.of_time)
         self._kernel: KernelRates | None = None
+        self.trouble: Stopped | None = None
         self.engine = task.engine if task.library is None else COMPILED
         self._shape: Callable[[], tuple[float, float]]
         found = self._found(t, self._first[:, None])
@@ -371,14 +379,14 @@ class ChartStage:
         here = self._by_kernel(t, y)
         if here is None:
             return self._rates(t, y[:, None])[:, 0]
-        return here.rates
+        return np.insert(here.rates, -1, 0.0)
 
     def _by_kernel(self, t: float, y: Array) -> EvaluatedRates | None:
         """The same by the kernel; None where there is none, or it does not serve: numpy says what is there."""
         if self._kernel is None:
             return None
         near = self._near(t)
-        found = self._kernel(near.state, t - near.t, y[:-1], self.task.prescribed_at(np.array([t]))[..., 0])
+        found = self._kernel(near.state, t - near.t, y[:-2], self.task.prescribed_at(np.array([t]))[..., 0])
         if found is not None:
             self._last = _Known(t, found.state, *self._sizes)
             self._y, self._shape = y, lambda: (found.steepness, found.condition)
@@ -390,17 +398,20 @@ class ChartStage:
 
     def _rates(self, t: float, y: Array) -> Array:
         """``y' (k, T)`` at one time and several ``y (k, T)``; NaN where no closed states are found near the last ones."""
-        found = self._found(t, y)
+        found = self._found(t, y) if np.isfinite(y).all() else None
         if found is None:
             return np.full(y.shape, np.nan)
+        if found.rubs is not None and (outcome := int(found.rubs.outcome[0])):
+            self.trouble = no_force(self.task, OUTCOMES[outcome], t)
         du = self.chart.rates_of_coordinates(found.rates.here.x, found.rates.dq)
-        return np.concatenate([du, found.rates.ddq[self.chart.moving], found.power[None]])
+        lost = found.lost[None]
+        return np.concatenate([du, found.rates.ddq[self.chart.moving], lost, found.power[None]])
 
     def jacobian(self, t: float, y: Array) -> Array:
         """See ``Stage``: forward differences, all evaluated in one batch."""
         # part of a coordinate (or of one) by which it is changed for a derivative
-        size = 1e-7 * np.maximum(1.0, np.abs(y[:-1]))
-        places = y[:, None] + np.pad(np.diag(size), ((0, 1), (1, 0)))
+        size = 1e-7 * np.maximum(1.0, np.abs(y[:-2]))
+        places = y[:, None] + np.pad(np.diag(size), ((0, 2), (1, 0)))
         f = (
             self._rates(t, places)
             if self._kernel is None
@@ -408,14 +419,14 @@ class ChartStage:
         )
         J = (f[:, 1:] - f[:, :1]) / size
         # where it does not close the rates are NaN as well, and the step is taken back
-        return np.nan_to_num(np.pad(J, ((0, 0), (0, 1))), copy=False)
+        return np.nan_to_num(np.pad(J, ((0, 0), (0, 2))), copy=False)
 
     def by_time(self, t: float, y: Array) -> tuple[Callable[[Array], Array], Array] | None:
         """See ``Stage``."""
         loads = self._of_time
         if not (loads or len(self.task.columns)) or (loads and not self._evaluated(t, y)):
             return None
-        rates = np.concatenate([y[self.n : -1], self.task.prescribed_at(np.array([t]))[1, :, 0]])
+        rates = np.concatenate([y[self.n : -2], self.task.prescribed_at(np.array([t]))[1, :, 0]])
         return partial(_by_time, self.task, self._moved, loads), rates
 
     def _evaluated(self, t: float, y: Array) -> bool:
@@ -426,6 +437,7 @@ class ChartStage:
     def accepted(self, t: float, y: Array) -> bool:
         """See ``Stage``."""
         self._evaluated(t, y)
+        self.trouble = None
         self._path.append(self._last)
         return not self.chart.worn(*self._shape(), y[: self.n])
 
@@ -440,7 +452,7 @@ class ChartStage:
         guess = np.concatenate(
             [self._path[i].ahead(self.task.system, t[before == i]) for i in dict.fromkeys(before.tolist())], axis=1
         )
-        return self.chart.close(guess, y[: self.n], self.task.prescribed_at(t)[0]), y[self.n : -1]
+        return self.chart.close(guess, y[: self.n], self.task.prescribed_at(t)[0]), y[self.n : -2]
 
     def _found(self, t: float, y: Array) -> Moved | None:
         """Rates and accelerations at a time for ``y (k, T)``; None where no closed states are found near the last ones."""
@@ -450,7 +462,7 @@ class ChartStage:
         closed = self.chart.close(near.ahead(self.task.system, at), y[:n], p[0])
         if not closed.done.all():
             return None
-        found = moved(closed, y[n:-1], p[1:], self.task.loads, at)
+        found = moved(closed, y[n:-2], p[1:], self.task.loads, at)
         rates = found.rates
         state = np.concatenate([closed.here.x[:, 0], rates.dq[:, 0], rates.ddq[:, 0]])
         self._last = _Known(t, state, *self._sizes)
@@ -495,19 +507,38 @@ def trajectory_of(
             raise DeclarationError(f"mechanism {m.name!r}", [fault])
         # the batch of a block is its own: loads are functions of time here, not arrays over positions
         at, count, q = t[places], len(places), coordinates[:, places]
-        rates = _still(closed.here) if at_rest else moved(closed, v, own.prescribed_at(at)[1:], own.loads, at).rates
+        found = None if at_rest else moved(closed, v, own.prescribed_at(at)[1:], own.loads, at)
+        rates = _still(closed.here) if found is None else found.rates
         idle = None if closed.held is None else closed.held.places
         force_task = ForceTask(out.method, m.loads, own.columns, own.held, (count,), at, "nan", idle)
-        forces = forces_of_block(force_task, rates, closed.f, q, np.arange(count))
+        forces = forces_of_block(
+            force_task, rates, closed.f, q, np.arange(count), None if found is None else found.rubs
+        )
         held = np.setdiff1d(own.columns, task.columns)
         given = forces.given.copy()
         given[held] = (forces.efforts - forces.coupled)[held]
-        out.put(BlockMotion(places, rates), replace(forces, given=given))
+        if forces.rubs is not None:
+            stuck = np.intersect1d(own.loads.stuck, held).astype(np.intp)
+            forces.rubs.efforts[stuck] += (given - forces.given)[stuck]
+        forces = replace(forces, given=given)
+        if len(own.loads.stuck) > len(np.intersect1d(own.loads.stuck, held)):
+            forces = _undetermined(forces)
+            out.mark(places, OUTCOMES[-1])
+        out.put(BlockMotion(places, rates), forces)
         kinetic[places] = kinetic_energy(closed.here, rates.V) * s.par.L**2
         site = Site(closed.here, rates, q, (count,), np.arange(count), at)
         for load in task.loads.stored:
             potential[places] += load.energy(site)
     return out, kinetic, potential
+
+
+def _undetermined(forces: BlockForces) -> BlockForces:
+    """Without values that depend on how several freedoms share the friction by which they stick together."""
+    assert forces.rubs is not None
+    rubs = replace(forces.rubs, efforts=forces.rubs.efforts * np.nan, normals=forces.rubs.normals * np.nan)
+    names = ("reactions", "efforts", "given", "balance", "power")
+    values: dict[str, Any] = {name: np.full_like(getattr(forces, name), np.nan) for name in names}
+    return replace(forces, rubs=rubs, **values)
 
 
 def _still(here: Configuration) -> Rates:

@@ -1,4 +1,4 @@
-"""Integration in time: steps, events, stops.
+"""Integration in time: steps and events.
 
 A look between the ends of a step at what depends on time by itself: a pulse between two evaluations leaves no trace in its error.
 
@@ -10,40 +10,29 @@ The equations of motion integrated in time by the steppers of scipy, stage after
 
 A stage is a choice of coordinates that serves for a while: a local chart of independent freedoms (``charts``), or the distance along the
 only path there is (``along_path``). A segment is one accepted step: its times, its stage and the dense output of the stepper in the
-stage's coordinates ``y = (u, v, work)``: independent coordinates, rates of independent freedoms, work done since the start.
-
-Stops: freedoms that may not pass a limit. They strike it, rebound, rest on it and leave it.
-
-At an impact with stops ``i`` closing at the rates ``w_i = g_i . v`` the impulses ``p_i >= 0`` are those of Newton's law of restitution,
-
-    v+ = v + M^-1 G^T p,   w+ + e w >= 0,   p . (w+ + e w) = 0,
-
-with ``G`` the rows ``g_i`` of independent rates. Stops that are closed at rest hold as long as they press: ``f >= 0``, ``G v' >= 0``,
-``f . G v' = 0``. Both are linear complementarity problems of a positive semidefinite matrix ``G M^-1 G^T``, solved as least squares with
-``p >= 0``. Source: Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts, 1996, chapters 5 and 6.
+stage's coordinates ``y = (u, v, lost, work)``: independent coordinates, rates of independent freedoms, what friction took and the work
+done since the start.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from mechgraph.errors import MechgraphWarning, counted
-from mechgraph.force.loads import kinetic_energy
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import RESPONSE
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.response_setup import WHATS, Event, Stop
+from mechgraph.model.response_setup import WHATS, Event
 from mechgraph.quantities import items_of, real_array, shown, wrong
-from mechgraph.response.charts import Prescribed, Task
-from mechgraph.response.motion_equations import NO_INERTIA, ClosedChart, Stopped, accelerations, moved, stopping
+from mechgraph.response.charts import Task
+from mechgraph.response.motion_equations import ClosedChart, Stopped, stopping
 from mechgraph.result.solution import Solution
 
 POINTS_OF_STEP = 16
@@ -80,11 +69,18 @@ LOOKS_IN_STEP = np.union1d(WATCHED_IN_STEP, 0.5 ** np.arange(4, 20))
 
 @dataclass(frozen=True)
 class Occurrence:
-    """An event that happened at time ``t``; ``rising`` or falling."""
+    """An event that happened at time ``t``; ``rising`` or falling.
+
+    Where a stop or a contact is struck: the ``impulse`` that it exerts, the ``energy_lost`` in all at that time, and the ``impulses`` in
+    the pairs, by name: wrenches ``(6,)``, (M, F) about the global origin, of link a on link b, NaN where not unique.
+    """
 
     event: Event
     t: float
     rising: bool
+    impulse: float = 0.0
+    energy_lost: float = 0.0
+    impulses: Mapping[str, Array] = field(default_factory=dict)
 
     def __str__(self) -> str:
         return f"{self.event.text} at t = {self.t:.6g}"
@@ -185,6 +181,7 @@ def read_events(m: Mechanism, events: Any, faults: list[str]) -> tuple[Event, ..
     return known
 
 
+_SUMS = np.eye(3)[:, 1:]
 EXPLICIT = ("RK23", "RK45", "DOP853")
 
 
@@ -195,13 +192,15 @@ class Stage(Protocol):
     """What moves."""
     energy: float
     """An energy of the size that moves here, against which work is measured."""
+    trouble: Stopped | None
+    """Why the last evaluations had no value, where that is known."""
 
     @property
     def engine(self) -> str:
         """What evaluates the equations of motion."""
 
     def begin(self) -> Array:
-        """The coordinates ``y`` where the stage begins; the work is 0."""
+        """The coordinates ``y`` where the stage begins; its last two, what friction took and the work, are 0."""
 
     def rates(self, t: float, y: Array) -> Array:
         """``y'``; NaN where the coordinates do not reach (the stepper takes a shorter step)."""
@@ -230,13 +229,15 @@ class Stage(Protocol):
 
 @dataclass(frozen=True)
 class StepSpan:
-    """One accepted step from ``begin`` to ``end``; ``work`` was done before the stage began."""
+    """One accepted step from ``begin`` to ``end``; ``before`` the stage began so much was lost in impacts and in friction, and so much work
+    done.
+    """
 
     begin: float
     end: float
     stage: Stage
     dense: Callable[[Any], Array]
-    work: float
+    before: Array
 
 
 @dataclass
@@ -273,8 +274,8 @@ class Integration:
     breaks: tuple[float, ...] = ()
     apart: float = np.inf
     segments: list[StepSpan] = field(default_factory=list)
-    done: float = 0.0
-    """Work done since the start."""
+    done: Array = field(default_factory=lambda: np.zeros(3))
+    """Lost in impacts and in friction, and work done, since the start."""
     work: Count = field(default_factory=Count)
     _told: bool = False
 
@@ -286,7 +287,7 @@ class Integration:
         Stopped
             where steps become shorter than rounding.
         """
-        t, h, y, work = begin, first, stage.begin(), self.done
+        t, h, y, before = begin, first, stage.begin(), self.done
         self.work.stages += 1
         while t < end:
             goal = min((one for one in self.breaks if one > t), default=end)
@@ -301,7 +302,7 @@ class Integration:
                     rounding = stepper.t - t <= 1e-13 * max(abs(t), abs(stepper.t))
                     known = bool(np.isfinite(stepper.y).all())
                     if stepper.status == "failed" or (rounding and not known):
-                        raise Stopped(
+                        raise stage.trouble or Stopped(
                             f"{message or ''} Steps collapse where loads are stiff or jump, and at positions where the mechanism locks or "
                             "only links without inertia move; for stiff loads use method='Radau'".strip()
                         )
@@ -310,10 +311,10 @@ class Integration:
                         h = 0.25 * (stepper.t - t)
                         break
                     self.work.steps += 1
-                    self.segments.append(StepSpan(t, stepper.t, stage, stepper.dense_output(), work))
+                    self.segments.append(StepSpan(t, stepper.t, stage, stepper.dense_output(), before))
                     # the step goes on with its length, which a multistep method finds anew, and any behind a break
                     h = None if self.method in ("BDF", "LSODA") or stepper.t == goal else stepper.t - t
-                    t, y, self.done = stepper.t, stepper.y, work + float(stepper.y[-1])
+                    t, y, self.done = stepper.t, stepper.y, before + _SUMS @ stepper.y[-2:]
                     self._look(end)
                     serves = stage.accepted(t, y)
                     yield self.segments[-1]
@@ -321,7 +322,7 @@ class Integration:
                 self.work.evaluations += stepper.nfev
             if t < end and not serves:
                 stage = stage.following(t, y)
-                y, work = stage.begin(), self.done
+                y, before = stage.begin(), self.done
                 self.work.stages += 1
 
     def _stepper(self, stage: Stage, t: float, y: Array, end: float, first: float | None) -> Any:
@@ -332,7 +333,7 @@ class Integration:
             return lambda at, y: function(min(max(at, low), high), y)
 
         atol = np.full(len(y), self.atol)
-        atol[-1] *= stage.energy
+        atol[-2:] *= stage.energy
         more: dict[str, Any] = {} if first is None else {"first_step": min(first, end - t)}
         if self.method not in EXPLICIT:
             more["jac"] = stage.jacobian and between(stage.jacobian)
@@ -371,242 +372,19 @@ class Integration:
         """End the last step at a time within it."""
         last = self.segments[-1]
         self.segments[-1] = replace(last, end=t)
-        self.done = last.work + float(last.dense(t)[-1])
+        self.done = last.before + _SUMS @ last.dense(t)[-2:]
 
     def at(self, t: Array) -> Iterator[tuple[Index, Stage, Array, Array]]:
-        """Times ``(T,)`` by stage: their places, the stage, coordinates ``y (k, n)`` and the work ``(n,)`` since the start."""
+        """Times ``(T,)`` by stage: their places, the stage, coordinates ``y (k, n)`` and what was lost and done ``(3, n)``."""
         ends = np.array([segment.end for segment in self.segments])
         step = np.minimum(np.searchsorted(ends, t), len(ends) - 1)
         of = np.array([id(self.segments[i].stage) for i in step])
         for stage in dict.fromkeys(of.tolist()):
             places = np.flatnonzero(of == stage)
             first = self.segments[int(step[places[0]])]
-            y, work = np.empty((len(first.stage.begin()), len(places))), np.empty(len(places))
+            y, done = np.empty((len(first.stage.begin()), len(places))), np.empty((3, len(places)))
             for i in np.unique(step[places]).tolist():
                 segment, mine = self.segments[i], step[places] == i
                 y[:, mine] = segment.dense(t[places[mine]])
-                work[mine] = segment.work + y[-1, mine]
-            yield places, first.stage, y, work
-
-
-def read_stops(m: Mechanism, stops: Any, faults: list[str]) -> tuple[Stop, ...]:
-    """The stops of a call; adds what is wrong with them to ``faults``."""
-    given = (stops,) if isinstance(stops, Stop) else items_of(stops, "stops", faults)
-    faults += [wrong(one, "an item of stops", "an mg.Stop") for one in given if not isinstance(one, Stop)]
-    known = [one for one in given if isinstance(one, Stop)]
-    bad = [fault for one in known for fault in one.faults(m)]
-    faults += bad
-    return () if bad else tuple(known)
-
-
-@dataclass(frozen=True)
-class _Limit:
-    """One limit of one freedom, internal units: ``sign * (q - value) >= 0``."""
-
-    stop: Stop
-    name: str
-    column: int
-    row: int
-    sign: float
-    value: float
-
-    @property
-    def user(self) -> float:
-        """The limit in the user's units."""
-        return float(getattr(self.stop, self.name))
-
-    def occurrence(self, t: float, meets: bool) -> Occurrence:
-        """What ``Response.events`` says of it."""
-        text = f"{self.stop.freedom} {'meets' if meets else 'leaves'} its {self.name} stop"
-        event = Event(self.stop.freedom, self.user, name=text)
-        return Occurrence(event, t, (self.sign > 0) != meets)
-
-
-class Moving(Protocol):
-    """What stops see of a motion."""
-
-    def positions(self, t: Array) -> Array:
-        """Internal states ``(nx, T)`` at times ``(T,)``."""
-
-    def rates(self, t: Array) -> Array:
-        """Rates and accelerations ``(2, F, T)`` of all freedoms at times ``(T,)``."""
-
-
-def _gap(motion: Moving, limit: _Limit, t: Array) -> Array:
-    return np.asarray(limit.sign * (motion.positions(t)[limit.row] - limit.value))
-
-
-@dataclass(frozen=True)
-class _Held:
-    """Prescribed freedoms with those that rest on a stop behind them (see ``Prescribed``)."""
-
-    prescribed: Prescribed
-    limits: tuple[float, ...]
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return self.prescribed.names
-
-    def at(self, t: float) -> Array:
-        """Positions, velocities and accelerations ``(3, p)``."""
-        still = np.zeros((3, len(self.limits)))
-        still[0] = self.limits
-        return np.concatenate([self.prescribed.at(t), still], axis=1)
-
-
-@dataclass
-class Stops:
-    """The stops of a motion; ``task`` is what moves without them, ``held`` the limits that freedoms rest on."""
-
-    task: Task
-    limits: tuple[_Limit, ...]
-    held: tuple[_Limit, ...] = ()
-
-    @classmethod
-    def of(cls, m: Mechanism, task: Task, stops: Iterable[Stop]) -> Stops:
-        """Stops of the scaled system of a task."""
-        s, limits = task.system, []
-        for stop in stops:
-            k, j = m.freedom(stop.freedom)
-            column = int(s.first_column[k]) + j
-            unit = s.par.L if s.is_length[column] else 1.0
-            for name, sign in (("lower", 1.0), ("upper", -1.0)):
-                value = getattr(stop, name)
-                if value is not None:
-                    limits.append(_Limit(stop, name, column, int(s.single_rows[column]), sign, float(value) / unit))
-        return cls(task, tuple(limits))
-
-    def faults(self, x: Array) -> list[str]:
-        """What is wrong with them at the start, a state ``x (nx,)``: freedoms that are prescribed, or beyond their limits."""
-        driven = {limit.stop.freedom for limit in self.limits if limit.column in self.task.columns}
-        found = [
-            f"stop of {name!r}: its motion is prescribed; leave the stop or the motion out" for name in sorted(driven)
-        ]
-        return found + [
-            f"start of {limit.stop.freedom!r}: is beyond its {limit.name} stop at {limit.user:g}; give a start within its limits"
-            for limit in self.limits
-            if limit.sign * (x[limit.row] - limit.value) < -RESPONSE.touching
-        ]
-
-    def held_task(self) -> Task:
-        """The task with what rests on a stop held there."""
-        if not self.held:
-            return self.task
-        columns = np.append(self.task.columns, [limit.column for limit in self.held]).astype(np.intp)
-        held: Any = _Held(self.task.prescribed, tuple(limit.user for limit in self.held))
-        return replace(self.task, prescribed=held, columns=columns)
-
-    def met(self, motion: Moving, begin: float, end: float) -> float | None:
-        """The first time in a step at which a free limit is passed, or a held one no longer presses."""
-        times: list[float] = []
-        looks = (
-            begin + (end - begin) * LOOKS_IN_STEP[1:]
-        )  # rates at the beginning are those before an impact, if there was one
-        free = [limit for limit in self.limits if limit not in self.held]
-        if free:
-            x = motion.positions(looks)
-            for limit in free:
-                height = partial(_gap, motion, limit)
-                t, gap = with_turns(height, looks, limit.sign * (x[limit.row] - limit.value))
-                deep = np.flatnonzero(gap < -RESPONSE.touching)
-                if deep.size:
-                    before = np.flatnonzero(gap[: deep[0]] > 0.0)
-                    times.append(first_root(height, t[before[-1]], t[deep[0]]) if before.size else looks[0])
-        if self.held:
-            push = partial(self._pressing, motion)
-            if push(looks[-1:])[0] < 0.0:
-                times.append(first_root(push, looks[0], end) if push(looks[:1])[0] > 0.0 else looks[0])
-        return min(times, default=None)
-
-    def _pressing(self, motion: Moving, times: Array) -> Array:
-        """The least of the efforts with which the held limits press: negative where one would have to pull."""
-        states, rates = motion.positions(times), motion.rates(times)
-        out = []
-        for t, x, dq in zip(times.tolist(), states.T, rates[0].T, strict=True):
-            free = _Free(self.task, t, x, dq, self.held)
-            out.append(float(np.linalg.lstsq(free.D, -free.w_rate, rcond=1e-12)[0].min()))
-        return np.array(out)
-
-    def after(self, t: float, x: Array, dq: Array) -> tuple[Array, float, float, list[Occurrence]]:
-        """Rates after a time ``t`` at which stops are met or left; ``held`` is what rests on them afterwards.
-
-        Also the energy that impacts take away, the longest first step from here, and what happened.
-        """
-        closed = tuple(one for one in self.limits if one.sign * (x[one.row] - one.value) <= RESPONSE.touching)
-        if not closed:
-            self.held = ()
-            return dq, 0.0, np.inf, []
-        before = _Free(self.task, t, x, dq, closed)
-        e = np.array([limit.stop.restitution for limit in closed])
-        after, lost = before.struck(e)
-        free = _Free(self.task, t, x, after, closed)
-        if (free.still & (free.w > 0.0)).any():
-            after, lost = before.struck(np.where(free.still, 0.0, e))
-            free = _Free(self.task, t, x, after, closed)
-        pressing, w_rate = free.pressing()
-        now = tuple(closed[i] for i in pressing)
-        hops = 2.0 * free.w / np.where((w_rate < 0.0) & ~free.still & (free.w > 0.0), -w_rate, np.inf)
-        hit = (before.w < 0.0) & ~before.still
-        found = [
-            one.occurrence(t, True) for i, one in enumerate(closed) if hit[i] or (one in now and one not in self.held)
-        ]
-        found += [one.occurrence(t, False) for one in self.held if one not in now]
-        self.held = now
-        return after, lost, float(hops[hops > 0.0].min(initial=np.inf)) / 2, found
-
-
-class _Free:
-    """The equations of motion at a state, nothing held: what closed limits do."""
-
-    def __init__(self, task: Task, t: float, x: Array, dq: Array, closed: tuple[_Limit, ...]) -> None:
-        self.chart = task.chart(x)
-        f = self.chart.solver.factored(self.chart.start, self.chart.which)
-        at = ClosedChart(self.chart.start, f, np.ones(1, dtype=bool), self.chart.held)
-        p = task.prescribed_at(np.array([t]))[1:]
-        found = moved(at, dq[self.chart.moving][:, None], p, task.loads, np.array([t]))
-        self.dq, self.mass = dq, found.columns.mass
-        self.columns = np.array([limit.column for limit in closed])
-        self.sign = np.array([limit.sign for limit in closed])
-        self.Z = found.columns.Z[..., 0]
-        G = self.sign[:, None] * self.Z[self.columns]
-        # rate of a freedom for unit rates of the independent ones below which these do not move it
-        self.moves = np.abs(G).max(axis=1, initial=0.0) > 1e-12
-        self.impulse_to_rate, left = np.zeros(G.T.shape), np.zeros(G.T.shape)
-        for i in np.flatnonzero(self.moves):
-            (self.impulse_to_rate[:, [i]], left[:, [i]]) = accelerations(self.mass, G[i][:, None])
-        if np.abs(left).max(initial=0.0) > RESPONSE.unopposed * np.abs(G).max(initial=0.0):
-            raise Stopped(NO_INERTIA)
-        self.D = G @ self.impulse_to_rate
-        self.w, self.w_rate = self.sign * dq[self.columns], self.sign * found.rates.ddq[self.columns, 0]
-
-    @property
-    def still(self) -> NDArray[np.bool_]:
-        """Which limits are closed at rest: they would open by next to nothing before they close again."""
-        return np.asarray(
-            self.w**2 <= 2.0 * RESPONSE.lowest * np.maximum(np.abs(self.w_rate), RESPONSE.lowest), dtype=bool
-        )
-
-    def _least(self, D: Array, c: Array) -> Array:
-        """``p >= 0`` with ``D p + c >= 0`` and ``p . (D p + c) = 0``."""
-        w, U = np.linalg.eigh(D)
-        kept = w > 1e-12 * w.max(initial=0.0)
-        root = np.sqrt(w[kept])[:, None] * U[:, kept].T
-        return np.asarray(scipy.optimize.nnls(root, -(U[:, kept].T @ c) / np.sqrt(w[kept]))[0])
-
-    def struck(self, e: Array) -> tuple[Array, float]:
-        """Rates after an impact with coefficients of restitution ``e``, and the kinetic energy lost."""
-        if (~self.moves & (self.w < 0.0) & ~self.still).any():
-            raise Stopped("a freedom is moved against its stop by prescribed motions alone, which no force can hold up")
-        p = self._least(self.D, self.w + e * np.minimum(self.w, 0.0))
-        after = self.dq + self.Z @ (self.impulse_to_rate @ p)
-        here = self.chart.start
-        before, behind = (float(kinetic_energy(here, here.link_twists(dq[:, None]))[0]) for dq in (self.dq, after))
-        return after, before - behind
-
-    def pressing(self) -> tuple[list[int], Array]:
-        """Which of the limits that are closed at rest press, so that they hold: independent ones; and the accelerations then."""
-        rest = np.flatnonzero(self.still)
-        p = np.zeros(len(self.w))
-        if len(rest):
-            p[rest] = self._least(self.D[np.ix_(rest, rest)], self.w_rate[rest])
-        return np.flatnonzero(p > 0.0).tolist(), self.w_rate + self.D @ p
+                done[:, mine] = segment.before[:, None] + _SUMS @ y[-2:, mine]
+            yield places, first.stage, y, done

@@ -47,7 +47,10 @@ import numpy as np
 import scipy
 
 from mechgraph import by_kernel
+from mechgraph.force.block import rubbed_in_motion
+from mechgraph.force.friction import Rubbed
 from mechgraph.force.loads import Site, inertia_wrenches
+from mechgraph.force.reactions import ForceProblem
 from mechgraph.kernel import build
 from mechgraph.kernel.tables import Integers, layout, pointer, tables, why_not, why_not_load
 from mechgraph.kinematics.layout import Tree
@@ -63,7 +66,14 @@ from mechgraph.model.loads import Load
 
 
 class Stopped(Exception):
-    """The motion cannot be followed on; the message says why."""
+    """The motion cannot be followed on; the message says why.
+
+    ``kind``: why friction ends it, where it does; ``at``: the last time up to which it holds, where that is not the end of its last step.
+    """
+
+    def __init__(self, message: str, kind: str = "", at: float | None = None) -> None:
+        super().__init__(message)
+        self.kind, self.at = kind, at
 
 
 @contextmanager
@@ -267,10 +277,17 @@ SPARSE_FROM = 8000
 
 @dataclass(frozen=True)
 class Loads:
-    """Loads by whether they have a potential energy."""
+    """Loads by whether they have a potential energy; ``dry`` friction, which acts against the ``senses (F,)`` in which freedoms slip.
+
+    A sense is 1 or -1, and 0 where a freedom does not slip; ``stuck`` are the freedoms that friction holds. With ``senses`` loads are those
+    of a motion with friction, without it friction is refused.
+    """
 
     stored: tuple[Load, ...]
     rest: tuple[Load, ...]
+    dry: tuple[Any, ...] = ()
+    senses: Array | None = None
+    stuck: tuple[int, ...] = ()
 
     @classmethod
     def of(cls, loads: tuple[Load, ...]) -> Loads:
@@ -279,7 +296,15 @@ class Loads:
         return cls(
             tuple(stored for stored, _ in parts if stored is not None),
             tuple(rest for _, rest in parts if rest is not None),
+            tuple(load for load in loads if load.follows_reactions),
         )
+
+    def directions(self, dq: Array) -> Array:
+        """Rates ``(F, T)`` that tell where friction acts: those of freedoms that slip, also where these are about to."""
+        assert self.senses is not None
+        sense = self.senses[:, None]
+        speed = np.maximum(sense * dq, 0.0)
+        return np.asarray(sense * np.maximum(speed, 1e-100))  # above zero also where it is about to move
 
 
 @dataclass(frozen=True)
@@ -287,13 +312,21 @@ class Moved:
     """Rates and accelerations at a batch of states, with the power of loads and prescribed drivers.
 
     ``rates``; ``columns`` of the independent rates, with their masses, and the generalized ``force (n, T)``; ``power (T,)`` of prescribed
-    drivers and of the loads without a potential energy; internal units.
+    drivers and of the loads without a potential energy; the efforts ``held (p, T)`` of the prescribed freedoms; the friction that acts,
+    ``rubs``, if any; internal units.
     """
 
     rates: Rates
     columns: Columns
     force: Array
     power: Array
+    held: Array
+    rubs: Rubbed | None = None
+
+    @property
+    def lost(self) -> Array:
+        """Power ``(T,)`` that friction takes."""
+        return np.zeros(len(self.power)) if self.rubs is None else -(self.rates.dq * self.rubs.efforts).sum(axis=0)
 
 
 def _inertia(here: Configuration, V: Array, A: Array) -> Array:
@@ -385,6 +418,16 @@ class Columns:
             found.append(a)
         return np.stack(found, axis=1)
 
+    def inertia_of(self, a: Array) -> Array:
+        """Inertia wrenches ``(6, N, T)`` of accelerations ``(n, T)`` of the independent columns alone."""
+        here = self.here
+        return -_momenta(here, here.link_twists((self.Z * a).sum(axis=1))[:, :, None])[:, :, 0]
+
+    def yields(self, efforts: Array) -> Array:
+        """Inertia wrenches ``(6, N, T)`` with which the links yield to efforts ``(F, T)`` in the freedoms."""
+        nothing = np.zeros((6, len(self.here.system.m.links), self.here.T))
+        return self.inertia_of(self.accelerations(nothing, efforts)[0])
+
     def largest(self, wrenches: Iterable[Array], efforts: Iterable[Array]) -> float:
         """The largest part that a component of wrenches or of efforts has in a generalized force."""
         by_wrenches, by_efforts = (np.abs(columns).max(axis=-2, initial=0.0) for columns in (self.V, self.Z))
@@ -402,11 +445,14 @@ class Columns:
         return velocities, ddq, _inertia(here, velocities.V, here.accelerations_with(ddq, velocities.bias))
 
 
-def applied(here: Configuration, loads: tuple[Load, ...], velocities: Velocities, t: Array) -> tuple[Array, Array]:
-    """Wrenches ``(6, N, T)`` of loads on the links and efforts ``(F, T)`` in the freedoms."""
+def applied(
+    here: Configuration, loads: tuple[Load, ...], velocities: Velocities, t: Array, rough: bool = False
+) -> tuple[Array, Array]:
+    """Wrenches ``(6, N, T)`` of loads on the links and efforts ``(F, T)`` in the freedoms; ``rough``: dry friction is added elsewhere."""
     if not loads:
         return np.zeros((6, len(here.system.m.links), here.T)), np.zeros((here.system.n_freedoms, here.T))
     site = Site(here, velocities, here.system.coordinates_of(here.x), (here.T,), np.arange(here.T), t)
+    site.solves_friction = rough
     site.collect(loads)
     return site.applied(), site.scaled_efforts()
 
@@ -429,20 +475,27 @@ def moved(closed: ClosedChart, v: Array, p: Array, loads: Loads, t: Array) -> Mo
     Z, Zp = columns.Z, columns.Zp
     dq = (Z * v).sum(axis=1) + (Zp * p[0]).sum(axis=1)
     velocities, ddq, inertia = columns.bound(dq, (Zp * p[1]).sum(axis=1))
-    V = velocities.V
-    (stored, by_stored), (rest, by_rest) = (applied(here, some, velocities, t) for some in (loads.stored, loads.rest))
+    V, rough = velocities.V, loads.senses is not None
+    (stored, by_stored), (rest, by_rest) = (
+        applied(here, some, velocities, t, rough) for some in (loads.stored, loads.rest)
+    )
     wrenches, efforts = stored + rest + inertia, by_stored + by_rest
     a, unopposed = columns.accelerations(wrenches, efforts)
     left = np.abs(unopposed).max(initial=0.0)
     if left and left > RESPONSE.unopposed * columns.largest((stored, rest, inertia), (by_stored, by_rest)):
         raise Stopped(NO_INERTIA)
-    further = (Z * a).sum(axis=1)
+    left_over, rubs = wrenches + columns.inertia_of(a), None
+    if rough and loads.dry:
+        problem = ForceProblem(here, left_over, efforts, np.zeros(0, dtype=np.intp), closed.f)
+        rubs = rubbed_in_motion(problem, loads.dry, loads.directions(dq), columns.yields)
+        more, _ = columns.accelerations(0.0 * wrenches, rubs.efforts)
+        a, by_rest, efforts = a + more, by_rest + rubs.efforts, efforts + rubs.efforts
+        left_over = left_over + columns.inertia_of(more)
     power = (V * rest).sum(axis=(0, 1)) + (dq * by_rest).sum(axis=0)
-    if Zp.shape[1]:
-        left_over = wrenches - _momenta(here, here.link_twists(further)[:, :, None])[:, :, 0]
-        by_freedom = efforts + here.tree_efforts(left_over)
-        power -= (p[0] * (Zp * by_freedom[:, None]).sum(axis=0)).sum(axis=0)
-    return Moved(Rates(velocities, ddq + further, np.zeros(here.T)), columns, columns.force(wrenches, efforts), power)
+    held = -(Zp * (efforts + here.tree_efforts(left_over))[:, None]).sum(axis=0)
+    power += (p[0] * held).sum(axis=0)
+    rates = Rates(velocities, ddq + (Z * a).sum(axis=1), np.zeros(here.T))
+    return Moved(rates, columns, columns.force(wrenches, efforts), power, held, rubs)
 
 
 def along_one(here: Configuration, f: FactoredClosure, loads: Loads) -> Array:
@@ -509,6 +562,8 @@ def cannot(system: System, loads: Loads, held: bool) -> str | None:
     """Why the kernel does not serve a motion; None where it does."""
     if held:
         return "passive freedoms are held at rest"
+    if loads.dry:
+        return "dry friction holds freedoms and lets them go"
     if system.n_freedoms * len(system.m.links) >= SPARSE_FROM:
         return f"it has {system.n_freedoms} freedoms and {len(system.m.links)} links; expected fewer than {SPARSE_FROM} of the product"
     return next(filter(None, map(why_not_load, (*loads.stored, *loads.rest))), None) or why_not(system)

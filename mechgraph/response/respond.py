@@ -22,7 +22,7 @@ from mechgraph.determinacy.mobility import free_motion
 from mechgraph.determinacy.report import hinted
 from mechgraph.determinacy.snapping import SnappedMechanism, declared_closure, meant
 from mechgraph.document import Bullets, Document, Heading, Paragraph, Shown
-from mechgraph.errors import AssemblyError, DeclarationError, MechgraphWarning, ResponseError
+from mechgraph.errors import AssemblyError, DeclarationError, FrictionError, MechgraphWarning, ResponseError
 from mechgraph.files import plain
 from mechgraph.force.loads import Site
 from mechgraph.kinematics.assembly import CLOSED, assembled_at, named_columns
@@ -58,23 +58,23 @@ from mechgraph.response.integration import (
     Integration,
     Occurrence,
     Stage,
-    Stops,
     Watch,
     first_root,
     read_events,
-    read_stops,
     with_turns,
 )
 from mechgraph.response.motion_equations import (
     ClosedChart,
     Columns,
     Loads,
+    Moved,
     Stopped,
     library_for,
     moved,
     positions_together,
     stopping,
 )
+from mechgraph.response.resting import Rests, friction_faults, read_stops, with_contacts
 from mechgraph.result.solution import Solution
 from mechgraph.result.summary import SolutionData, solution_data, summary
 from mechgraph.result.trajectory import Trajectory
@@ -100,12 +100,15 @@ class Energy(Shown):
     """Energies over the times ``t (T,)`` in the user's units.
 
     ``kinetic``; ``potential`` of gravity and springs; ``work`` done since the start by prescribed drivers and by loads without a potential
-    energy. ``kinetic + potential - work`` is constant; ``start`` is its value at the start.
+    energy, less what impacts and friction took, which is ``impact`` and ``friction``. ``kinetic + potential - work`` is constant; ``start``
+    is its value at the start.
     """
 
     kinetic: Array
     potential: Array
     work: Array
+    impact: Array
+    friction: Array
     start: float
     t: Array
 
@@ -126,6 +129,11 @@ class Energy(Shown):
         """Ranges over the output times."""
         rows = [(name, getattr(self, name)) for name in ("kinetic", "potential", "work", "balance")]
         return Document("Energies", (ranges(rows, lambda i: f"t = {self.t.reshape(-1)[i]:.5g}"),))
+
+
+def _energy(parts: Array, start: float, t: Array) -> Energy:
+    kinetic, potential, work, impact, friction = parts
+    return Energy(kinetic, potential, work, impact, friction, start, t)
 
 
 class Response(Solution):
@@ -250,23 +258,21 @@ class Course:
         ):
             what = f"times between {self.begin:g} and {self.reached:g}, one or one-dimensional"
             raise DeclarationError("response", [wrong(t, "t", what)])
-        trajectory, *parts = self._read(times)
-        kinetic, potential, work = (part.reshape(times.shape) for part in parts)
-        return Response(trajectory, Energy(kinetic, potential, work, self._energy_at_start, times), self)
+        trajectory, parts = self._read(times)
+        return Response(trajectory, _energy(parts.reshape(-1, *times.shape), self._energy_at_start, times), self)
 
     def moments(self, t: Array) -> list[Response]:
         """The responses at each of several times ``(T,)``, evaluated together."""
-        (whole, *parts), out = self._read(t), []
+        (whole, parts), out = self._read(t), []
         for i, at in enumerate(t.tolist()):
             values = whole.part(slice(i, i + 1))
             values.batch, values.t = (), np.array(at)
-            kinetic, potential, work = (part[i] for part in parts)
-            out.append(Response(values, Energy(kinetic, potential, work, self._energy_at_start, values.t), self))
+            out.append(Response(values, _energy(parts[:, i], self._energy_at_start, values.t), self))
         return out
 
     @cached_property
     def _energy_at_start(self) -> float:
-        _, kinetic, potential, work = self._read(np.array(self.begin))
+        kinetic, potential, work = self._read(np.array(self.begin))[1][:3]
         return float((kinetic + potential - work)[0])
 
     @cached_property
@@ -276,13 +282,13 @@ class Course:
         # steps at which the greatest energy of a motion is looked for
         return self.response(ends[:: max(1, len(ends) // 100)]).energy.greatest
 
-    def _read(self, times: Array) -> tuple[Trajectory, Array, Array, Array]:
-        """The trajectory at times, with kinetic and potential energy and work, flat."""
+    def _read(self, times: Array) -> tuple[Trajectory, Array]:
+        """The trajectory at times, flat, with energies ``(5, T)`` in the order of ``Energy``."""
         flat = times.reshape(-1)
-        works = np.zeros(flat.size)
+        done = np.zeros((3, flat.size))
         blocks = []
-        for places, task, closed, v, work in self._states(flat):
-            works[places] = work
+        for places, task, closed, v, sums in self._states(flat):
+            done[:, places] = sums
             blocks.append((places, task, closed, v))
         m, system = self.mechanism, self.task.system
         trajectory, kinetic, potential = trajectory_of(self.task, m, times, blocks)
@@ -291,19 +297,21 @@ class Course:
             trajectory.engine = COMPILED
         if isinstance(m, SnappedMechanism):
             trajectory.as_declared(partial(declared_closure, system, declared(m.declared)), m.changes.tol)
-        return trajectory, kinetic, potential, works * system.par.L**2
+        return trajectory, np.stack([kinetic, potential, *(done[[2, 0, 1]] * system.par.L**2)])
 
     def _states(self, flat: Array) -> Iterator[tuple[Index, Task, ClosedChart, Array, Array]]:
-        """Closed states at times ``(T,)`` in blocks: places, task, states, rates of the independent columns, work done."""
-        for places, stage, y, work in self.integration.at(flat):
-            together = positions_together(self.task.system, (len(y) - 1) // 2)
+        """Closed states at times ``(T,)`` in blocks: places, task, states, rates of the independent columns, what was lost and
+        done ``(3, T)``.
+        """
+        for places, stage, y, done in self.integration.at(flat):
+            together = positions_together(self.task.system, len(y) // 2 - 1)
             for part in in_blocks(np.arange(len(places)), together):
                 closed, v = stage.states(flat[places[part]], y[:, part])
                 if not closed.done.all() or float(closed.here.closure.max()) > CLOSED:
                     raise ResponseError(
                         f"mechanism {self.mechanism.name!r}: the loops do not close at some time of {flat[places[part]]}"
                     )
-                yield places[part], stage.task, closed, v, work[part]
+                yield places[part], stage.task, closed, v, done[:, part]
 
     def positions(self, t: Array) -> Array:
         """Internal states ``(nx, T)`` at times ``(T,)``."""
@@ -315,11 +323,19 @@ class Course:
     def rates(self, t: Array) -> Array:
         """Rates and accelerations ``(2, F, T)`` of all freedoms at times ``(T,)``, internal units."""
         out = np.empty((2, self.task.system.n_freedoms, len(t)))
-        for places, task, closed, v, _ in self._states(t):
-            at = t[places]
-            rates = moved(closed, v, task.prescribed_at(at)[1:], task.loads, at).rates
-            out[0][:, places], out[1][:, places] = rates.dq, rates.ddq
+        for places, found in self._moved(t):
+            out[0][:, places], out[1][:, places] = found.rates.dq, found.rates.ddq
         return out
+
+    def efforts_held(self, t: Array) -> Array:
+        """Efforts ``(p, T)`` of the freedoms that are prescribed and held at times ``(T,)`` of one stage."""
+        parts = sorted(self._moved(t), key=lambda one: int(one[0][0]))
+        return np.concatenate([found.held for _, found in parts], axis=1)
+
+    def _moved(self, t: Array) -> Iterator[tuple[Index, Moved]]:
+        """Rates, accelerations and forces at times ``(T,)`` in blocks."""
+        for places, task, closed, v, _ in self._states(t):
+            yield places, moved(closed, v, task.prescribed_at(t[places])[1:], task.loads, t[places])
 
     def site(self, t: Array) -> Site:
         """What loads see of the motion at times ``(T,)``."""
@@ -563,7 +579,9 @@ def respond(
 
     The accelerations of as many independent freedoms as the mechanism has mobility are unknowns beside the reactions:
     ``M(u) u'' + h(u, u') = Q``. Steppers of ``scipy.integrate``; the loops are closed at every output. Arguments from ``t`` to
-    ``stops`` default to those of ``m.response``.
+    ``stops`` default to those of ``m.response``. Dry friction (``Friction``) of pairs with one freedom slips, sticks and reverses by
+    events, so that nothing creeps at rest; where several freedoms stick together, how they share the load is not determined: NaN. Impacts
+    know no friction.
 
     Parameters
     ----------
@@ -593,6 +611,7 @@ def respond(
         Watched quantities; a terminal event ends the motion.
     stops : Stop or iterable of Stop, optional
         Limits of freedoms: impact, rest and release; their force is an ``applied_effort``.
+
     on_stop : {"raise", "return"}
         If the motion cannot be integrated to its end: raise, or return what there is, with ``stopped`` set.
     passive : {"free", "held"}
@@ -616,6 +635,8 @@ def respond(
         The loops cannot be closed at the beginning.
     ResponseError
         The motion cannot be integrated to its end; ``error.solution`` is the Response so far.
+    FrictionError
+        Friction has no finite force from some time on, or several; ``.kind`` says which.
     MissingExtraError
         ``engine="compiled"`` without a C compiler.
 
@@ -647,10 +668,14 @@ def respond(
     if faults:
         raise DeclarationError(f"respond {m.name!r}", faults)
     declared = m if replaced is None else m.replace(loads=replaced)
+    bounces = {f"{pair.name}.gap": pair.restitution for pair in declared.pairs if pair.restitution is not None}
+    declared, gaps = with_contacts(declared, limits)
+    m = declared
     m = meant(declared, tol, "respond")
+    faults += friction_faults(m, how.passive)
     begin = float(times[0])
     prescribed = read_motions(m, how.motions, times, faults)
-    wanted = read_start(m, how.start, prescribed, begin, faults) if not faults else {}
+    wanted = gaps | read_start(m, how.start, prescribed, begin, faults) if not faults else {}
     wanted_rates = read_rates(m, how.rates, faults)
     faults += [f"{one.where}{', '.join(one.over_positions)}: {OVER_POSITIONS}" for one in m.loads if one.over_positions]
     if faults:
@@ -670,7 +695,7 @@ def respond(
         dq = start_rates(m, task, x, wanted_rates, begin)
     except Stopped as stop:
         raise ResponseError(f"mechanism {m.name!r}: {stop}") from None
-    standing = Stops.of(m, task, limits)
+    standing = Rests.of(m, task, limits, bounces)
     faults = standing.faults(x)
     if faults:
         raise DeclarationError(f"respond {m.name!r}", faults)
@@ -696,7 +721,7 @@ def _how(m: Mechanism, given: Mapping[str, Any]) -> Any:
 
 def _followed(
     course: Course,
-    stops: Stops,
+    stops: Rests,
     watched: tuple[Event, ...],
     x: Array,
     dq: Array,
@@ -718,6 +743,8 @@ def _followed(
         why = str(stop) or "interrupted"
         why = f"mechanism {course.mechanism.name!r}: the motion was followed to t = {course.reached:.6g} of {course.times[-1]:.6g}: {why}"
         out = course.outputs()
+        if getattr(stop, "kind", "") and (on_stop == "raise" or out is None):
+            raise FrictionError(why, {}, out, kind=stop.kind, factor=np.nan) from None  # type: ignore[union-attr]
         if on_stop == "raise" or out is None:
             raise ResponseError(why, out) from (stop if isinstance(stop, DeclarationError) else stop.__cause__)
     else:
@@ -730,7 +757,7 @@ def _followed(
 
 
 def _occurrences(
-    course: Course, stops: Stops, watch: Watch, x: Array, dq: Array, progress: Callable[[float], None] | None
+    course: Course, stops: Rests, watch: Watch, x: Array, dq: Array, progress: Callable[[float], None] | None
 ) -> Iterable[Occurrence]:
     """Follow the motion to its end; yields what happens, in the order of time."""
     it, end, t, crowd = course.integration, float(course.times[-1]), course.begin, 0
@@ -746,7 +773,12 @@ def _occurrences(
                 with stopping("progress"):
                     progress(segment.end)
             chatter.look(segment.begin, segment.end)
-            met = stops.met(course, segment.begin, segment.end) if stops.limits else None
+            try:
+                met = stops.met(course, segment.begin, segment.end, it.apart) if stops else None
+            except Stopped as stop:
+                if stop.at is not None:
+                    it.cut(stop.at)
+                raise
             _end_at_ranges(course, segment.begin, segment.end if met is None else met)
             if met is not None:
                 crowd = crowd + 1 if met - segment.begin < RESPONSE.soon * (end - t) else 0
@@ -762,7 +794,7 @@ def _occurrences(
         at = np.array([met])
         t, x, dq = met, course.positions(at)[:, 0], course.rates(at)[0, :, 0]
         dq, lost, first, found = stops.after(t, x, dq)
-        it.done -= lost
+        it.done = it.done + lost * np.array([1.0, 0.0, -1.0])
         yield from found
 
 
@@ -800,7 +832,7 @@ def _first_stage(it: Integration, task: Task, begin: float, x: Array, dq: Array)
         arc = last.stage.arc
         return PathStage(arc, begin, float(last.dense(begin)[0]), float(dq[arc.column]))
     motions = closure_rank(Configuration(task.system, x[:, None]), engine=task.engine).motions
-    if motions.shape[1] == 1 and not len(task.columns):
+    if motions.shape[1] == 1 and not len(task.columns) and not task.loads.dry:
         arc = Arc(task, x, dq)
         it.work.coordinates = "along the path"
         return PathStage(arc, begin, arc.begin, arc.rate)

@@ -247,6 +247,12 @@ class PairResult(Shown):
         return self._values.coordinates(self._index, 2)
 
     @property
+    def gap(self) -> Array:
+        """By how much a contact is open ``(...)``, in ``respond``; 0 of one that stays closed."""
+        place = self._values.whole.pairs[self._index].type.gap
+        return np.zeros(self._values.batch) if place is None else self.position[..., place]
+
+    @property
     def reaction(self) -> Array:
         """Wrench ``(..., 6)``, (M, F) about the global origin, that link a exerts on link b: the constraint part alone."""
         return self._values.reaction(self._index)

@@ -1,0 +1,305 @@
+"""Dry friction in a motion in time against closed forms: sliding, sticking, reversal.
+
+Mass on a belt, pendulum on a journal: K. Magnus and K. Popp, Schwingungen, 1997. Screws: J. E. Shigley and C. R. Mischke, Mechanical
+Engineering Design, 1989, chapter 8.
+"""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import mechgraph as mg
+
+X, Y, Z = np.eye(3)
+G = 9.81
+FINE = {"rtol": 1e-9, "atol": 1e-11}
+
+
+def block(mass=2.0, inertia=0.01):
+    return mg.Link("block", mass=mass, center=(0, 0, 0), inertia=inertia * np.eye(3))
+
+
+def slide(*loads, mass=2.0, swapped=False, planar=False, along=X, **friction):
+    """A block on a rough slide, on a spring of 40 N/m from a point to one side of it."""
+    a, b = ("block", "frame") if swapped else ("frame", "block")
+    pair = mg.Pair("A", "P", a, b, point=(0, 0, 0), axis=along)
+    spring, dry = mg.Spring(freedom="A", stiffness=40.0), mg.Friction("A", **{"mu": 0.1, **friction})
+    return mg.Mechanism(
+        "slide",
+        [mg.Link("frame"), block(mass)],
+        [pair],
+        loads=[mg.Gravity((0, -G, 0)), spring, dry, *loads],
+        planar=planar,
+    )
+
+
+@pytest.mark.parametrize("more", [{}, {"planar": True}, {"swapped": True}])
+def test_a_mass_on_a_spring_loses_2_mu_N_over_k_a_half_swing(more):
+    """Turning points lie at 0.5 less so much each, half a period apart, until one is in the dead band, where it stays for good."""
+    d, half = 0.1 * 2.0 * G / 40.0, np.pi / np.sqrt(20.0)
+    r = mg.respond(slide(**more), np.linspace(0, 4, 41), start={"A": 0.5}, **FINE)
+    assert [str(one).split(" at ")[0] for one in r.events] == ["A reverses"] * 4 + ["A sticks"]
+    np.testing.assert_allclose([one.t for one in r.events], half * np.arange(1, 6), atol=1e-7)
+    n = np.minimum(np.floor(r.t / half), 5)
+    side, size = (-1.0) ** n, 0.5 - 2 * n * d
+    moving = side * (d + (size - d) * np.cos(np.sqrt(20.0) * (r.t - n * half)))
+    np.testing.assert_allclose(r["A"].position[:, 0], np.where(n < 5, moving, side * size), atol=1e-8)
+    # nothing creeps
+    assert np.ptp(r["A"].position[r.t > 3.6]) == 0.0
+    assert np.abs(r.energy.balance).max() < 1e-8
+    lost = 20.0 * (0.5**2 - size[-1] ** 2)
+    assert r.energy.friction[-1] == pytest.approx(lost, rel=1e-8)
+    assert r.energy.work[-1] == pytest.approx(-lost, rel=1e-8)
+    assert r.energy.impact[-1] == 0.0
+    np.testing.assert_allclose(r["A"].normal_forces[..., 0], 2.0 * G, rtol=1e-12)
+    np.testing.assert_allclose(r["A"].friction[r.t > 3.6, 0], 40.0 * r["A"].position[-1, 0], rtol=1e-9)
+    # 1.962 N against the motion while it slips: to the left at first
+    np.testing.assert_allclose(r["A"].friction[:7, 0], 0.1 * 2.0 * G, rtol=1e-12)
+
+
+def test_friction_of_nothing_is_no_friction():
+    r, free = (mg.respond(slide(mu=mu), [0, 0.5, 1.0], start={"A": 0.5}, **FINE) for mu in (1e-12, 0.0))
+    np.testing.assert_allclose(r["A"].position[:, 0], 0.5 * np.cos(np.sqrt(20.0) * r.t), atol=1e-9)
+    np.testing.assert_allclose(free["A"].position[:, 0], 0.5 * np.cos(np.sqrt(20.0) * r.t), atol=1e-9)
+
+
+@pytest.mark.parametrize(("angle", "stays"), [(0.25, True), (0.35, False)])
+def test_a_block_pushed_up_a_slope_stays_or_comes_back(angle, stays):
+    """Up with g (sin + mu cos) against it, down with g (sin - mu cos), from tan(angle) = mu = 0.3 on."""
+    along, mu, v = (np.cos(angle), np.sin(angle), 0), 0.3, 2.0
+    pair = mg.Pair("A", "P", "frame", "block", point=(0, 0, 0), axis=along)
+    m = mg.Mechanism(
+        "slope", [mg.Link("frame"), block()], [pair], loads=[mg.Gravity((0, -G, 0)), mg.Friction("A", mu=mu)]
+    )
+    r = mg.respond(m, [0, 1.0, 1.5], rates={"A": v}, **FINE)
+    up, down = (G * (np.sin(angle) + s * mu * np.cos(angle)) for s in (1, -1))
+    assert r.events[0].t == pytest.approx(v / up, abs=1e-9)
+    assert str(r.events[0]).startswith("A sticks" if stays else "A reverses")
+    back = 0.0 if stays else 0.5 * down * (1.5 - v / up) ** 2
+    assert r["A"].position[-1, 0] == pytest.approx(v * v / up / 2 - back, abs=1e-9)
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_a_pendulum_on_a_journal(swapped):
+    """L q'' + g sin q = -+ rho |g cos q + L w^2| / sqrt(L^2 - rho^2): the reaction is tangent to the friction circle and meets the mass."""
+    L, mu, radius = 0.5, 0.3, 0.06
+    rho = radius * np.sin(np.arctan(mu))
+    a, b = ("bob", "frame") if swapped else ("frame", "bob")
+    sign = -1.0 if swapped else 1.0
+    pin = mg.Pair("A", "R", a, b, point=(0, 0, 0), axis=Z)
+    bob = mg.Link("bob", mass=3.0, center=(0, -L, 0))
+    m = mg.Mechanism(
+        "pendulum",
+        [mg.Link("frame"), bob],
+        [pin],
+        loads=[mg.Gravity((0, -G, 0)), mg.Friction("A", mu=mu, radius=radius)],
+    )
+    r = mg.respond(m, (0, 4), start={"A": sign * 0.5}, **FINE)
+
+    def swing(q, sense):
+        """The turning point after one, with the time that it takes."""
+
+        def rates(t, y):
+            couple = rho * abs(G * np.cos(y[0]) + L * y[1] ** 2) / np.sqrt(L * L - rho * rho)
+            return [y[1], -(G * np.sin(y[0]) + sense * couple) / L]
+
+        def turn(t, y):
+            return y[1] if t > 0.1 else sense
+
+        turn.terminal = True
+        found = solve_ivp(rates, (0, 3), [q, 0.0], method="DOP853", rtol=1e-12, atol=1e-13, events=turn)
+        return found.t_events[0][0], found.y_events[0][0][0]
+
+    t, q, times, sense = 0.0, 0.5, [], -1.0
+    while abs(q) > np.arcsin(rho / L):
+        step, q = swing(q, sense)
+        t, sense = t + step, -sense
+        times.append(t)
+    np.testing.assert_allclose([one.t for one in r.events], times, atol=1e-7)
+    assert str(r.events[-1]).startswith("A sticks")
+    assert r["A"].position[-1, 0] == pytest.approx(sign * q, abs=1e-8)
+    assert abs(q) < np.arcsin(rho / L)
+    assert np.abs(r.energy.balance).max() < 1e-7
+
+
+def belt(mu, static, v, units=None):
+    """A mass on a spring, on a belt that is driven at a speed; its friction is that between mass and belt."""
+    links = [mg.Link("frame"), mg.Link("belt"), block(1.0)]
+    pairs = [
+        mg.Pair("D", "P", "frame", "belt", point=(0, 0, 0), axis=X),
+        mg.Pair("A", "P", "belt", "block", point=(0, 0, 0), axis=X),
+    ]
+    spring = mg.Spring("frame", "block", (-50.0, 0, 0), (0, 0, 0), stiffness=25.0, free_length=50.0)
+    loads = [mg.Gravity((0, -G, 0)), spring, mg.Friction("A", mu=mu, static=static)]
+    return mg.Mechanism("belt", links, pairs, loads=loads), {"D": lambda t: (v * t, v, 0.0)}
+
+
+def test_a_mass_on_a_belt_sticks_and_slips():
+    """It sticks for 2 d / v and slips for 2 (pi - atan(d w / v)) / w, d = (static - mu) N / k."""
+    mu, static, v, w = 0.1, 0.3, 0.25, 5.0
+    m, motions = belt(mu, static, v)
+    r = mg.respond(m, (0, 6), motions=motions, **FINE)
+    d = (static - mu) * G / 25.0
+    names = [str(one).split(" at ")[0] for one in r.events]
+    assert names[:4] == ["A slips", "A sticks", "A slips", "A sticks"]
+    t = np.array([one.t for one in r.events])
+    # from the middle on at first: static N / k at the speed of the belt
+    assert t[0] == pytest.approx(static * G / 25.0 / v, abs=1e-7)
+    np.testing.assert_allclose((t[1:-1:2] - t[0:-2:2])[:3], 2 * (np.pi - np.arctan(d * w / v)) / w, atol=1e-7)
+    np.testing.assert_allclose(t[2] - t[1], 2 * d / v, atol=1e-7)
+    assert np.abs(r.energy.balance).max() < 1e-7
+
+
+def screw(mu, cut):
+    """A lift: a motor turns a spindle whose nut carries 400 N up, until it is cut off; the spindle has inertia, the nut mass."""
+    links = [
+        mg.Link("frame"),
+        mg.Link("spindle", mass=1.0, center=(0, 0, 0), inertia=np.diag([0.01, 0.01, 0.002])),
+        mg.Link("nut", mass=40.0, center=(0, 0, 0), inertia=0.1 * np.eye(3)),
+    ]
+    pairs = [
+        mg.Pair("M", "R", "frame", "spindle", point=(0, 0, 0), axis=Z),
+        mg.Pair("A", "H", "spindle", "nut", point=(0, 0, 0), axis=Z, pitch=PITCH),
+        mg.Pair("D", "P", "frame", "nut", point=(0, 0, 0), axis=Z),
+    ]
+    motor = mg.Effort("M", lambda pose, twist, t: np.where(t < cut, -5.0, 0.0), breaks=[cut])
+    loads = [mg.Gravity((0, 0, -G)), motor, mg.Friction("A", mu=mu, radius=RADIUS)]
+    return mg.Mechanism("lift", links, pairs, loads=loads)
+
+
+PITCH, RADIUS = 0.004, 0.012
+
+
+@pytest.mark.parametrize(("mu", "stays"), [(0.4, True), (0.15, False)])
+def test_a_screw_whose_motor_is_cut_off(mu, stays):
+    """The nut rises against r Q tan(lead + phi); it stops, and stays where lead < phi, or runs back against r Q tan(lead - phi).
+
+    The nut does not turn: the spindle turns against it by -q where it rises by pitch q; Q = m (g + z'').
+    """
+    cut, mass, inertia = 0.2, 40.0, 0.002
+    lead, phi = np.arctan(PITCH / RADIUS), np.arctan(mu)
+    r = mg.respond(screw(mu, cut), [0.0, cut, 0.5], **FINE)
+
+    def acceleration(couple, way):
+        arm = RADIUS * np.tan(lead + way * phi)
+        # J a = couple - arm m (g + pitch a)
+        return (couple - arm * mass * G) / (inertia + arm * mass * PITCH)
+
+    speed = acceleration(5.0, 1) * cut
+    stop = cut - speed / acceleration(0.0, 1)
+    assert str(r.events[0]).split(" at ")[0] == ("A sticks" if stays else "A reverses")
+    assert len(r.events) == 1
+    assert r.events[0].t == pytest.approx(stop, abs=1e-7)
+    top = 0.5 * speed * stop
+    back = 0.0 if stays else 0.5 * acceleration(0.0, -1) * (0.5 - stop) ** 2
+    assert (lead < phi) == stays
+    assert abs(r["M"].position[-1, 0]) == pytest.approx(top + back, rel=1e-8)
+    assert r["D"].position[-1, 0] == pytest.approx(PITCH * (top + back), rel=1e-8)
+    assert np.abs(r.energy.balance).max() < 1e-8
+
+
+def stack(push, *, low=0.1, up=0.3):
+    """A block of 1 kg on one of 2 kg on the ground, the lower one pushed."""
+    links = [mg.Link("frame"), *(mg.Link(n, m, (0, 0, 0), 0.01 * np.eye(3)) for n, m in (("low", 2.0), ("up", 1.0)))]
+    pairs = [
+        mg.Pair("A", "P", "frame", "low", point=(0, 0, 0), axis=X),
+        mg.Pair("B", "P", "low", "up", point=(0, 0, 0), axis=X),
+    ]
+    force = mg.Wrench("low", force=(push, 0, 0), point=(0, 0, 0))
+    loads = [mg.Gravity((0, -G, 0)), force, mg.Friction("A", mu=low), mg.Friction("B", mu=up)]
+    return mg.Mechanism("stack", links, pairs, loads=loads)
+
+
+@pytest.mark.parametrize(
+    ("push", "lower", "upper"), [(2.0, 0.0, 0.0), (5.0, (5 - 0.3 * G) / 3, 0.0), (20.0, (20 - 0.6 * G) / 2, 0.3 * G)]
+)
+def test_of_two_blocks_none_slips_or_one_or_both(push, lower, upper):
+    """Which stick and which slip at rest: none below 0.1 (3 g), both together up to 0.3 g, the upper one less above."""
+    r = mg.respond(stack(push), [0.0, 0.2], **FINE)
+    assert r["A"].acceleration[-1, 0] == pytest.approx(lower, abs=1e-10)
+    assert r["B"].acceleration[-1, 0] == pytest.approx(upper - lower if push > 6 else 0.0, abs=1e-10)
+    assert r["A"].friction[-1, 0] == pytest.approx(-min(push, 0.3 * G), rel=1e-10)
+    assert r["B"].friction[-1, 0] == pytest.approx(upper if push > 6 else lower, abs=1e-10)
+
+
+def test_two_blocks_come_to_rest_one_after_the_other():
+    """The upper one slows by 0.3 g, while the lower one goes on, pulled as much forward as back; then both slow by 0.1 g."""
+    r = mg.respond(stack(0.0), [0.0, 3.0], rates={"A": 1.0, "B": 2.0}, **FINE)
+    assert [str(one).split(" at ")[0] for one in r.events] == ["B sticks", "A sticks"]
+    first = 2.0 / (0.3 * G)
+    np.testing.assert_allclose([one.t for one in r.events], [first, first + 1.0 / (0.1 * G)], atol=1e-8)
+    np.testing.assert_allclose(r["A"].position[-1, 0], first + 0.5 / (0.1 * G), atol=1e-8)
+    assert r.energy.friction[-1] == pytest.approx(0.5 * 2.0 + 0.5 * 9.0, rel=1e-9)
+
+
+def test_a_block_rebounds_from_a_stop_with_friction():
+    """In and back by 0.2 g; what is lost is split into impact and friction."""
+    pair = mg.Pair("A", "P", "frame", "block", point=(0, 0, 0), axis=X)
+    m = mg.Mechanism(
+        "slide", [mg.Link("frame"), block()], [pair], loads=[mg.Gravity((0, -G, 0)), mg.Friction("A", mu=0.2)]
+    )
+    r = mg.respond(m, [0.0, 2.0], rates={"A": 2.0}, stops=mg.Stop("A", upper=0.5, restitution=0.6), **FINE)
+    v = np.sqrt(4 - 0.2 * G)
+    back = (0.6 * v) ** 2 / (0.4 * G)
+    assert [str(one).split(" at ")[0] for one in r.events] == ["A meets its upper stop", "A reverses", "A sticks"]
+    assert r["A"].position[-1, 0] == pytest.approx(0.5 - back, abs=1e-9)
+    assert r.energy.impact[-1] == pytest.approx(0.64 * v * v, rel=1e-9)
+    assert r.energy.friction[-1] == pytest.approx(0.4 * G * (0.5 + back), rel=1e-9)
+
+
+def slider_crank(planar):
+    r, l = 0.05, 0.15
+    at = {"A": (0, 0, 0), "B": (r, 0, 0), "C": (r + l, 0, 0), "D": (r + l, 0, 0)}
+    ends = {"A": ("frame", "crank"), "B": ("crank", "rod"), "C": ("rod", "piston"), "D": ("frame", "piston")}
+    pairs = [mg.Pair(n, "P" if n == "D" else "R", *ends[n], point=at[n], axis=X if n == "D" else Z) for n in at]
+    masses = {"crank": (1.0, r / 2), "rod": (0.5, r + l / 2), "piston": (0.8, r + l)}
+    links = [mg.Link("frame"), *(mg.Link(n, m, (c, 0, 0), 1e-4 * np.eye(3)) for n, (m, c) in masses.items())]
+    dry = [mg.Friction(n, mu=0.1, radius=0.01) for n in "ABC"] + [mg.Friction("D", mu=0.1)]
+    return mg.Mechanism("slider-crank", links, pairs, loads=[mg.Gravity((0, -G, 0)), *dry], planar=planar)
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_a_slider_crank_rough_everywhere_runs_out(planar):
+    """Its accelerations are those at which `solve`, given the same motion with its friction, needs no effort at the crank."""
+    m = slider_crank(planar)
+    r = mg.respond(m, (0, 0.26), rates={"A": 30.0}, rtol=1e-7, atol=1e-9)
+    assert np.abs(r.energy.balance).max() < 1e-6 * r.energy.kinetic.max()
+    # where the slider is at its dead point `solve` knows no way in which it is about to go
+    early = (r.t > 0.0) & (r.t < r.events[0].t)
+    crank = r["A"]
+    motion = mg.Motion(
+        crank.position[early, 0], velocity=crank.velocity[early, 0], acceleration=crank.acceleration[early, 0]
+    )
+    s = mg.solve(m.replace(drives=["A"]), {"A": motion})
+    assert np.abs(s["A"].effort).max() < 1e-8 * np.abs(s["A"].friction).max()
+    np.testing.assert_allclose(s["B"].friction, r["B"].friction[early], rtol=1e-6, atol=1e-9)
+    # at rest all four stick together, and share the load as they like
+    assert {str(one).split(" at ")[0] for one in r.events} == {f"{name} sticks" for name in "ABCD"}
+    assert r.status[-1] == "friction not determined"
+    assert np.isnan(r["A"].force[-1]).all()
+    assert np.isfinite(r["A"].position).all()
+
+
+def test_units_change_nothing():
+    m = slide().replace(units={"length": "m", "mass": "kg", "time": "s"})
+    r = mg.respond(m, [0.0, 0.5, 1.0], start={"A": 0.5}, **FINE)
+    q = mg.respond(m.to_units(length="mm", mass="g", time="ms"), [0.0, 500.0, 1000.0], start={"A": 500.0}, **FINE)
+    np.testing.assert_allclose([one.t for one in q.events], [1000 * one.t for one in r.events], rtol=1e-9)
+    np.testing.assert_allclose(q["A"].position, 1000 * r["A"].position, atol=1e-5)
+    np.testing.assert_allclose(q.energy.friction, 1e3 * r.energy.friction, rtol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("pair", "more", "words"),
+    [
+        ({"type": "C", "axis": X}, {"radius": 0.1}, "slips in several freedoms"),
+        ({"type": "S"}, {"radius": 0.1}, "slips in several freedoms"),
+    ],
+)
+def test_what_is_not_followed_in_time_is_refused(pair, more, words):
+    m = mg.Mechanism(
+        "one", [mg.Link("frame"), block()], [mg.Pair("A", a="frame", b="block", point=(0, 0, 0), **pair)],
+        loads=[mg.Friction("A", mu=0.1, **more)],
+    )  # fmt: skip
+    with pytest.raises(mg.DeclarationError, match=words):
+        mg.respond(m, (0, 1))

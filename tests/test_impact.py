@@ -1,0 +1,235 @@
+"""Contacts that open and land, stops of points, and impacts: closed forms, jumps of momentum, the balance of energy."""
+
+import numpy as np
+import pytest
+
+import mechgraph as mg
+
+X, Y, Z = np.eye(3)
+G = 9.81
+FINE = {"rtol": 1e-10, "atol": 1e-12}
+
+
+def body(name, mass=1.0, center=(0, 0, 0), **more):
+    return mg.Link(name, mass=mass, center=center, inertia=0.01 * np.eye(3), **more)
+
+
+def touching(name, a, b, planar=False, **more):
+    """A contact of b with the plane y = 0 of a: a sphere on it, in the plane a point on a line."""
+    flat = {"type": "Ps", "axis": Z, "curve": mg.Curve.line(point=(0, 0, 0), direction=(1, 0, 0))}
+    kind = flat if planar else {"type": "Sp", "axis": Y}
+    return mg.Pair(name, a=a, b=b, point=(0, 0, 0), closed="force", **kind, **more)
+
+
+@pytest.mark.parametrize("planar", [False, True])
+@pytest.mark.parametrize("guided", [False, True])
+def test_a_ball_on_a_plane_bounces_and_comes_to_rest(planar, guided):
+    """Dropped from h it lands at sqrt(2 h / g) (1 + 2 e + 2 e^2 + ...); then the plane bears its weight."""
+    e, first = 0.4, np.sqrt(2 / G)
+    guide = [mg.Pair("A", "P", "frame", "ball", point=(0, 0, 0), axis=Y)] if guided else []
+    pairs = [touching("K", "frame", "ball", planar, restitution=e, gap=1.0), *guide]
+    m = mg.Mechanism(
+        "drop", [mg.Link("frame"), body("ball", 2.0)], pairs, loads=[mg.Gravity((0, -G, 0))], planar=planar
+    )
+    r = mg.respond(m, np.linspace(0, 1.5, 16), rtol=1e-9, atol=1e-11)
+    times = np.array([one.t for one in r.events])
+    np.testing.assert_allclose(times[:6], first * (1 + 2 * np.cumsum([0, *e ** np.arange(1, 6)])), atol=1e-7)
+    strike = r.events[0]
+    assert str(strike).startswith("K lands at t = 0.4515")
+    v = G * first
+    assert strike.impulse == pytest.approx(2.0 * (1 + e) * v, rel=1e-9)
+    assert strike.energy_lost == pytest.approx((1 - e * e) * v * v, rel=1e-9)
+    np.testing.assert_allclose(strike.impulses["K"][3:], [0, strike.impulse, 0], atol=1e-9)
+    assert r["K"].gap[0] == pytest.approx(1.0, abs=1e-12)
+    assert r["K"].gap.min() > -1e-8
+    down = r.t > times[-1]
+    assert down.sum() > 3
+    np.testing.assert_allclose(r["K"].force[down], np.tile([0, 2.0 * G, 0], (down.sum(), 1)), atol=1e-9)
+    np.testing.assert_allclose(r["K"].force[~down], 0.0, atol=1e-9)
+    assert r.energy.impact[-1] == pytest.approx(2.0 * G, rel=1e-9)
+    assert np.abs(r.energy.balance).max() < 1e-8
+    assert np.max(r.checks.equilibrium) < 1e-9
+
+
+def shaken(a, w, planar=False):
+    links = [mg.Link("frame"), mg.Link("table"), body("block", 2.0)]
+    pairs = [
+        mg.Pair("D", "P", "frame", "table", point=(0, 0, 0), axis=Y),
+        mg.Pair("B", "P", "frame", "block", point=(0, 0, 0), axis=Y),
+        touching("K", "table", "block", planar, restitution=0.0),
+    ]
+    m = mg.Mechanism("shaken", links, pairs, loads=[mg.Gravity((0, -G, 0))], planar=planar)
+    return m, {"D": lambda t: (a * np.sin(w * t), a * w * np.cos(w * t), -a * w * w * np.sin(w * t))}
+
+
+@pytest.mark.parametrize("planar", [False, True])
+def test_a_block_on_a_shaken_table_opens_and_lands(planar):
+    """It opens where A w^2 sin(w t) = g, flies along a parabola and lands where that meets the table."""
+    a, w = 0.02, 30.0
+    m, motions = shaken(a, w, planar)
+    r = mg.respond(m, [0.0, 0.01, 0.2], motions=motions, **FINE)
+    opens = np.arcsin(G / (a * w * w)) / w
+    assert [str(one).split(" at ")[0] for one in r.events] == ["K lands", "K opens", "K lands"]
+    assert r.events[1].t == pytest.approx(opens, abs=1e-8)
+
+    def gap(t):
+        s = t - opens
+        return a * np.sin(w * opens) + a * w * np.cos(w * opens) * s - G * s * s / 2 - a * np.sin(w * t)
+
+    lands = r.events[2].t
+    assert gap(lands) == pytest.approx(0.0, abs=1e-9)
+    assert (gap(np.linspace(opens + 1e-4, lands - 1e-4, 400)) > 0).all()
+    assert r["K"].force[1, 1] == pytest.approx(2.0 * (G - a * w * w * np.sin(0.3)), rel=1e-9)
+    assert np.abs(r.energy.balance).max() < 1e-8
+
+
+def test_a_table_shaken_less_keeps_its_block():
+    m, motions = shaken(0.01, 30.0)
+    r = mg.respond(m, np.linspace(0, 0.25, 6), motions=motions, **FINE)
+    assert [str(one).split(" at ")[0] for one in r.events] == ["K lands"]
+    np.testing.assert_allclose(r["K"].force[:, 1], 2.0 * (G - 9.0 * np.sin(30.0 * r.t)), rtol=1e-8)
+    np.testing.assert_allclose(r["K"].gap, 0.0, atol=1e-12)
+
+
+def four_bar(planar):
+    """A four-bar in a level plane with a named point of its coupler."""
+    at = {"A": (0, 0, 0), "B": (0, 1, 0), "C": (2, 1.5, 0), "D": (2, 0, 0)}
+    links = [
+        mg.Link("frame"),
+        body("crank", 1.0, (0, 0.5, 0)),
+        body("coupler", 2.0, (1, 1.3, 0), points={"tip": (1, 2, 0)}),
+        body("rocker", 1.5, (2, 0.7, 0)),
+    ]
+    ends = {"A": ("frame", "crank"), "B": ("crank", "coupler"), "C": ("coupler", "rocker"), "D": ("frame", "rocker")}
+    pairs = [mg.Pair(n, "R", *ends[n], point=at[n], axis=Z) for n in at]
+    return mg.Mechanism("four-bar", links, pairs, planar=planar)
+
+
+@pytest.mark.parametrize("planar", [False, True])
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+def test_a_linkage_strikes_a_wall(planar, e):
+    """Lost are (1 - e^2) w^2 / (2 G M^-1 G'); the impulses in the pins are the jumps of momentum of the links."""
+    m = four_bar(planar)
+    stop = mg.Stop("coupler.tip.Tx", upper=1.1, restitution=e)
+    r = mg.respond(m, (0, 0.3), rates={"A": -1.0}, stops=stop, **FINE)
+    strike = r.events[0]
+    assert str(strike).startswith("coupler.tip.Tx meets its upper stop")
+    before = r.at(strike.t)
+    w, u = before["coupler.tip"].velocity[0], before["A"].velocity[0]
+    # of one freedom: T = M u^2 / 2 and w = G u, so that w^2 / (2 G M^-1 G) is all of T
+    assert strike.energy_lost == pytest.approx((1 - e * e) * before.energy.kinetic, rel=1e-8)
+    assert strike.impulse == pytest.approx((1 + e) * 2 * before.energy.kinetic / abs(w), rel=1e-8)
+    # of each link the momentum p = m v changes by - (1 + e) p: of pins alone on the crank and the rocker
+    for link, pins in (("crank", {"A": 1, "B": -1}), ("rocker", {"D": 1, "C": 1})):
+        momentum = m.link(link).mass * before.link(link).center_velocity
+        got = sum(sign * strike.impulses[name][3:5] for name, sign in pins.items())
+        np.testing.assert_allclose(got, -(1 + e) * momentum[:2], atol=1e-8)
+    free = np.isnan(strike.impulses["A"])
+    assert free.tolist() == ([False] * 6 if planar else [True, True, False, False, False, True])
+    assert np.sign(u) == -1
+
+
+def test_bad_contacts_are_named():
+    for more, words in (
+        ({"restitution": 1.5}, "restitution = 1.5: expected a number from 0 to 1"),
+        ({"restitution": 0.5, "closed": "form"}, "restitution: is for contacts"),
+        ({"gap": 0.1}, "gap = 0.1: the contact stays closed"),
+        ({"restitution": 0.5, "gap": -0.1}, "gap = -0.1"),
+    ):
+        with pytest.raises(mg.DeclarationError, match=words):
+            mg.Mechanism("k", pairs=[touching("K", "frame", "ball").replace(**more)])
+    with pytest.raises(mg.DeclarationError, match="restitution: is for contacts"):
+        mg.Mechanism("k", pairs=[mg.Pair("K", "R", "frame", "ball", point=(0, 0, 0), axis=Z, restitution=0.5)])
+
+
+LENGTH, MASS = 0.5, 2.0
+
+
+def rod(angle, mu, restitution=0.0, swapped=False, **more):
+    """A uniform rod of half length 0.5 whose lower end is on a floor with friction; inclined, in a vertical plane."""
+    center = (LENGTH * np.cos(angle), LENGTH * np.sin(angle), 0)
+    links = [mg.Link("frame"), mg.Link("rod", mass=MASS, center=center, inertia=MASS * LENGTH**2 / 3 * np.eye(3))]
+    contact = touching("K", "frame", "rod", planar=True, restitution=restitution, **more)
+    loads = [mg.Gravity((0, -G, 0)), mg.Friction("K", mu=mu)]
+    return mg.Mechanism("rod", links, [contact], loads=loads, planar=True)
+
+
+def law(angle, mu, sense, w):
+    """Normal acceleration b + p N / m of the lower end."""
+    c, s = np.cos(angle), np.sin(angle)
+    return LENGTH * s * w * w - G, 1 + 3 * c * (c + sense * mu * s)
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+@pytest.mark.parametrize(("angle", "mu", "w"), [(0.6, 0.3, 0.0), (1.0, 1.2, 1.5), (1.4, 1.3, -2.0)])
+def test_a_sliding_rod_has_one_normal_force(angle, mu, sense, w):
+    """N = -b m / p where p > 0; friction mu N against the sliding."""
+    r = mg.respond(rod(angle, mu), [0.0, 0.001], rates={"K.Ts": 1.0 * sense, "K.Rz": w}, rtol=1e-9, atol=1e-11)
+    b, p = law(angle, mu, sense, w)
+    assert r["K"].force[0, 1] == pytest.approx(-MASS * b / p, rel=1e-10)
+    assert r["K"].friction[0, 0] == pytest.approx(sense * mu * MASS * b / p, rel=1e-10)
+
+
+def test_a_sliding_rod_has_no_normal_force_or_two():
+    """Painleve: p < 0 for some angle from mu = 4/3 on, where tan(2 angle) = -mu; none for b < 0, two for b > 0."""
+    for mu in (4 / 3 - 1e-3, 4 / 3 + 1e-3):
+        angle = 0.5 * (np.pi - np.arctan(mu))
+        b, p = law(angle, mu, -1, 0.0)
+        still, turning = ({"K.Ts": -1.0, "K.Rz": w} for w in (0.0, 8.0))
+        if p > 0:
+            r = mg.respond(rod(angle, mu), [0.0, 1e-6], rates=still)
+            assert r["K"].force[0, 1] == pytest.approx(-MASS * b / p, rel=1e-9)
+            continue
+        with pytest.raises(
+            mg.FrictionError, match=r"contact K at t = 0: .* b = -9.81, p = -0.000[0-9]*: no N >= 0"
+        ) as error:
+            mg.respond(rod(angle, mu), (0, 0.1), rates=still)
+        assert error.value.kind == "no finite force"
+        with pytest.raises(mg.FrictionError, match="may press with N = -b / p, or leave") as error:
+            mg.respond(rod(angle, mu), (0, 0.1), rates=turning)
+        assert error.value.kind == "friction not determined"
+
+
+@pytest.mark.parametrize(("mu", "speed"), [(0.05, 4.0), (0.6, 1.5)])
+@pytest.mark.parametrize("e", [0.0, 0.5])
+def test_a_rod_lands_with_friction(mu, speed, e):
+    """Poisson's law: the end slips through compression and expansion, or sticks in both; energy is lost."""
+    angle = 1.0
+    m = rod(angle, mu, e, gap=0.1)
+    r = mg.respond(m, (0, 0.2), rates={"K.Ts": speed}, rtol=1e-10, atol=1e-12)
+    strike = r.events[0]
+    assert strike.t == pytest.approx(np.sqrt(0.2 / G), abs=1e-8)
+    c, s = np.cos(angle), np.sin(angle)
+    # rates of the end for impulses along x and y: 1/m + r x (r x) / J with r = -L (c, s)
+    D = np.array([[1 + 3 * s * s, -3 * s * c], [-3 * s * c, 1 + 3 * c * c]]) / MASS
+    w = np.array([speed, -G * strike.t])
+    if mu < 0.5:
+        normal = -(1 + e) * w[1] / (D[1, 1] - mu * D[1, 0])
+        along = -mu * normal
+        assert w[0] + D[0] @ [along, normal] > 0.0
+    else:
+        first = np.linalg.solve(D, -w)
+        normal, along = (1 + e) * first[1], first[0] - D[0, 1] / D[0, 0] * e * first[1]
+        assert abs(first[0]) < mu * first[1]
+        assert D[1, 0] ** 2 / D[0, 0] ** 2 < mu**2
+    np.testing.assert_allclose(strike.impulses["K"][3:5], [along, normal], rtol=1e-7)
+    assert strike.impulse == pytest.approx(normal, rel=1e-7)
+    assert strike.energy_lost > 0
+    assert np.abs(r.energy.balance).max() < 1e-8
+
+
+def test_a_block_slides_on_a_floor_that_only_holds_it_up():
+    """A point mass on the floor, which slides v^2 / (2 mu g) far and stays."""
+    links = [mg.Link("frame"), body("block", 2.0)]
+    loads = [mg.Gravity((0, -G, 0)), mg.Friction("K", mu=0.25)]
+    m = mg.Mechanism(
+        "floor", links, [touching("K", "frame", "block", planar=True, restitution=0.0)], loads=loads, planar=True
+    )
+    r = mg.respond(m, [0.0, 0.1, 1.0], rates={"K.Ts": 1.0}, rtol=1e-10, atol=1e-12)
+    stop = 1.0 / (0.25 * G)
+    assert str(r.events[-1]).startswith("K sticks")
+    assert r.events[-1].t == pytest.approx(stop, abs=1e-9)
+    assert r["K"].position[-1, 0] == pytest.approx(0.5 * stop, abs=1e-9)
+    assert r["K"].friction[1, 0] == pytest.approx(-0.25 * 2.0 * G, rel=1e-10)
+    assert r["K"].friction[2, 0] == pytest.approx(0.0, abs=1e-10)
+    assert r.energy.friction[-1] == pytest.approx(1.0, rel=1e-9)
