@@ -12,7 +12,7 @@ import mechgraph as mg
 
 X, Y, Z = np.eye(3)
 G = 9.81
-FINE = {"rtol": 1e-9, "atol": 1e-11}
+FINE = {"rtol": 1e-10, "atol": 1e-12}
 
 
 def block(mass=2.0, inertia=0.01):

@@ -794,7 +794,7 @@ def _occurrences(
         at = np.array([met])
         t, x, dq = met, course.positions(at)[:, 0], course.rates(at)[0, :, 0]
         dq, lost, first, found = stops.after(t, x, dq)
-        it.done = it.done + lost * np.array([1.0, 0.0, -1.0])
+        it.done = it.done + lost
         yield from found
 
 

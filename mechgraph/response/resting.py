@@ -378,15 +378,15 @@ class Rests:
 
     # --- at an event -----------------------------------------------------------------------------------------------------
 
-    def after(self, t: float, x: Array, dq: Array) -> tuple[Array, float, float, list[Occurrence]]:
+    def after(self, t: float, x: Array, dq: Array) -> tuple[Array, Array, float, list[Occurrence]]:
         """Rates after a time ``t`` at which something is met or left; ``holding`` is what holds freedoms afterwards.
 
-        Also the energy that impacts take away, the longest first step from here, and what happened.
+        Also what impacts take, none of friction, and the work done ``(3,)``, the longest first step from here, and what happened.
         """
         closed = tuple(one for one in self.limits if one.sign * (x[one.row] - one.value) <= RESPONSE.touching)
         was, after, first = self.holding, dq, np.inf
         blow: dict[_Limit, dict[str, Any]] = {}
-        lost = 0.0
+        lost = spent = 0.0
         resting: tuple[_Limit, ...] = ()
         pressing: tuple[_Limit, ...] = ()
         if closed:
@@ -405,9 +405,9 @@ class Rests:
             resting = tuple(closed[i] for i in np.flatnonzero(free.still & free.moves))
             hops = 2.0 * free.w / np.where((w_rate < 0.0) & ~free.still & (free.w > 0.0), -w_rate, np.inf)
             first = float(hops[hops > 0.0].min(initial=np.inf)) / 2
-            hit = (before.w < 0.0) & ~before.still
+            hit, spent = (before.w < 0.0) & ~before.still, before.spent(p, after)
             if hit.any():
-                blow = {closed[i]: before.blow(i, p, lost) for i in np.flatnonzero(hit).tolist()}
+                blow = {closed[i]: before.blow(i, p, spent) for i in np.flatnonzero(hit).tolist()}
         if self.rough:
             self.holding, after = self._settled(t, x, after, resting)
         else:
@@ -419,7 +419,7 @@ class Rests:
             if one in blow or (one in now and one not in was.limits)
         ]
         found += [one.occurrence(t, False) for one in was.limits if one not in now]
-        return after, lost, first, [*found, *self._rubbing(t, was)]
+        return after, np.array([spent, 0.0, -lost]), first, [*found, *self._rubbing(t, was)]
 
     def _rough_blow(self, before: _Free) -> tuple[int, float] | None:
         """The freedom in which a contact that is struck rubs, and its coefficient; None where what is struck is smooth."""
@@ -690,13 +690,17 @@ class _Free:
         """Rates after a ``change (n,)`` of the independent ones, and the energy lost, with the impulses in the freedoms."""
         here, after = self.here, self.dq + self.Z @ change
         before, behind = (float(kinetic_energy(here, here.link_twists(dq[:, None]))[0]) for dq in (self.dq, after))
-        if behind > before * (1.0 + RESPONSE.lost_energy):
+        if self.spent(efforts, after) < -RESPONSE.lost_energy * before:
             raise Stopped(
                 "an impact would gain energy: contacts that are closed beside it lead it back; give them restitution=0"
             )
         return after, before - behind, efforts
 
-    def blow(self, i: int, impulses: Array, lost: float) -> dict[str, Any]:
+    def spent(self, impulses: Array, after: Array) -> float:
+        """The energy that ``impulses (F,)`` take: not what the kinetic energy loses where prescribed motions do work in the impact."""
+        return float(-0.5 * impulses @ (self.dq + after))
+
+    def blow(self, i: int, impulses: Array, spent: float) -> dict[str, Any]:
         """What an occurrence says of an impact with the ``impulses (F,)`` in freedoms, as limit ``i`` is struck; the user's units."""
         here, par = self.here, self.here.system.par
         efforts = impulses[:, None].copy()
@@ -712,7 +716,7 @@ class _Free:
         wrenches = zip(here.system.m.pairs, user_wrench(par, found).T, strict=True)
         return {
             "impulse": float(unit * self.sign[i] * impulses[self.columns[i]]),
-            "energy_lost": float(lost * par.L**2),
+            "energy_lost": float(spent * par.L**2),
             "impulses": {pair.name: wrench for pair, wrench in wrenches},
         }
 
