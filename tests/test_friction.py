@@ -120,6 +120,11 @@ def test_a_collar_lifted_beside_its_guide_jams() -> None:
         assert (error.value.kind, error.value.factor) == ("jams", pytest.approx(0.25 / mu, rel=1e-9))
         assert error.value.places == ("A",)
         assert moved(collar(mu), on_reach="flag").status == "jams"
+    one = mg.Motion([0.0, 0.0], velocity=[1.0, -1.0])
+    both = mg.solve(collar(0.3), {"D": one}, on_reach="flag")
+    assert both.status.tolist() == ["jams", "ok"]
+    assert abs(both.checks.equilibrium[1]) < 1e-12
+    assert abs(both.checks.power[1]) < 1e-12
 
 
 def test_a_guide_that_is_embraced_or_embraces() -> None:
@@ -515,3 +520,28 @@ def test_coefficients_that_fall_with_speed_and_vary_from_case_to_case() -> None:
         one = {name.partition(".")[2]: float(found.parameters[name][at]) for name in values}
         t = mg.solve(m, given, loads=[m.loads[0], mg.Friction("A", radius=RADIUS, **one)])
         assert np.allclose(found.outputs["T"][at], t["A"].effort, rtol=1e-12)
+
+
+def test_what_is_left_out_is_told() -> None:
+    """Moments that rub nothing, circles of great friction, and before any load what friction rests on."""
+    bent = moved(shaft(force(0, -W, (0, 0, 0.2))))
+    (note,) = bent.warnings
+    assert note.text.startswith("friction of A: a moment of up to 20 across the axis")
+    assert "rubs nothing" in bent.summary()
+    assert not moved(shaft(force(0, -W, (0, 0, 0.2)), length=0.1)).warnings
+    assert not moved(shaft(force(0, -W, (0, 0, 0)))).warnings
+    assert "4.4 %" not in moved(shaft(force(0, -W, (0, 0, 0)), mu=0.3)).summary()
+    (note,) = moved(shaft(force(0, -W, (0, 0, 0)), mu=0.4)).warnings
+    assert note.text == "friction of A: model='total' gives couples 7.7 % larger than the circle; say which is meant"
+    assert not moved(shaft(force(0, -W, (0, 0, 0)), mu=0.4, model="total")).warnings
+    doors = [mg.Pair(k, "R", "frame", "door", point=(0, 0, z), axis=Z) for k, z in (("A", 0.0), ("B", 1.0))]
+    m = mg.Mechanism("door", pairs=doors, drives=["A"])
+    for more, read in (
+        ({}, "Fx, Fy, not"),
+        ({"thrust_radius": 0.01}, "Fx, Fy, Fz, not"),
+        ({"length": 0.01}, "Fx, Fy, Mx, My, not"),
+    ):
+        report = mg.check(m.replace(loads=[mg.Friction("B", mu=0.1, radius=0.01, **more)]))
+        assert report.friction[0].startswith(f"friction of 'B' rests on {read} unique")
+        assert report.friction[0] in " ".join(report.text(full=True).split())
+    assert not mg.check(shaft()).friction

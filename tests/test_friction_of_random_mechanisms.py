@@ -44,7 +44,8 @@ def test_power_in_is_power_out_and_what_is_lost() -> None:
         m = solvable(seed, loops=1)
         if m is None:
             continue
-        loads = [*(load for load in m.loads if load.by_position), *rough(m, np.random.default_rng(seed))]
+        m = m.replace(loads=[load for load in m.loads if load.in_freedom is None])
+        loads = [*m.loads, *rough(m, np.random.default_rng(seed))]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", mg.MechgraphWarning)
             s = mg.solve(m, motions(m, seed, np.array([0.3, 0.6])), loads=loads, on_reach="flag")

@@ -40,6 +40,7 @@ from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import independent_rows
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import RANKS
+from mechgraph.model.friction import rests_on, rubbing_loads
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import wrong
 
@@ -524,6 +525,31 @@ class Facts(GraphFacts):
         """
         g = self.geometry
         return misfit_sums(self.mechanism, self.self_stresses, float(g.system.par.L)) if g else ()
+
+    @property
+    def friction(self) -> tuple[str, ...]:
+        """Friction among the loads that rests on reactions that are not unique, one sentence each.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> hinges = [
+        ...     mg.Pair(k, "R", "frame", "door", point=(0, 0, z), axis=(0, 0, 1)) for k, z in (("A", 0), ("B", 1))
+        ... ]
+        >>> rubs = mg.Friction("B", mu=0.1, radius=0.01, thrust_radius=0.01)
+        >>> print(mg.check(mg.Mechanism("door", pairs=hinges, drives=["A"], loads=[rubs])).friction[0])
+        friction of 'B' rests on Fz, not unique: not determined where loads add to it; change a pair type, or solve with redundant='elastic'
+        """
+        out = []
+        for load in rubbing_loads(self.mechanism, self.mechanism.loads):
+            known = self.unique.get(load.of, {})
+            if loose := [name for name in rests_on(self.mechanism, load) if not known.get(name, True)]:
+                subject, it = load.where.removesuffix(": "), ("it", "them")[len(loose) > 1]
+                out.append(
+                    f"{subject} rests on {', '.join(loose)}, not unique: not determined where loads add to {it}; change a pair type, or "
+                    "solve with redundant='elastic'"
+                )
+        return tuple(out)
 
     @property
     def determinate(self) -> bool:

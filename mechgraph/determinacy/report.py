@@ -156,6 +156,7 @@ def _reactions(r: Facts) -> Iterator[Block]:
     yield Table(("pair", "type", "unique", "not unique"), tuple(lines))
     if not all(ok for components in r.unique.values() for ok in components.values()):
         yield Paragraph(NOT_UNIQUE)
+    yield from _listed(r.friction)
     rows = {p.type.symbol: p.type for p in r.mechanism.pairs if p.type.reactions and p.type.directed}
     if rows:
         told = (f"{symbol}: {component_words(row, row.component_names)}" for symbol, row in rows.items())

@@ -196,7 +196,7 @@ def forces_of_block(
     first = pretensioned(here, METHODS[task.method](ForceProblem(here, loads, given, task.driven, f)), f)
     lines = ContactLines(here)
     found, flank = _least_on_flanks(here, on_their_flanks(here, first, lines), f, task, lines)
-    dry = rubbing_loads(here.system.m, task.loads, site.number)
+    dry = [load.with_numbers(site.number) for load in rubbing_loads(here.system.m, task.loads)]
     ranges: Array | None = None
     if rubs is not None:
         found = replace(found, reactions=found.reactions - rubs.taken)

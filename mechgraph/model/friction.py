@@ -229,19 +229,26 @@ def coupling_of(m: Any, load: Any) -> Any:
     return next((c for c in m.couplings if load.of in (c.name, getattr(c, "belt", None))), None)
 
 
-def rubbing_loads(m: Any, loads: Iterable[Load], number: Callable[[Any], Any]) -> list[Friction]:
-    """The friction among loads that exerts forces, which belts do not, with the numbers of every position."""
-    out = []
-    for load in loads:
-        if isinstance(load, Friction) and "wrap" not in getattr(coupling_of(m, load), "rubs", ()):
-            out.append(load.with_numbers(number))
-    return out
+def rubbing_loads(m: Any, loads: Iterable[Load]) -> list[Friction]:
+    """The friction among loads that exerts forces, which belts do not."""
+    dry = [load for load in loads if isinstance(load, Friction)]
+    return [load for load in dry if "wrap" not in getattr(coupling_of(m, load), "rubs", ())]
 
 
 def pairs_of(m: Any, load: Friction) -> list[int]:
     """Places of the pair that rubs, or of those on the way between gears."""
     coupling = coupling_of(m, load)
     return [m.place_of_pair(load.of)] if coupling is None else [step.pair for step in coupling.steps]
+
+
+def rests_on(m: Any, load: Friction) -> tuple[str, ...]:
+    """Names of the reaction components that friction follows: forces, with a ``length`` moments too; of gears their effort."""
+    if load.of not in m.pair_index:
+        return ("effort",)
+    row = m.pair(load.of).type
+    axial = "Fz" if row.f == 1 and rubs_as_journal(row) and load.thrust_radius is None else ""
+    moments = load.length is not None or load.width is not None or rubs_as_plane(row)
+    return tuple(c.name for c in row.reactions or () if (moments if c.is_couple else c.name != axial))
 
 
 def rubs_as_journal(row: PairType) -> bool:

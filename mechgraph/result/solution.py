@@ -53,9 +53,11 @@ from mechgraph.result.values import (
 from mechgraph.result.views import (
     BeltResult,
     CouplingResult,
+    FrictionNote,
     LinkResult,
     PairResult,
     PositionLabels,
+    friction_notes,
     losses,
     misfits_left_out,
 )
@@ -733,12 +735,13 @@ class Solution(Shown):
         )
 
     @property
-    def warnings(self) -> tuple[Doubt | PassedCrossing | Inaccurate, ...]:
+    def warnings(self) -> tuple[Doubt | PassedCrossing | Inaccurate | FrictionNote, ...]:
         """What makes reactions doubtful (``doubts``); crossings of branches that were passed, with place, miss and the other branches;
-        rates and forces that rounding spoils (see ``checks.accuracy``).
+        rates and forces that rounding spoils (see ``checks.accuracy``); moments that rub nothing, friction circles that differ from the
+        whole force by more than 5 %, belts that slip.
         """
         worst = [Inaccurate(*one) for one in _worst(self.checks.accuracy, PATH.inaccurate)]
-        return (*self.doubts, *self._values.passed, *worst)
+        return (*self.doubts, *self._values.passed, *worst, *friction_notes(self._values))
 
     def document(self, asked: bool = False) -> Document:
         """Return what ``print`` shows as a document.

@@ -29,7 +29,7 @@ from mechgraph.result.values import (
     number,
     with_unit,
 )
-from mechgraph.result.views import UNASKED, PositionLabels, losses, misfits_left_out
+from mechgraph.result.views import UNASKED, PositionLabels, friction_notes, losses, misfits_left_out
 
 
 class Greatest:
@@ -376,6 +376,7 @@ def summary(values: Trajectory, asked: bool = True, more_checks: tuple[tuple[str
         size = len(view.m.pairs) * view.status.size
         blocks += view.forces() if asked or size <= UNASKED else [Paragraph(view.left_out(size))]
         blocks += view.passive()
+    blocks += view.friction_notes()
     blocks += view.crossings()
     if view.solved.any():
         blocks += view.checks(more_checks)
@@ -667,6 +668,12 @@ class _SummaryText(PositionLabels):
         if items:
             yield Heading("Passive freedoms", 2)
             yield Bullets(_shortened(items))
+
+    def friction_notes(self) -> Iterator[Block]:
+        """What friction leaves out."""
+        if notes := _shortened([str(note) for note in friction_notes(self.values)]):
+            yield Heading("Friction left out", 2)
+            yield Bullets(notes)
 
     def crossings(self) -> Iterator[Block]:
         """The crossings of branches that the path was led over."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -14,11 +15,11 @@ from mechgraph.fields import vector_fault
 from mechgraph.maths.se3 import Array
 from mechgraph.model.belts import BeltCourse, BeltDrive
 from mechgraph.model.couplings import Belt
-from mechgraph.model.friction import Friction
+from mechgraph.model.friction import WAYS, Friction, coupling_of
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.pairs.pair_type import PairType
-from mechgraph.quantities import ByName, is_numeric, unit_of
+from mechgraph.quantities import MOMENT, ByName, is_numeric, unit_of
 from mechgraph.result.trajectory import Trajectory
 from mechgraph.result.values import (
     OK,
@@ -467,6 +468,53 @@ def losses(values: Trajectory) -> dict[str, Array]:
     """Power lost in what rubs, by name, ``(...)``."""
     dry = {i: load.of for i, load in enumerate(values.loads) if isinstance(load, Friction)}
     return {name: -values.load(i).power for i, name in dry.items() if name in values.rubbing}
+
+
+@dataclass(frozen=True)
+class FrictionNote:
+    """What friction leaves out or bears badly at a pair or belt ``name``, in a sentence."""
+
+    name: str
+    text: str
+
+    def __str__(self) -> str:
+        return self.text
+
+
+def friction_notes(values: Trajectory) -> Iterator[FrictionNote]:
+    """Moments that rub nothing, coefficients at which the circle and the whole force differ, belts that slip."""
+    m = values.whole
+    for load in (load for load in values.loads if isinstance(load, Friction) and values.has_forces):
+        if load.of in m.pair_index:
+            yield from _notes_of_pair(values, load.with_numbers(values.number))
+        elif "wrap" in (belt := coupling_of(m, load)).rubs:
+            whole = isinstance(belt, BeltDrive)
+            of = BeltResult(values, load.of) if whole else CouplingResult(values, m.couplings.index(belt))
+            least = np.nanmin(
+                [*of.slip_margin.values()] if isinstance(of, BeltResult) else of.slip_margin, initial=np.inf
+            )
+            if least < 0:
+                why = f"belt {load.of} slips (slip_margin down to {least:.3g}): its strands differ by more than e^(mu wrap)"
+                yield FrictionNote(load.of, why)
+
+
+def _notes_of_pair(values: Trajectory, load: Friction) -> Iterator[FrictionNote]:
+    where, result = f"friction of {load.of}: ", PairResult(values, values.whole.pair_index[load.of])
+    row = values.whole.pair(load.of).type
+    more = 100 * float(np.max(np.hypot(1.0, load.coefficient_at_rest)) - 1)
+    if load.model == "circle" and load.radius is not None and not row.takes_pitch and more > 5:
+        yield FrictionNote(
+            load.of, f"{where}model='total' gives couples {more:.2g} % larger than the circle; say which is meant"
+        )
+    borne = [c.name for c in row.reactions or () if c.is_couple and not (load.width is not None and c.name == "Mz")]
+    if load.length is None and borne and any("length" in way.takes and way.of(row) for way in WAYS):
+        moment = np.sqrt(sum(np.nan_to_num(result.components[name]) ** 2 for name in borne))
+        # a bearing as long as its diameter bears it by more than its force; of a guide any moment that is no rounding
+        arm = 1e-6 * values.radius if load.radius is None else load.radius
+        if (moment > arm * np.nan_to_num(result.magnitude)).any():
+            most = f"{moment.max():.4g} {unit_of(values.mechanism.units, MOMENT)}".rstrip()
+            why = f"{where}a moment of up to {most} across the axis rubs nothing; give length=, the distance at which it is borne"
+            yield FrictionNote(load.of, why)
 
 
 def friction_of(values: Trajectory, name: str) -> Friction:
