@@ -321,15 +321,21 @@ def _relieved(wrenches: Wrenches, lines: ContactLines, flank: Array) -> Wrenches
 
 
 def _least(
-    here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: ForceTask, lines: ContactLines, flank: Array
+    here: Configuration,
+    wrenches: Wrenches,
+    f: FactoredClosure,
+    task: ForceTask,
+    lines: ContactLines,
+    flank: Array,
+    known: Stress | None = None,
 ) -> _FreeForces:
-    """Reactions and efforts of least norm; where self-stresses are random ones only if that is asked for."""
+    """Reactions and efforts of least norm; where self-stresses are random ones only if that is asked for. They may be ``known``."""
     totals, multipliers = wrenches.totals, wrenches.multipliers
     if task.redundant == "elastic" and not f.complete:
         every = f.self_stresses(every=True)
         others = -every[here.system.graph.loop_rows :]
         wrenches = replace(wrenches, stress=here.pair_wrenches(every), multiplier_stress=others)
-    stress = _stress(here, wrenches, f, task)
+    stress = known or _stress(here, wrenches, f, task)
     s = stress.wrenches.shape[2]
     if s and not f.complete and task.redundant == "minimum_norm":
         x = _least_multipliers(here, totals, multipliers, f, _acting(here, task), lines, flank)
@@ -436,14 +442,14 @@ class _FrictionProblem:
         loads = loads if self.yields is None else loads + self.yields(efforts)
         problem = ForceProblem(here, loads, efforts, self.task.driven, self.f)
         wrenches = pretensioned(here, METHODS[self.task.method](problem), self.f, part=0.0)
-        one = self._least(wrenches)
+        one = self._least(wrenches, None if self.task.redundant == "elastic" else self.found.stress)
         return {name: getattr(one, name) for name in ("reactions", "efforts", "multipliers", "coupled")}
 
-    def _least(self, wrenches: Wrenches) -> _FreeForces:
-        """The forces of total wrenches on the first flanks, on those that act."""
+    def _least(self, wrenches: Wrenches, known: Stress | None = None) -> _FreeForces:
+        """The forces of total wrenches on the first flanks, on those that act; their self-stresses may be known."""
         here, lines, flank = self.here, self.lines, self.flank
         wrenches = _relieved(on_settled_flanks(here, wrenches, lines), lines, flank) if lines else wrenches
-        return _least(here, wrenches, self.f, self.task, lines, flank)
+        return _least(here, wrenches, self.f, self.task, lines, flank, known)
 
     def forces(self, dq: Array, at_rest: bool = False) -> tuple[_FreeForces, Rubbed, Array]:
         """Forces with the friction of a motion, that friction, and the flanks ``(n, T)`` on which teeth then touch: friction may turn the
