@@ -1,6 +1,7 @@
 """House rules that no linter knows."""
 
 import ast
+import functools
 import re
 import shutil
 import subprocess
@@ -9,6 +10,8 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
+
+parsed = functools.cache(ast.parse)
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "mechgraph"
@@ -104,7 +107,7 @@ def test_nothing_prints_but_the_command_line() -> None:
     for file in package_files():
         if file.parent == PACKAGE and file.name in MAY_PRINT:
             continue
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        for node in ast.walk(parsed(file.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "print":
                 found.append(f"{name_of(file)}:{node.lineno}")
     assert not found
@@ -161,9 +164,7 @@ def lines_beside_docstrings(text: str) -> int:
     """Lines of a module, but for its docstrings: they are the reference, and long where a name takes much."""
     nodes = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
     bodies = [
-        node.body
-        for node in ast.walk(ast.parse(text))
-        if isinstance(node, nodes) and ast.get_docstring(node) is not None
+        node.body for node in ast.walk(parsed(text)) if isinstance(node, nodes) and ast.get_docstring(node) is not None
     ]
     return len(text.splitlines()) - sum((body[0].end_lineno or 0) - body[0].lineno + 1 for body in bodies)
 
@@ -185,7 +186,7 @@ def test_a_bound_has_one_value() -> None:
     """The name of a number says what it bounds, so that no name stands for two numbers."""
     found: dict[str, dict[str, str]] = {}
     for path in package_files():
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        for node in parsed(path.read_text(encoding="utf-8")).body:
             targets = node.targets if isinstance(node, ast.Assign) else []
             for target, value in [pair for t in targets for pair in parts_of(t, node.value)]:
                 if isinstance(target, ast.Name) and target.id.isupper() and not any(map(is_text, ast.walk(value))):

@@ -5,6 +5,7 @@ has a layer.
 """
 
 import ast
+import functools
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,6 +15,8 @@ import networkx as nx
 import pytest
 
 from mechgraph import methods
+
+parsed = functools.cache(ast.parse)
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "mechgraph"
@@ -56,7 +59,7 @@ def import_statements(node: ast.AST) -> Iterator[ast.Import | ast.ImportFrom]:
 
 def imported_layers(source: str, package: list[str]) -> Iterator[tuple[int, str]]:
     """(line, layer) of each import of the package, in a module that lies in the dotted `package`."""
-    for statement in import_statements(ast.parse(source)):
+    for statement in import_statements(parsed(source)):
         if isinstance(statement, ast.Import):
             modules = [alias.name for alias in statement.names]
         else:
@@ -124,7 +127,7 @@ def circles(sources: dict[str, str]) -> list[list[str]]:
     """Modules (dotted name -> source) that import each other in circles, imports for type checking included."""
     graph: nx.DiGraph[str] = nx.DiGraph()
     for name, source in sources.items():
-        for statement in ast.walk(ast.parse(source)):
+        for statement in ast.walk(parsed(source)):
             if isinstance(statement, ast.Import):
                 targets = [alias.name for alias in statement.names]
             elif isinstance(statement, ast.ImportFrom):
@@ -171,7 +174,7 @@ def test_the_check_finds_a_circle(source: str) -> None:
 
 def names_of_modules(source: str) -> list[str]:
     """Texts that name a module of the package: what no check of import statements sees."""
-    texts = [node.value for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Constant)]
+    texts = [node.value for node in ast.walk(parsed(source)) if isinstance(node, ast.Constant)]
     return [text for text in texts if text in MODULES]
 
 
@@ -188,7 +191,7 @@ def test_methods_that_rooms_above_answer_are_thin() -> None:
     """The top finds just the names that classes of lower rooms ask for, each in a method that does nothing else."""
     asked = []
     for file in FILES:
-        for method in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        for method in ast.walk(parsed(file.read_text(encoding="utf-8"))):
             if isinstance(method, ast.FunctionDef) and file.stem != "methods":
                 calls = [
                     node
