@@ -357,6 +357,10 @@ class ByName(dict[str, Any]):
     def __missing__(self, name: object) -> Any:
         raise DeclarationError(self.subject, [unknown(self.what, name, self)])
 
+    def __repr__(self) -> str:
+        with np.printoptions(threshold=8, edgeitems=2):
+            return "{" + ", ".join(f"{name!r}: {value}" for name, value in self.items()) + "}"
+
 
 P = ParamSpec("P")
 R = TypeVar("R")
