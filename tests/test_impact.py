@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import mechgraph as mg
 
@@ -188,6 +189,59 @@ def test_a_sliding_rod_has_no_normal_force_or_two():
         with pytest.raises(mg.FrictionError, match="may press with N = -b / p, or leave") as error:
             mg.respond(rod(angle, mu), (0, 0.1), rates=turning)
         assert error.value.kind == "friction not determined"
+
+
+@pytest.mark.parametrize(("w", "opens"), [(4.5, False), (5.2, True)])
+def test_a_rod_that_slides_into_painleves_region_is_not_followed_there(w, opens):
+    """It leaves the floor where b comes to zero first; where p does, N grows without bound and the motion ends, by name.
+
+    No N = -b / p of p < 0 is returned.
+    """
+    angle, mu, v = 0.79, 1.6, 0.8
+
+    def rates(t, y):
+        """Of angle, its rate, and the speed of the end to the left."""
+        (turned, w, _), (c, s) = y, (np.cos(y[0]), np.sin(y[0]))
+        b, p = law(turned, mu, -1, w)
+        a = 3 / LENGTH * (c - mu * s) * b / p
+        return [w, a, mu * b / p - LENGTH * (s * a + c * w * w)]
+
+    ends = [lambda t, y: law(y[0], mu, -1, y[1])[1] - 1e-9, lambda t, y: law(y[0], mu, -1, y[1])[0]]
+    for one in ends:
+        one.terminal = True
+    found = solve_ivp(rates, (0, 0.1), [angle, w, v], method="DOP853", rtol=1e-11, atol=1e-12, events=ends)
+    assert len(found.t_events[opens])
+    assert found.y[2, -1] > 0.1
+    m, start = rod(angle, mu), {"K.Ts": -v, "K.Rz": w}
+    if opens:
+        r = mg.respond(m, (0, 0.006), rates=start, rtol=1e-9, atol=1e-11)
+        assert str(r.events[-1]).startswith("K opens")
+        assert r.events[-1].t == pytest.approx(found.t[-1], abs=1e-7)
+        return
+    with pytest.raises(mg.FrictionError, match=r"friction of K at t = ") as error:
+        mg.respond(m, (0, 0.1), rates=start, rtol=1e-5, atol=1e-7)
+    assert error.value.kind in ("no finite force", "friction not determined")
+    assert error.value.solution.t[-1] == pytest.approx(found.t[-1], abs=1e-6)
+
+
+def test_a_rod_that_sticks_stays_where_slipping_would_have_no_normal_force():
+    """It turns about its end as a pendulum, while the friction that this takes is within the cone; p of slipping changes sign."""
+    angle, w, mu = 0.65, 1.85, 1.8
+    r = mg.respond(rod(angle, mu), np.linspace(0, 0.12, 4), rates={"K.Ts": 0.0, "K.Rz": w}, rtol=1e-8, atol=1e-10)
+    assert [str(one) for one in r.events[1:]] == []
+
+    def turn(t, y):
+        return [y[1], -0.75 * G / LENGTH * np.cos(y[0])]
+
+    turned, rate = solve_ivp(turn, (0, 0.12), [angle, w], t_eval=r.t, rtol=1e-11, atol=1e-12).y
+    np.testing.assert_allclose(r["K"].velocity[:, -1], rate, atol=1e-8)
+    assert (np.diff(np.sign([law(one, mu, -1, 0.0)[1] for one in turned])) != 0).any()
+    c, s = np.cos(turned), np.sin(turned)
+    # of the center, L (cos, sin): the forces are m (a + g)
+    along, up = (-0.75 * G * c * (-s) - LENGTH * rate**2 * c), (G - 0.75 * G * c * c - LENGTH * rate**2 * s)
+    np.testing.assert_allclose(r["K"].force[:, 1], MASS * up, rtol=1e-7)
+    np.testing.assert_allclose(r["K"].friction[:, 0], MASS * along, rtol=1e-7)
+    assert (np.abs(along) < mu * up).all()
 
 
 @pytest.mark.parametrize(("mu", "speed"), [(0.05, 4.0), (0.6, 1.5)])

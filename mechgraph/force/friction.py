@@ -352,7 +352,10 @@ def rubbed(here: Configuration, places: Sequence[Place], base: Array, unit: dict
     signed = [t for t, place in enumerate(places) if place.signed]
     C[:, starts[signed]] += B[:, signed]
     B[:, signed] = 0.0
-    n, V, outcome, factor, growth = _normals(a, B, C, starts)
+    # what presses one way alone has passed infinity while friction grew: nothing holds it up, or it is two-valued
+    over = np.linalg.det(np.eye(len(a)) - np.moveaxis(C, -1, 0)) <= 0.0 if signed else np.zeros(T, dtype=bool)
+    n, V, outcome, factor, growth = _normals(a, B, np.where(over, 0.0, C), starts)
+    outcome = np.where(over, np.where((V[starts[signed]] > 0.0).any(axis=0), 2, 3), outcome)
     n[signed] = V[starts[signed]]
     for t, place in enumerate(places):
         loose = np.einsum("dct,cst->dst", place.A, stress[:, place.reads])

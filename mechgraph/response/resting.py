@@ -371,7 +371,20 @@ class Rests:
         return -self._verge(holding, one, sense, t, motion.positions(t), motion.rates(t)[0])
 
     def _verge(self, holding: _Holding, one: _Stuck, sense: float, t: Array, x: Array, dq: Array) -> Array:
-        """The acceleration ``(T,)`` one way with which freedoms that stick would slip against friction at rest; not a bit where it jams."""
+        """The acceleration ``(T,)`` one way with which freedoms that stick would slip against friction at rest; not a bit where it jams.
+
+        Of a contact that opens, which may have no such state, the effort beyond that of friction, over its greatest one at rest.
+        """
+        pair = self.rough[one.column]
+        presses = [i for i, limit in enumerate(holding.limits) if limit.contact == pair]
+        if presses and len(one.columns) == 1:
+            found, _ = evaluated(holding.task(self.task), t, x, dq)
+            efforts = found.held[len(self.task.columns) :]
+            normal = holding.limits[presses[0]].sign * efforts[presses[0]]
+            rubs = [load for load in self.task.loads.dry if load.of == pair]
+            most = sum(load.coefficient_at_rest * (normal + load.preload / self.task.system.par.L) for load in rubs)
+            beyond = -sense * efforts[len(holding.limits) + holding.stuck.index(one)] - most
+            return np.asarray(beyond / (np.abs(efforts).sum(axis=0) + 1e-300))
         task = holding.slipping(one, sense).task(self.task, [self.rough[column] for column in one.columns])
         found, _ = evaluated(task, t, x, dq)
         return np.nan_to_num(sense * one.signs[0] * found.rates.ddq[one.column], nan=-np.inf)
