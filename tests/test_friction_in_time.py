@@ -23,7 +23,10 @@ def slide(*loads, mass=2.0, swapped=False, planar=False, along=X, **friction):
     """A block on a rough slide, on a spring of 40 N/m from a point to one side of it."""
     a, b = ("block", "frame") if swapped else ("frame", "block")
     pair = mg.Pair("A", "P", a, b, point=(0, 0, 0), axis=along)
-    spring, dry = mg.Spring(freedom="A", stiffness=40.0), mg.Friction("A", **{"mu": 0.1, **friction})
+    spring, dry = (
+        mg.Spring(freedom="A", stiffness=40.0),
+        mg.Friction("A", on="a" if swapped else "b", **{"mu": 0.1, **friction}),
+    )
     return mg.Mechanism(
         "slide",
         [mg.Link("frame"), block(mass)],
@@ -55,6 +58,16 @@ def test_a_mass_on_a_spring_loses_2_mu_N_over_k_a_half_swing(more):
     np.testing.assert_allclose(r["A"].friction[r.t > 3.6, 0], 40.0 * r["A"].position[-1, 0], rtol=1e-9)
     # 1.962 N against the motion while it slips: to the left at first
     np.testing.assert_allclose(r["A"].friction[:7, 0], 0.1 * 2.0 * G, rtol=1e-12)
+
+
+@pytest.mark.filterwarnings("ignore:.*rubs nothing")
+@pytest.mark.parametrize("on", ["b", "a"])
+def test_a_moment_that_rubs_nothing_is_that_about_the_marker_that_is_named(on):
+    """A block 0.5 beside the marker of its guide: about its own marker there is no moment, about that of the guide m g 0.5."""
+    loads = [mg.Gravity((0, -G, 0)), mg.Friction("A", mu=0.1, on=on)]
+    s = mg.solve(slide().replace(loads=loads, drives=["A"]), {"A": mg.Motion([0.0, 0.5])})
+    said = [str(one) for one in s.warnings if "rubs nothing" in str(one)]
+    assert (len(said) == 1 and "up to 9.81 " in said[0]) if on == "a" else not said
 
 
 def test_friction_of_nothing_is_no_friction():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from program import run
 from scipy.integrate import solve_ivp
 
 import mechgraph as mg
@@ -222,6 +223,17 @@ def test_a_rod_that_slides_into_painleves_region_is_not_followed_there(w, opens)
         mg.respond(m, (0, 0.1), rates=start, rtol=1e-5, atol=1e-7)
     assert error.value.kind in ("no finite force", "friction not determined")
     assert error.value.solution.t[-1] == pytest.approx(found.t[-1], abs=1e-6)
+
+
+def test_the_command_line_says_where_friction_has_no_force(tmp_path):
+    """That is no answer, exit status 1, as where a motion cannot be followed; friction of a pair that there is not is an input error."""
+    mg.save(rod(1.0, 0.0).replace(loads=[mg.Gravity((0, -G, 0))]), tmp_path / "rod.toml")
+    asked = ("respond", tmp_path / "rod.toml", "--for", "1ms", "--rate", "K.Ts=-3")
+    result = run(*asked, "--friction", "K:mu=1.6")
+    assert result.exit_code == 1
+    assert "no N >= 0 holds it up (Painleve)" in result.stderr
+    assert run(*asked, "--friction", "K:mu=0.3").exit_code == 0
+    assert run(*asked, "--friction", "Q:mu=0.3").exit_code == 2
 
 
 def test_a_rod_that_sticks_stays_where_slipping_would_have_no_normal_force():

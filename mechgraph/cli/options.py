@@ -271,7 +271,14 @@ def progress(what: str, end: float | None = None) -> Iterator[Callable[..., None
 DONE, NO_ANSWER, BAD_INPUT = 0, 1, 2
 """Exit statuses."""
 
-NO_ANSWERS = (mg.AssemblyError, mg.ReachError, mg.DeadPointError, mg.IndeterminateError, mg.ResponseError)
+NO_ANSWERS = (
+    mg.AssemblyError,
+    mg.ReachError,
+    mg.DeadPointError,
+    mg.IndeterminateError,
+    mg.ResponseError,
+    mg.FrictionError,
+)
 """Errors that say that the mechanism has no answer; every other error is bad input."""
 
 

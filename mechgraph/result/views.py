@@ -508,7 +508,16 @@ def _notes_of_pair(values: Trajectory, load: Friction) -> Iterator[FrictionNote]
         )
     borne = [c.name for c in row.reactions or () if c.is_couple and not (load.width is not None and c.name == "Mz")]
     if load.length is None and borne and any("length" in way.takes and way.of(row) for way in WAYS):
-        moment = np.sqrt(sum(np.nan_to_num(result.components[name]) ** 2 for name in borne))
+        parts = np.stack([np.nan_to_num(result.components[name]) for name in borne], axis=-1)
+        if load.on == "b":
+            # about marker B all but the couple along the axis, which is the same about both markers
+            along = 0.0 if "Mz" in borne else result.components.get("Mz", 0.0)
+            if row.takes_pitch:
+                along = values.whole.pair(load.of).pitch_per_radian * result.components["Fz"]
+            parts = np.sqrt(np.abs((np.nan_to_num(result.moment) ** 2).sum(axis=-1) - np.nan_to_num(along) ** 2))[
+                ..., None
+            ]
+        moment = np.linalg.norm(parts, axis=-1)
         # a bearing as long as its diameter bears it by more than its force; of a guide any moment that is no rounding
         arm = 1e-6 * values.radius if load.radius is None else load.radius
         if (moment > arm * np.nan_to_num(result.magnitude)).any():
