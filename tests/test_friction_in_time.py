@@ -13,6 +13,9 @@ import mechgraph as mg
 X, Y, Z = np.eye(3)
 G = 9.81
 FINE = {"rtol": 1e-10, "atol": 1e-12}
+SLOW = pytest.mark.slow
+UNBORNE = pytest.mark.filterwarnings("ignore:.*rubs nothing")
+"""Moments that friction without a length does not ask for."""
 
 
 def block(mass=2.0, inertia=0.01):
@@ -36,7 +39,9 @@ def slide(*loads, mass=2.0, swapped=False, planar=False, along=X, **friction):
     )
 
 
-@pytest.mark.parametrize("more", [{}, {"planar": True}, {"swapped": True}])
+@pytest.mark.parametrize(
+    "more", [{"planar": True}, *(pytest.param(more, marks=SLOW) for more in ({}, {"swapped": True}))]
+)
 def test_a_mass_on_a_spring_loses_2_mu_N_over_k_a_half_swing(more):
     """Turning points lie at 0.5 less so much each, half a period apart, until one is in the dead band, where it stays for good."""
     d, half = 0.1 * 2.0 * G / 40.0, np.pi / np.sqrt(20.0)
@@ -60,7 +65,7 @@ def test_a_mass_on_a_spring_loses_2_mu_N_over_k_a_half_swing(more):
     np.testing.assert_allclose(r["A"].friction[:7, 0], 0.1 * 2.0 * G, rtol=1e-12)
 
 
-@pytest.mark.filterwarnings("ignore:.*rubs nothing")
+@UNBORNE
 @pytest.mark.parametrize("on", ["b", "a"])
 def test_a_moment_that_rubs_nothing_is_that_about_the_marker_that_is_named(on):
     """A block 0.5 beside the marker of its guide: about its own marker there is no moment, about that of the guide m g 0.5."""
@@ -71,7 +76,7 @@ def test_a_moment_that_rubs_nothing_is_that_about_the_marker_that_is_named(on):
 
 
 def test_friction_of_nothing_is_no_friction():
-    r, free = (mg.respond(slide(mu=mu), [0, 0.5, 1.0], start={"A": 0.5}, **FINE) for mu in (1e-12, 0.0))
+    r, free = (mg.respond(slide(mu=mu), [0, 0.1, 0.3], start={"A": 0.5}, **FINE) for mu in (1e-12, 0.0))
     np.testing.assert_allclose(r["A"].position[:, 0], 0.5 * np.cos(np.sqrt(20.0) * r.t), atol=1e-9)
     np.testing.assert_allclose(free["A"].position[:, 0], 0.5 * np.cos(np.sqrt(20.0) * r.t), atol=1e-9)
 
@@ -151,14 +156,14 @@ def test_a_mass_on_a_belt_sticks_and_slips():
     """It sticks for 2 d / v and slips for 2 (pi - atan(d w / v)) / w, d = (static - mu) N / k."""
     mu, static, v, w = 0.1, 0.3, 0.25, 5.0
     m, motions = belt(mu, static, v)
-    r = mg.respond(m, (0, 6), motions=motions, **FINE)
+    r = mg.respond(m, (0, 2.9), motions=motions, **FINE)
     d = (static - mu) * G / 25.0
     names = [str(one).split(" at ")[0] for one in r.events]
     assert names[:4] == ["A slips", "A sticks", "A slips", "A sticks"]
     t = np.array([one.t for one in r.events])
     # from the middle on at first: static N / k at the speed of the belt
     assert t[0] == pytest.approx(static * G / 25.0 / v, abs=1e-7)
-    np.testing.assert_allclose((t[1:-1:2] - t[0:-2:2])[:3], 2 * (np.pi - np.arctan(d * w / v)) / w, atol=1e-7)
+    np.testing.assert_allclose((t[1:-1:2] - t[0:-2:2]), 2 * (np.pi - np.arctan(d * w / v)) / w, atol=1e-7)
     np.testing.assert_allclose(t[2] - t[1], 2 * d / v, atol=1e-7)
     assert np.abs(r.energy.balance).max() < 1e-7
 
@@ -223,6 +228,7 @@ def stack(push, *, low=0.1, up=0.3):
     return mg.Mechanism("stack", links, pairs, loads=loads)
 
 
+@UNBORNE
 @pytest.mark.parametrize(
     ("push", "lower", "upper"), [(2.0, 0.0, 0.0), (5.0, (5 - 0.3 * G) / 3, 0.0), (20.0, (20 - 0.6 * G) / 2, 0.3 * G)]
 )
@@ -235,6 +241,7 @@ def test_of_two_blocks_none_slips_or_one_or_both(push, lower, upper):
     assert r["B"].friction[-1, 0] == pytest.approx(upper if push > 6 else lower, abs=1e-10)
 
 
+@UNBORNE
 def test_two_blocks_come_to_rest_one_after_the_other():
     """The upper one slows by 0.3 g, while the lower one goes on, pulled as much forward as back; then both slow by 0.1 g."""
     r = mg.respond(stack(0.0), [0.0, 3.0], rates={"A": 1.0, "B": 2.0}, **FINE)
@@ -271,7 +278,8 @@ def slider_crank(planar):
     return mg.Mechanism("slider-crank", links, pairs, loads=[mg.Gravity((0, -G, 0)), *dry], planar=planar)
 
 
-@pytest.mark.parametrize("planar", [True, False])
+@UNBORNE
+@pytest.mark.parametrize("planar", [True, pytest.param(False, marks=SLOW)])
 def test_a_slider_crank_rough_everywhere_runs_out(planar):
     """Its accelerations are those at which `solve`, given the same motion with its friction, needs no effort at the crank."""
     m = slider_crank(planar)
@@ -295,8 +303,8 @@ def test_a_slider_crank_rough_everywhere_runs_out(planar):
 
 def test_units_change_nothing():
     m = slide().replace(units={"length": "m", "mass": "kg", "time": "s"})
-    r = mg.respond(m, [0.0, 0.5, 1.0], start={"A": 0.5}, **FINE)
-    q = mg.respond(m.to_units(length="mm", mass="g", time="ms"), [0.0, 500.0, 1000.0], start={"A": 500.0}, **FINE)
+    r = mg.respond(m, [0.0, 0.5, 0.75], start={"A": 0.5}, **FINE)
+    q = mg.respond(m.to_units(length="mm", mass="g", time="ms"), [0.0, 500.0, 750.0], start={"A": 500.0}, **FINE)
     np.testing.assert_allclose([one.t for one in q.events], [1000 * one.t for one in r.events], rtol=1e-9)
     np.testing.assert_allclose(q["A"].position, 1000 * r["A"].position, atol=1e-5)
     np.testing.assert_allclose(q.energy.friction, 1e3 * r.energy.friction, rtol=1e-7)
