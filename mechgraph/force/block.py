@@ -211,6 +211,8 @@ def forces_of_block(
         found = replace(found, coupled=found.coupled + rubs.teeth)
     own = np.zeros_like(found.efforts)
     own[task.driven] = (found.efforts - given - found.coupled)[task.driven]
+    if ranges is not None:
+        ranges = np.where(dq.any(axis=0), own[:, None], ranges)
     acting = own + given + found.coupled
     totals = here.pair_sums(here.E * acting) + found.reactions
     if lines:
@@ -506,17 +508,25 @@ class _FrictionProblem:
         return np.concatenate([forces["reactions"], self.lines.on_gears(forces["multipliers"], self.flank)], axis=1)
 
     def at_rest(self, dq: Array, given: Array) -> Array:
-        """Efforts of drives ``(F, 2, T)`` on the verge of motion to - and to +, the others held; infinite where it jams, NaN in motion."""
+        """Efforts of drives ``(F, 2, T)`` on the verge of motion to - and to +, the others held; infinite where it jams, NaN in motion, and
+        where what only pushes would have to pull on the verge, or be pressed without bound: it tips or lifts before that.
+        """
         out = np.full((len(dq), 2, self.here.T), np.nan)
         rest = ~dq.any(axis=0)
         if not rest.any():
             return out
-        moved = self.f.sensitivity()
+        m, moved, push = self.here.system.m, self.f.sensitivity(), seats_of(self.here.system).push
+        tips = any(m.pairs[k].closed == "force" for load in self.dry for k in pairs_of(m, load))
         for j, column in enumerate(self.task.driven):
             for side, sense in enumerate((-1.0, 1.0)):
                 found, rubs, _ = self.forces(sense * moving_rates(moved[:, j]), at_rest=True)
                 effort = (found.efforts - given - rubs.efforts - found.coupled)[column]
-                effort = np.where((rubs.outcome == 1) | (rubs.outcome == 2), sense * np.inf, effort)
+                jams = (rubs.outcome == 1) | (rubs.outcome == 2)
+                effort = np.where(jams, np.nan if tips else sense * np.inf, effort)
+                if push.any():
+                    values = component_values(PairFrames(self.here), found.reactions)
+                    pulls = (values[push] < -STRESSES.rounding * np.abs(values).max(axis=0)).any(axis=0)
+                    effort = np.where(pulls, np.nan, effort)
                 out[column, side, rest] = effort[rest]
         return out
 

@@ -163,9 +163,10 @@ class _Rubbing:
 
 
 def _touching(x: _Rubbing) -> Iterator[Place]:
-    """A point or line, on the side of link b's curve to which the force points."""
+    """A point, or the center of pressure of a line, on the side of link b's curve to which the force points."""
     c, r = x.frame(next(iter(x.row.reactions or ())).frame)[:, 3], _or_zero(x.pair.radius_b) / x.L
-    n, _ = _unit(x.w[3:])
+    n, size = _unit(x.w[3:])
+    c = c + cross(n, x.w[:3] - cross(c, x.w[3:])) / np.where(size > 0, size, np.inf)
     u, speed = _unit(x.twist[3:] + cross(x.twist[:3], c - r * n), x.rolls_below)
     mu = x.mu(speed)
     yield x.place(

@@ -389,13 +389,26 @@ def _rates(pair: Pair, q: Array, twist: Any, change: Any, *, at_rest: bool) -> t
     return first, np.concatenate([ddp, np.linalg.solve(E, left)[..., 0]], axis=-1)
 
 
-def with_free_pairs(m: Mechanism, free: Sequence[Pair], names: Sequence[str], poses: Array, q: Array) -> Mechanism:
+def with_free_pairs(m: Mechanism, free: Sequence[Pair], names: Sequence[Any], poses: Array, q: Array) -> Mechanism:
     """The mechanism with free pairs behind its own and the drives ``names``, starting at coordinates ``q (F,)``, poses ``(N, 4, 4)``."""
     start = dict(zip(m.freedom_names(), q.tolist(), strict=True))
     for pair in free:
         at = coordinates(pair, poses[m.place_of_link(pair.b)])
         start |= dict(zip(pair.freedom_names, at.tolist(), strict=True))
-    return m.replace(pairs=[*m.pairs, *free], drives=names, start=start)
+    made = m.replace(pairs=[*m.pairs, *free], drives=names)
+    # those of a free pair in space that the plane has not are zero there
+    return made.replace(start={name: start[name] for name in made.freedom_names()})
+
+
+def with_pairs_at(m: Mechanism, free: Sequence[Pair], names: Sequence[Any], start: Configuration) -> Mechanism:
+    """The same in a closed position of the mechanism."""
+    par, X = start.system.par, start.poses[:, :, :, 0]
+    R = np.moveaxis(X[:, :3], -1, 0)
+    poses = np.tile(np.eye(4), (len(R), 1, 1))
+    poses[:, :3, :3] = R
+    poses[:, :3, 3] = par.origin + par.L * X[:, 3].T - (R @ par.offset.T[:, :, None])[..., 0]
+    q = start.system.coordinates_of(start.x, start.system.start_coordinates(m.start))[:, 0]
+    return with_free_pairs(m, free, names, poses, q)
 
 
 def _as_motion(m: Mechanism, value: Any, name: str, faults: list[str]) -> Motion | None:
@@ -537,13 +550,7 @@ class DriverMotion:
 
     def whole(self, start: Configuration) -> Mechanism:
         """The mechanism with the free pairs behind its own, in a closed position."""
-        par, X = start.system.par, start.poses[:, :, :, 0]
-        R = np.moveaxis(X[:, :3], -1, 0)
-        poses = np.tile(np.eye(4), (len(R), 1, 1))
-        poses[:, :3, :3] = R
-        poses[:, :3, 3] = par.origin + par.L * X[:, 3].T - (R @ par.offset.T[:, :, None])[..., 0]
-        q = start.system.coordinates_of(start.x, start.system.start_coordinates(self.m.start))[:, 0]
-        return with_free_pairs(self.m, self.free, self.names, poses, q)
+        return with_pairs_at(self.m, self.free, self.names, start)
 
     def values(self, kind: str, batch: tuple[int, ...]) -> Array:
         """Driver ``position``, ``velocity`` or ``acceleration`` ``(d, T)`` in the user's units, spread over a batch."""

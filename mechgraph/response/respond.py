@@ -669,7 +669,7 @@ def respond(
         raise DeclarationError(f"respond {m.name!r}", faults)
     declared = m if replaced is None else m.replace(loads=replaced)
     bounces = {f"{pair.name}.gap": pair.restitution for pair in declared.pairs if pair.restitution is not None}
-    declared, gaps = with_contacts(declared, limits)
+    declared, gaps = with_contacts(declared, limits, declared.tol or 0.0 if tol is None else tol)
     m = declared
     m = meant(declared, tol, "respond")
     faults += friction_faults(m, how.passive)

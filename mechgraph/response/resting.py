@@ -34,6 +34,8 @@ from mechgraph.force.block import unique_reactions
 from mechgraph.force.friction import OUTCOMES, places_of
 from mechgraph.force.loads import kinetic_energy
 from mechgraph.force.reactions import ForceProblem, user_wrench
+from mechgraph.kinematics.assembly import closed_start
+from mechgraph.kinematics.prescribed import with_pairs_at
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import Array, cross
@@ -60,7 +62,7 @@ def read_stops(m: Mechanism, stops: Any, faults: list[str]) -> tuple[Stop, ...]:
     return () if bad else tuple(known)
 
 
-def with_contacts(m: Mechanism, stops: Iterable[Stop]) -> tuple[Mechanism, dict[str, float]]:
+def with_contacts(m: Mechanism, stops: Iterable[Stop], tol: float) -> tuple[Mechanism, dict[str, float]]:
     """The mechanism with contacts that open, and with the coordinates of named points that have stops; where its gaps start."""
     gaps = {f"{pair.name}.gap": pair.gap for pair in m.pairs if pair.restitution is not None}
     said: dict[str, Any] = {"restitution": None, "gap": 0.0, "closed": "", "hertz": None, "radius": None}
@@ -70,11 +72,14 @@ def with_contacts(m: Mechanism, stops: Iterable[Stop]) -> tuple[Mechanism, dict[
     ]
     places = dict.fromkeys(place for stop in stops if (place := stop.point(m)) is not None)
     names = {pair.name for pair in m.pairs}
+    free: list[Pair] = []
     for link, point in (place for place in places if ".".join(place) not in names):
-        free = PairType("Fr", "coordinates of a point", freedoms=["Tx", "Ty", "Tz", "rotation"], reactions=[])
+        row = PairType("Fr", "coordinates of a point", freedoms=["Tx", "Ty", "Tz", "rotation"], reactions=[])
         on_a, on_b = (Marker(at, (0.0, 0.0, 1.0)) for at in ((0.0, 0.0, 0.0), m.link(link).point(point)))
-        pairs.append(Pair(f"{link}.{point}", free, m.frame, link, on_a=on_a, on_b=on_b))
-    return (m.replace(pairs=pairs), gaps) if len(pairs) > len(m.pairs) or gaps else (m, {})
+        free.append(Pair(f"{link}.{point}", row, m.frame, link, on_a=on_a, on_b=on_b))
+    m = m.replace(pairs=pairs) if gaps else m
+    # their coordinates begin where the points are, so that they do not move what start= leaves open
+    return (with_pairs_at(m, free, m.drives, closed_start(m, tol=tol)) if free else m), gaps
 
 
 def _rubs_in(pair: Pair) -> int | None:
@@ -437,17 +442,14 @@ class Rests:
     def _rough_blow(self, before: _Free) -> tuple[int, float] | None:
         """The freedom in which a contact that is struck rubs, and its coefficient; None where what is struck is smooth."""
         rubs = {name: column for column, name in self.rough.items()}
-        struck = [
-            i
-            for i, one in enumerate(before.closed)
-            if before.w[i] < 0.0 and not before.still[i] and one.contact in rubs
-        ]
-        if not struck:
+        struck = (before.w < 0.0) & ~before.still
+        rough = [one.contact for one in before.closed if one.contact in rubs]
+        if not rough or not struck.any():
             return None
-        name = before.closed[struck[0]].contact
+        name = rough[0]
         if len(before.closed) > 1:
             raise Stopped(
-                f"contact {name} with friction is struck while others are closed, which is not followed; leave its friction out"
+                f"an impact while contact {name} with friction and others are closed is not followed; leave its friction out"
             )
         return rubs[name], sum(load.mu for load in self.task.loads.dry if load.of == name)
 

@@ -611,8 +611,14 @@ class Solution(Shown):
         Raises
         ------
         DeclarationError
-            A position in motion, or without forces: only what rests can stay.
+            A position in motion, or without forces or ends: only what rests can stay. Several drives: each range holds with the other
+            drives held, so that the ranges do not tell whether all may be off together.
         """
+        if len(self.actuated) > 1:
+            why = (
+                f"self_locking: {len(self.actuated)} drives, whose ranges hold with the others held; ask with one drive"
+            )
+            raise DeclarationError(f"solution of {self.mechanism.name!r}", [why])
         rest = np.ones(self.batch, dtype=bool)
         for k, j in map(self.whole.freedom, self.actuated):
             pair = self[self.whole.pairs[k].name]
@@ -620,7 +626,10 @@ class Solution(Shown):
             doubt = np.isnan(low) | np.isnan(high) | (pair.velocity[..., j] != 0)
             if doubt.any():
                 place = self.place(int(np.argmax(doubt)))
-                why = f"self_locking: {place} is in motion or has no forces; solve at rest, with positions alone as motions"
+                why = (
+                    f"self_locking: {place} is in motion, or has no forces or no known ends of its range; solve at rest, "
+                    "with positions alone as motions"
+                )
                 raise DeclarationError(f"solution of {self.mechanism.name!r}", [why])
             rest &= (low < high) & (low <= 0) & (high >= 0)
         return rest

@@ -593,14 +593,14 @@ class Trajectory:
         return float(self._kept["factor"][place]), tuple(dict.fromkeys(jammed))
 
     def effort_range(self, pair: int) -> Array:
-        """Least and greatest effort of drives at rest, ``(..., f, 2)``; the effort itself in what does not rub."""
+        """Least and greatest effort of drives at rest, ``(..., f, 2)``; the effort itself in motion and where nothing rubs."""
         columns = self._columns(pair)
         own = self._efforts(columns)[0]
         unit = np.where(self._system.is_length[columns], self._L, self._L**2)[:, None, None]
         ends = np.repeat(own[:, None], 2, axis=1)
         if "range" in self._kept:
             found = unit * self._kept["range"][columns]
-            ends = np.where(np.isnan(found), ends, found)
+            ends = np.where(self._driven(columns)[:, None], found, ends)
         return self._out(ends)
 
     def at_places(self, name: str, of: str) -> Array:
