@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import scipy.optimize
@@ -370,6 +371,57 @@ def linked_four_bar(crank: float, coupler: float, rocker: float, ground: float, 
     last = pairs[3]
     pairs[3] = mg.Pair("O3", "R", last.a, last.b, on_a=last.on_a, on_b=mg.Marker((ground, 0, 0), Z))
     return mg.Mechanism("four-bar", pairs=pairs, drives=["O0"], frame="ground", start={"O0": angle, "O1": -1.0})
+
+
+class FourBarFormula:
+    """A random ``linked_four_bar``, often near a change point, by closed forms: two circles meet on either side of their centers' line."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        a, b, c, d = rng.uniform(0.3, 1.5, 4)
+        if rng.random() < 0.4:
+            near = np.array([b + c - a, a + b - c, a + c - b])[rng.integers(3)]
+            d = max(0.1, near + rng.normal() * 10 ** rng.uniform(-4, -2))
+        self.lengths = a, b, c, d
+        cosines = np.array([(a * a + d * d - reach * reach) / (2 * a * d) for reach in (b + c, b - c)])
+        folds = np.arccos(cosines[np.abs(cosines) < 1])
+        self.folds = np.concatenate([folds, -folds])
+        self.rng = rng
+
+    def joint(self, angle: float, side: int) -> tuple[complex, complex]:
+        """Where crank and coupler, coupler and rocker meet; the first fixed pivot at 0."""
+        a, b, c, d = self.lengths
+        tip = a * np.exp(1j * angle)
+        reach = d - tip
+        along = (b * b - c * c + abs(reach) ** 2) / (2 * abs(reach))
+        return tip, tip + reach / abs(reach) * (along + 1j * side * np.sqrt(b * b - along * along))
+
+    def start(self, angle: float, side: int) -> dict[str, float]:
+        """Coordinates of all freedoms."""
+        tip, joint = self.joint(angle, side)
+        alpha, beta = np.angle(joint - tip), np.angle(joint - self.lengths[3]) + np.pi
+        return dict(zip(("O0", "O1", "O2", "O3"), (angle, alpha - angle, beta - alpha, -beta), strict=True))
+
+    def mechanism(self, angle: float, side: int) -> mg.Mechanism:
+        """The mechanism standing there."""
+        return linked_four_bar(*self.lengths, angle).replace(start=self.start(angle, side))
+
+    def branch(self, angle: float, side: int) -> tuple[bool, int]:
+        """What tells its branch: with four folds the cranks are on one side of the ground, and always the joint is on one of its line."""
+        return len(self.folds) == 4 and np.sin(angle) > 0, side
+
+    def circuit(self, angle: float, side: int) -> tuple[bool, int]:
+        """What tells its circuit: at folds both sides meet."""
+        return self.branch(angle, 0 if self.folds.size else side)
+
+    def angles(self, n: int) -> Any:
+        """Crank angles at which it closes, 1e-6 or more from folds: some anywhere, some near folds and change points."""
+        a, b, c, d = self.lengths
+        near = np.concatenate([np.repeat(self.folds, 2), [0.0, 0.0, np.pi, np.pi]])
+        near += self.rng.choice([-1, 1], len(near)) * 10 ** self.rng.uniform(-5.9, -1, len(near))
+        angles = self.rng.permutation(np.concatenate([self.rng.uniform(-np.pi, np.pi, 8 * n), near]))
+        reach = np.abs(d - a * np.exp(1j * angles))
+        gap = np.abs(np.angle(np.exp(1j * (angles[:, None] - self.folds)))).min(axis=1, initial=np.pi)
+        return angles[(reach < b + c) & (reach > abs(b - c)) & (gap > 1e-6)][:n]
 
 
 def marked_four_bar() -> mg.Mechanism:

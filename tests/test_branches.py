@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mechanisms import linked_four_bar
+from mechanisms import FourBarFormula, linked_four_bar
 from test_assembly_groups import spatial
 
 import mechgraph as mg
@@ -103,6 +103,23 @@ def test_a_position_is_on_the_branch_that_leads_there() -> None:
             assert np.sin(mode.start["O2.Rz"]) * np.sin(branch.coordinates[3, rocker]) > 0
     with pytest.raises(mg.DeclarationError, match="position 1: expected one to which a branch of the map leads"):
         b.defects([mode, mode.start | {"O3.Rz": 0.2}])
+
+
+@pytest.mark.daily(16)
+@pytest.mark.parametrize("seed", range(1000))
+def test_branch_and_circuit_of_every_position_are_those_of_the_closed_form(seed: int) -> None:
+    """Of four-bars, many of them near a change point, at places anywhere and near folds; their crank turns right round without folds."""
+    known = FourBarFormula(np.random.default_rng(seed))
+    asked = [(angle, side) for angle in known.angles(5) for side in (1, -1)]
+    if not asked:  # closes nowhere
+        return
+    b = mg.branches(known.mechanism(*asked[0]), "O0", samples=12, points=24)
+    assert len(b.circuits) == (1 if len(known.folds) == 2 else 2)
+    assert set(b.full_turn) == {not known.folds.size}
+    found = b.defects([known.start(*at) for at in asked])
+    for numbers, formula in ((found.branches, known.branch), (found.circuits, known.circuit)):
+        told = {(number, formula(*at)) for number, at in zip(numbers, asked, strict=True)}
+        assert len({number for number, _ in told}) == len({name for _, name in told}) == len(told)
 
 
 def test_bad_arguments_of_a_map_are_all_named() -> None:

@@ -21,8 +21,8 @@ from mechgraph.modes import start_sets
 from mechgraph.modes.assemblies import Finder, Question
 from mechgraph.modes.family import Member
 from mechgraph.modes.homotopy import Equations
-from mechgraph.modes.start_sets import _beside, _poles, _tame, bound, rational, start_set, trace_test
-from mechgraph.modes.targets import Ends, _account, _TrackRun
+from mechgraph.modes.start_sets import _beside, _poles, bound, rational, start_set, tame, trace_test
+from mechgraph.modes.targets import Ends, TrackRun, _account
 
 
 @pytest.fixture
@@ -228,7 +228,7 @@ def test_ends_far_away_count_where_they_are_plainly_not_real_and_once() -> None:
         x[family.free[0]] = angles
         known = Ends.none(len(x), len(angles))
         none, every = np.zeros(len(angles), dtype=bool), np.ones(len(angles), dtype=bool)
-        _account(family, at, known, _TrackRun(x, every, none, none), 0)
+        _account(family, at, known, TrackRun(x, every, none, none), 0)
         return known
 
     far = 9.0j  # cosines of some 4,000
@@ -667,7 +667,7 @@ def test_an_assembly_that_rounding_had_told_apart_from_itself_is_one() -> None:
     known = start_set(q.family, rng)
     off = known.x[:, 1] + 1e-5 * rng.normal(size=len(known.x))
     x = np.concatenate([known.x[:, :2], off[:, None], known.x[:, 2:]], axis=1)
-    _, moved = _tame(Equations(q.family, known.mixing), known.member, x, rng)
+    _, moved = tame(Equations(q.family, known.mixing), known.member, x, rng)
     assert (known.x.shape[1], moved.shape[1]) == (4, 4)
 
 

@@ -19,7 +19,7 @@ from mechgraph.modes.family import Member, searched
 from mechgraph.modes.form import _ball, _two_turns, rods_of
 from mechgraph.modes.homotopy import Equations, Leg
 from mechgraph.modes.start_sets import bound, distinct
-from mechgraph.modes.targets import Ends, _account, _TrackRun, ends
+from mechgraph.modes.targets import Ends, TrackRun, _account, ends
 from mechgraph.pairs.factors import ConstantScrew
 
 
@@ -276,7 +276,7 @@ def test_a_track_led_round_to_no_assembly_is_at_infinity_only_if_a_second_run_sa
     stray = np.arange(every.shape[1]) == 0
     none, off = np.zeros(len(stray), dtype=bool), every.copy()
     off[:, 0] = 1e3 * (1 + 1j)
-    astray, whole = _TrackRun(off, ~stray, stray, none), _TrackRun(every, ~none, none, none)
+    astray, whole = TrackRun(off, ~stray, stray, none), TrackRun(every, ~none, none, none)
     known = Ends.none(*every.shape)
     _account(family, at, known, astray, 0)
     assert (known.infinite, known.x.shape[1], known.clean) == (1, 39, False)

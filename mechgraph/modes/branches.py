@@ -413,11 +413,8 @@ class Branches(Shown):
         """Whether the driver would have to turn back between positions of one branch."""
         if len({number for number, _ in places}) != 1:
             return False
-        branch, steps = self.branches[places[0][0]], np.diff([value for _, value in places])
-        if not branch.full_turn:
-            return bool((steps > 0).any() and (steps < 0).any())
-        period = 2 * np.pi * branch.turns
-        return bool(min(np.mod(steps, period).sum(), np.mod(-steps, period).sum()) >= period)
+        branch = self.branches[places[0][0]]
+        return in_order(np.array([value for _, value in places]), _period(branch)) is None
 
     def plot(self, output: str | None = None, *, ax: Any = None, current: int | None = None) -> Any:
         """Draw a freedom over the driver on all branches, with the folds.
@@ -510,6 +507,23 @@ def _turns(b: Branch) -> str:
     if not b.full_turn:
         return "no" if b.full_turn is False else "not told"
     return "yes" if b.turns == 1 else f"yes, back after {b.turns} turns"
+
+
+def _period(b: Branch) -> float:
+    return 2 * np.pi * b.turns if b.full_turn else np.inf
+
+
+def in_order(values: Array, period: float) -> Array | None:
+    """Driver values ``(n,)`` of a branch, with whole periods such that they rise or fall; None where the driver has to turn back."""
+    steps, ways = np.diff(values), []
+    if not np.isfinite(period):
+        return None if (steps > 0).any() and (steps < 0).any() else values
+    for sense in (1.0, -1.0):
+        ahead = np.mod(sense * steps, period)
+        # a step back by rounding (radians) is none
+        ways.append(sense * np.cumsum([0.0, *np.where(period - ahead < 1e-12, 0.0, ahead)]))
+    way = min(ways, key=lambda way: abs(way[-1]))
+    return values[0] + way if abs(way[-1]) < period else None
 
 
 @door

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +48,18 @@ class Equations:
         self._lengths = s.single_rows[s.is_length]
         self._angles = np.setdiff1d(self._rows, self._lengths)
         self._quaternions = complement(self._rows, s.n_state)
+
+    def advance(self, x: Array, dq: Array) -> Array:
+        """States after increments ``dq (F, T)``."""
+        return self.family.system.advance(x, dq)
+
+    def fingerprints(self, member: Member, x: Array) -> Array:
+        """What tells assemblies of a member apart ``(n, V)``, see ``Family.prints``."""
+        return self.family.prints(Configuration(self.family.system_of(member), x))
+
+    def leg(self, begin: Member, end: Member, which: Index | None = None) -> Leg:
+        """The ways between members."""
+        return Leg(self, begin, end, which)
 
     def state_rates(self, x: Array, dq: Array) -> Array:
         """Rates ``(nx, T)`` of states for rates ``dq (F, T)``: singles are their own, ``Q' = (0, w) Q / 2``."""
@@ -142,6 +155,11 @@ class Linear:
         self._leg = leg
         self.J = self._mixed(here.J[:, self.family.free])
 
+    @property
+    def x(self) -> Array:
+        """The states ``(nx, T)``."""
+        return self.here.x
+
     def again(self, x: Array) -> Linear:
         """The equations of the same members at other states ``x (nx, T)`` with the same values of drivers."""
         return Linear(self._leg, Configuration(self.here.system, x), self.change, self._eta)
@@ -160,7 +178,7 @@ class Linear:
         if len(right) > n - p:
             b[:, n - p :] = right[n - p :].transpose(2, 0, 1)
         out = np.zeros((self.family.system.n_freedoms, right.shape[1], T), dtype=complex)
-        out[self.family.free] = _solved(A, b).transpose(1, 2, 0)
+        out[self.family.free] = solved(A, b).transpose(1, 2, 0)
         return out
 
     @property
@@ -200,7 +218,8 @@ class Linear:
         return np.asarray(Q[:, :, rank:].conj().swapaxes(1, 2))
 
 
-def _solved(A: Array, b: Array) -> Array:
+def solved(A: Array, b: Array) -> Array:
+    """``A^-1 b`` of a batch, NaN where a matrix is singular."""
     try:
         return np.linalg.solve(A, b)
     except np.linalg.LinAlgError:
@@ -237,6 +256,9 @@ class Care:
         return replace(self, aim=0.1 * self.aim, most=0.1 * self.most)
 
 
+Equated: TypeAlias = Any
+Followed: TypeAlias = Any
+"""Equations of a class as ``Equations`` has them, and a way of them as ``Leg``; of synthesis too, which has others of its own."""
 Way = Callable[[Array], tuple[Array, Array]]
 """``t`` and ``dt/ds`` at ``s (T,)`` in [0, 1]."""
 
@@ -247,7 +269,7 @@ def straight(s: Array) -> tuple[Array, Array]:
 
 
 def follow(
-    leg: Leg, x: Array, care: Care, way: Way = straight, tracks: Index | None = None, polish: bool = True
+    leg: Followed, x: Array, care: Care, way: Way = straight, tracks: Index | None = None, polish: bool = True
 ) -> Tracked:
     """Tracks from states ``x (nx, V)`` at ``s = 0`` to ``s = 1``, at the end polished; ``tracks`` are their numbers on the leg."""
     V = x.shape[1]
@@ -274,7 +296,7 @@ def follow(
 class _March:
     """Tracks on their way: ``who`` they are, states, places and next steps, and the rates at the last nodes, the newest first."""
 
-    def __init__(self, leg: Leg, x: Array, every: Index, way: Way) -> None:
+    def __init__(self, leg: Followed, x: Array, every: Index, way: Way) -> None:
         V = x.shape[1]
         self.leg, self.way, self.every = leg, way, every
         self.who, self.x, self.h = np.arange(V), x.copy(), np.full(V, 0.02)  # the first step
@@ -296,15 +318,15 @@ class _March:
             t, dt = self.way(s)
             here = leg.at(x, t, tracks)
             one = here.newton(self.idle)
-            x = eq.family.system.advance(here.here.x, one)
+            x = eq.advance(here.x, one)
             here = here.again(x)
             two = here.newton(self.idle)
             sizes = [eq.size(x, d) for d in (one, two)]
             noise = here.noise
             good = (sizes[0] <= care.most) & (sizes[1] <= 0.1 * sizes[0] + np.clip(noise, 1e-10, care.aim))
             rates, idle = here.rates(self.idle)
-            v = eq.state_rates(here.here.x, rates) * dt
-            x = eq.family.system.advance(here.here.x, two)
+            v = eq.state_rates(here.x, rates) * dt
+            x = eq.advance(here.x, two)
         good &= np.isfinite(v).all(axis=0)
         order = 1.0 / (1.0 + np.minimum(self.known + 1, RATES_KEPT))
         grown = h * np.clip((care.aim / np.maximum(sizes[0], 1e-12)) ** order, 0.4, 2.0)
@@ -351,7 +373,7 @@ def rounding(size: Array) -> Array:
     return np.asarray(3e-14 * size**3)
 
 
-def polished(leg: Leg, x: Array, t: complex, tracks: Index, most: float | None = None) -> tuple[Array, Mask]:
+def polished(leg: Followed, x: Array, t: complex, tracks: Index, most: float | None = None) -> tuple[Array, Mask]:
     """States closed by Newton to rounding at one ``t``, passive bodies turned to where they are least imaginary; which closed."""
     eq = leg.equations
     places = np.full(x.shape[1], t)
@@ -361,17 +383,17 @@ def polished(leg: Leg, x: Array, t: complex, tracks: Index, most: float | None =
         for _ in range(8 if eq.idle else 0):
             step = _calming(eq, here)
             # so small a step ends it
-            if eq.size(here.here.x, step).max(initial=0.0) < 1e-4:
+            if eq.size(here.x, step).max(initial=0.0) < 1e-4:
                 break
-            here = here.again(eq.family.system.advance(here.here.x, step))
-            here = here.again(eq.family.system.advance(here.here.x, here.newton(here.idle())))
+            here = here.again(eq.advance(here.x, step))
+            here = here.again(eq.advance(here.x, here.newton(here.idle())))
         last, idle = np.full(x.shape[1], np.inf), here.idle()
         # Newton steps at the end of a track, at most
         for i in range(6):
             here = here.again(x) if i else here
             dq = here.newton(idle)
-            size = eq.size(here.here.x, dq)
-            x = np.where(size < last, eq.family.system.advance(here.here.x, dq), here.here.x)
+            size = eq.size(here.x, dq)
+            x = np.where(size < last, eq.advance(here.x, dq), here.x)
             last = np.fmin(size, last)
             # last Newton step at the end of a track
             if (last < 1e-12).all():

@@ -64,7 +64,7 @@ from mechgraph.maths.se3 import compose, pose_exp
 from mechgraph.maths.tolerances import MODES
 from mechgraph.modes.family import Array, Family, Labelling, Member, common, span
 from mechgraph.modes.form import RodFamily, is_one_group
-from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, Equations, Leg, Linear, follow
+from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, Equated, Equations, Leg, Linear, follow
 
 SIX_TURNS = (
     "Lee, Woernle and Hiller, A complete solution for the inverse kinematic problem of the general 6R robot manipulator, "
@@ -224,17 +224,18 @@ NOT_PASSED = Trace(-1, 0, 1.0, 1.0)
 
 
 def trace_test(
-    equations: Equations,
-    base: Member,
+    equations: Equated,
+    base: Any,
     x: Array,
     rng: np.random.Generator,
     progress: Callable[[str], None] | None = None,
+    of: Callable[..., Any] | None = None,
 ) -> Trace:
-    """The trace test of the assemblies ``x (nx, N)`` of a member."""
+    """The trace test of the assemblies ``x (nx, N)`` of a member, over pencils of members (those of ``of``)."""
     N, tracks = x.shape[1], 0
     # pencils of which one has to tell
     for _ in range(4):
-        pencil = _Pencil(equations, base, rng)
+        pencil = (of or Pencil)(equations, base, rng)
         phi = pencil.anywhere(pencil.first, rng)
         z, f, weights = np.zeros(0, dtype=complex), np.zeros(0, dtype=complex), np.zeros(0)
         while (tracks := tracks + len(phi) * N) <= MOST_TRACKS:
@@ -245,9 +246,9 @@ def trace_test(
             found = rational(z, f, weights)
             if found.passed:
                 return found
-            poles = _poles(z, f, weights)
+            poles = _poles(z, f, weights) if len(z) else z
             # members for every pole at which a pencil that does not tell is left for another one
-            if len(z) > 5 * len(poles):
+            if len(z) >= 5 * len(poles):
                 break
             phi = _beside(poles, rng)
             phi = np.concatenate([phi, pencil.anywhere(max(pencil.first, len(z)) - len(phi), rng)])
@@ -305,7 +306,7 @@ def _beside(poles: Array, rng: np.random.Generator) -> Array:
     return np.asarray(-1j * np.log(near))
 
 
-class _Pencil:
+class Pencil:
     """Members of a class in which one marker of every loop has turned by ``phi`` about a line, and all rods have other lengths."""
 
     def __init__(self, equations: Equations, base: Member, rng: np.random.Generator) -> None:
@@ -341,7 +342,7 @@ class _Pencil:
     def sums(self, x: Array, phi: Array) -> tuple[Array, Array, Array]:
         """``z``, the sum and weights at pairs of members ``phi (n,)`` to both of which all tracks from ``x`` come."""
         (n, N), members = (len(phi), x.shape[1]), self.members(phi)
-        leg = Leg(self.equations, self.base, members, np.repeat(np.arange(n), N))
+        leg = self.equations.leg(self.base, members, np.repeat(np.arange(n), N))
         tracked = follow(leg, np.tile(x, n), Care())
         good = tracked.arrived.reshape(n, N).all(axis=1)
         with np.errstate(all="ignore"):
@@ -439,11 +440,6 @@ class StartSet:
         return bool((here.closure < MODES.member_closed * size).all())
 
 
-def fingerprints(family: Family, member: Member, x: Array) -> Array:
-    """What tells assemblies of a member apart ``(n, V)``, see ``Family.prints``."""
-    return family.prints(Configuration(family.system_of(member), x))
-
-
 def distinct(poses: Array, known: Array | None = None, least: Array | None = None) -> Array:
     """Places of assemblies that are new, each once: poses ``(n, V)`` that differ from those ``known (n, N)`` and before.
 
@@ -507,9 +503,9 @@ def _permuted(
     known = bound(equations.family)
     # assemblies of one member from which on they are not looked for any further
     most_found = 1200
-    group = _Group(equations, base, x[:, None], most_found if known is None else known.count)
+    group = Group(equations, base, x[:, None], most_found if known is None else known.count)
     group.grow(MISSED, rng, progress)
-    group.move(*_tame(equations, group.base, group.x, rng))
+    group.move(*tame(equations, group.base, group.x, rng))
     group.grow(MISSED_AGAIN, rng, progress)
     N = group.x.shape[1]
     met = known is not None and known.count == N
@@ -521,16 +517,16 @@ def _permuted(
     )
 
 
-class _Group:
+class Group:
     """Assemblies ``x (nx, N)`` known of a member ``base``, and the loops that brought no further one."""
 
-    def __init__(self, equations: Equations, base: Member, x: Array, most: int) -> None:
+    def __init__(self, equations: Equated, base: Any, x: Array, most: int) -> None:
         self.equations, self.most, self.lost, self.followed = equations, most, 0, 0
         self.move(base, x)
 
-    def move(self, base: Member, x: Array) -> None:
+    def move(self, base: Any, x: Array) -> None:
         """Go on at another member."""
-        self.base, self.x, self.known = base, x, fingerprints(self.equations.family, base, x)
+        self.base, self.x, self.known = base, x, self.equations.fingerprints(base, x)
         self.quiet, self.chance = 0, 1.0
 
     def grow(self, missed: float, rng: np.random.Generator, progress: Callable[[str], None] | None) -> None:
@@ -547,7 +543,7 @@ class _Group:
             # 48 tracks are followed together at least, of as many loops as it takes
             loops = max(min(enough, TRACKS_TOGETHER // N), 48 // N, 1)
             there = self._round(family, loops, rng)
-            poses = fingerprints(family, self.base, there)
+            poses = self.equations.fingerprints(self.base, there)
             new = distinct(poses, self.known)
             # a further one stays outside where the loop leaves it where it is, or where its track is lost
             outside = min(1.0 / (N + 1.0) + (1.0 - there.shape[1] / (N * loops)), 1.0)
@@ -555,19 +551,19 @@ class _Group:
             self.x = np.concatenate([self.x, there[:, new]], axis=1)
             self.known = np.concatenate([self.known, poses[:, new]], axis=1)
 
-    def _round(self, family: Family, loops: int, rng: np.random.Generator) -> Array:
+    def _round(self, family: Any, loops: int, rng: np.random.Generator) -> Array:
         """Where all assemblies come to on several loops through two random members each."""
-        corners = [Member.joined([family.random_member(rng) for _ in range(loops)]) for _ in range(2)]
+        corners = [self.base.joined([family.random_member(rng) for _ in range(loops)]) for _ in range(2)]
         there, which = np.tile(self.x, loops), np.repeat(np.arange(loops), self.x.shape[1])
         for begin, end in pairwise([self.base, *corners, self.base]):
-            tracked = follow(Leg(self.equations, begin, end, which), there, Care())
+            tracked = follow(self.equations.leg(begin, end, which), there, Care())
             self.lost += int((~tracked.arrived).sum())
             self.followed += there.shape[1]
             there, which = tracked.x[:, tracked.arrived], which[tracked.arrived]
         return there
 
 
-def _tame(equations: Equations, base: Member, x: Array, rng: np.random.Generator) -> tuple[Member, Array]:
+def tame(equations: Equated, base: Any, x: Array, rng: np.random.Generator) -> tuple[Any, Array]:
     """Of some random members that with the smallest numbers in its assemblies, from which tracks are the least likely to be lost.
 
     Assemblies ``x (nx, N)`` that come to one there are one, which large numbers had told apart by their rounding.
@@ -577,15 +573,15 @@ def _tame(equations: Equations, base: Member, x: Array, rng: np.random.Generator
     candidates = 6
     members = [family.random_member(rng) for _ in range(candidates)]
     which = np.repeat(np.arange(candidates), N)
-    tracked = follow(Leg(equations, base, Member.joined(members), which), np.tile(x, candidates), Care())
+    tracked = follow(equations.leg(base, base.joined(members), which), np.tile(x, candidates), Care())
     keep, found = np.arange(N), []
     for number, member in enumerate(members):
         mine = which == number
-        there, poses = tracked.x[:, mine], fingerprints(family, member, tracked.x[:, mine])
+        there, poses = tracked.x[:, mine], equations.fingerprints(member, tracked.x[:, mine])
         arrived = np.flatnonzero(tracked.arrived[mine])
         keep = np.setdiff1d(keep, np.delete(arrived, distinct(poses[:, arrived])))
         found.append((member, there, poses, tracked.arrived[mine]))
-    best, least = (base, x[:, keep]), np.abs(fingerprints(family, base, x[:, keep])).max()
+    best, least = (base, x[:, keep]), np.abs(equations.fingerprints(base, x[:, keep])).max()
     for member, there, poses, came in found:
         size = np.abs(poses[:, keep]).max() if came[keep].all() else np.inf
         if size < least:

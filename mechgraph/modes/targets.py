@@ -35,7 +35,7 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Pair
 from mechgraph.modes.family import Array, Family, Member, Nearby, irregular, least_value
 from mechgraph.modes.form import RodFamily, RodPoints, RodStep, RodSystem, behind, sets_of
-from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, Equations, Leg, follow, rounding
+from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, Equations, Followed, Leg, follow, rounding
 from mechgraph.modes.start_sets import StartSet, distinct
 
 ARCS = 12
@@ -112,7 +112,7 @@ def _block(family: Family, start: StartSet, goals: Member, rng: np.random.Genera
         lost_before = N - x.shape[1]
         which = np.repeat(np.arange(len(left)), x.shape[1])
         leg = Leg(equations, begin, goals.taken(left), which)
-        run_ends = _run(leg, np.tile(x, len(left)), care)
+        run_ends = run_tracks(leg, np.tile(x, len(left)), care)
         for j, place in enumerate(left.tolist()):
             mine = np.flatnonzero(which == j)
             _account(family, goals.taken(np.array([place])), every[place], run_ends.taken(mine), lost_before)
@@ -123,7 +123,7 @@ def _block(family: Family, start: StartSet, goals: Member, rng: np.random.Genera
 
 
 @dataclass
-class _TrackRun:
+class TrackRun:
     """Ends of tracks of a run: states, and which are regular, singular, at infinity; the others are lost."""
 
     x: Array
@@ -131,13 +131,15 @@ class _TrackRun:
     singular: Array
     infinite: Array
 
-    def taken(self, at: Index) -> _TrackRun:
-        return _TrackRun(self.x[:, at], self.regular[at], self.singular[at], self.infinite[at])
+    def taken(self, at: Index) -> TrackRun:
+        """Some of them."""
+        return TrackRun(self.x[:, at], self.regular[at], self.singular[at], self.infinite[at])
 
 
-def _run(leg: Leg, x: Array, care: Care) -> _TrackRun:
+def run_tracks(leg: Followed, x: Array, care: Care) -> TrackRun:
+    """Tracks to the end of a leg, those too that do not close quadratically there."""
     tracked = follow(leg, x, care)
-    out = _TrackRun(
+    out = TrackRun(
         tracked.x, tracked.arrived.copy(), np.zeros(x.shape[1], dtype=bool), np.zeros(x.shape[1], dtype=bool)
     )
     # part of the way up to which a track must have come for its end to be looked for
@@ -147,7 +149,7 @@ def _run(leg: Leg, x: Array, care: Care) -> _TrackRun:
     return out
 
 
-def _endgame(leg: Leg, x: Array, tracks: Index, care: Care, out: _TrackRun) -> None:
+def _endgame(leg: Followed, x: Array, tracks: Index, care: Care, out: TrackRun) -> None:
     """Tracks from their starts to a distance from the end, and round it until they are back."""
     eq = leg.equations
     near = follow(
@@ -202,7 +204,7 @@ def _arc(k: int) -> Callable[[Array], tuple[Array, Array]]:
     return way
 
 
-def _account(family: Family, at: Member, known: Ends, run: _TrackRun, lost_before: int) -> None:
+def _account(family: Family, at: Member, known: Ends, run: TrackRun, lost_before: int) -> None:
     """Put the ends of a run to those that are known."""
     told, infinite = _Told(family, at, run), int(run.infinite.sum())
     # a track that is bounded near its end has an assembly there: what closes nowhere is none, or was led round to another one
@@ -230,7 +232,7 @@ class _Told:
     ``doubtful`` is the number of those that seemed singular and close nowhere, ``error (n,)`` how far ends may be off.
     """
 
-    def __init__(self, family: Family, at: Member, run: _TrackRun) -> None:
+    def __init__(self, family: Family, at: Member, run: TrackRun) -> None:
         self.family, self.system = family, family.system_of(at)
         self.x, self.regular = run.x.copy(), run.regular.copy()
         self.moving, self.meet = np.zeros(len(self.regular), dtype=bool), np.zeros(len(self.regular), dtype=np.intp)
