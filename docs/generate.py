@@ -81,6 +81,11 @@ GROUPS: Mapping[str, tuple[str, str, tuple[str, ...]]] = {
         "All ways to close the loops, and how they are connected.",
         ("assemblies", "Assemblies", "AssembliesOver", "branches", "Branches"),
     ),
+    "synthesis": (
+        "Synthesis",
+        "Dimensions of a declared topology that do what is asked.",
+        ("synthesize", "Syntheses", "SynthesesOver", "function", "path", "poses", "positions", "SynthesisSetup"),
+    ),
     "structure": (
         "Structure",
         "Kinematic chains, families, structural groups.",

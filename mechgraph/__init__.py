@@ -41,6 +41,7 @@ from mechgraph.model.meshes import Mesh, planet_places
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Misfit, Pair, Stiffness
 from mechgraph.model.response_setup import Event, ResponseSetup, Stop
+from mechgraph.model.synthesis_setup import SynthesisSetup
 from mechgraph.model.toml import library_names as library
 from mechgraph.pairs.cam_laws import CamLaw, Segment, cam_laws
 from mechgraph.pairs.cams import least_base_radius
@@ -79,23 +80,26 @@ if TYPE_CHECKING:
     from mechgraph.result.free_body import FreeBody, free_body
     from mechgraph.result.over_time import OverTime, over_time
     from mechgraph.show.page.write import write_report
+    from mechgraph.synthesis.syntheses import Syntheses, SynthesesOver, synthesize
+    from mechgraph.synthesis.tasks import function, path, poses, positions
     from mechgraph.variants.study import Study, study
 
 __all__ = [
     "Assemblies", "AssembliesOver", "AssemblyError", "Belt", "BeltDrive", "BevelGear", "BevelGears", "Bookkeeping",
     "Branches", "CamLaw", "Chain", "Compiled", "Component", "ContentError", "Coupling", "Curve", "Damper",
-    "DeadPointError", "DeclarationError", "Decomposition", "DeterminacyReport", "Drive", "Effort", "Event",
-    "Families", "FileError", "ForceLaw", "ForceTable", "Formulation", "FreeBody", "Freedom", "Friction",
-    "FrictionError", "Gear", "GearRack", "Gravity", "Group", "Hertz", "Identity", "IndeterminateError", "Journal",
-    "Link", "Marker", "Mechanism", "MechgraphError", "MechgraphWarning", "Mesh", "Misfit",
-    "MissingExtraError", "Motion", "MultipleJoint", "OverTime", "Pair", "PairType", "Pulley", "Rack", "ReachError",
-    "Response", "ResponseError", "ResponseSetup", "Segment", "ShapeError", "Solution", "Spring", "SpurGears",
-    "Stiffness", "Stop", "Structure", "Study", "StudyError", "Surface", "SystemGroup", "Tolerances", "TorsionSpring",
-    "Transmission", "Worm", "WormGear", "WormWheel", "Wrench", "assemble", "assemblies", "atlas", "branches",
-    "cam_laws", "chain", "check", "compile", "equilibrium", "formulate", "free_body", "groups", "identify", "inertia",
-    "kinematics", "least_base_radius", "least_preload", "library", "linearize", "load", "load_chains", "mesh_facts",
-    "multiple_joints", "over_time", "pair_types", "parts", "planet_places", "respond", "save", "save_chains", "solve",
-    "split_joint", "structure", "study", "system_groups", "transmission", "write_report",
+    "DeadPointError", "DeclarationError", "Decomposition", "DeterminacyReport", "Drive", "Effort", "Event", "Families",
+    "FileError", "ForceLaw", "ForceTable", "Formulation", "FreeBody", "Freedom", "Friction", "FrictionError", "Gear",
+    "GearRack", "Gravity", "Group", "Hertz", "Identity", "IndeterminateError", "Journal", "Link", "Marker",
+    "Mechanism", "MechgraphError", "MechgraphWarning", "Mesh", "Misfit", "MissingExtraError", "Motion",
+    "MultipleJoint", "OverTime", "Pair", "PairType", "Pulley", "Rack", "ReachError", "Response", "ResponseError",
+    "ResponseSetup", "Segment", "ShapeError", "Solution", "Spring", "SpurGears", "Stiffness", "Stop", "Structure",
+    "Study", "StudyError", "Surface", "Syntheses", "SynthesesOver", "SynthesisSetup", "SystemGroup", "Tolerances",
+    "TorsionSpring", "Transmission", "Worm", "WormGear", "WormWheel", "Wrench", "assemble", "assemblies", "atlas", "branches",
+    "cam_laws", "chain", "check", "compile", "equilibrium", "formulate", "free_body", "function", "groups", "identify",
+    "inertia", "kinematics", "least_base_radius", "least_preload", "library", "linearize", "load", "load_chains",
+    "mesh_facts", "multiple_joints", "over_time", "pair_types", "parts", "path", "planet_places", "poses", "positions",
+    "respond", "save", "save_chains", "solve", "split_joint", "structure", "study", "synthesize", "system_groups",
+    "transmission", "write_report",
 ]  # fmt: skip
 
 
@@ -169,10 +173,14 @@ def __getattr__(name: str) -> Any:
             from mechgraph.result import free_body as home
         case "OverTime" | "film_of" | "over_time":
             from mechgraph.result import over_time as home
-        case "draw_assemblies" | "draw_branches":
+        case "draw_assemblies" | "draw_branches" | "draw_syntheses":
             from mechgraph.show import diagrams as home
         case "view" | "write_report":
             from mechgraph.show.page import write as home
+        case "Syntheses" | "SynthesesOver" | "synthesize":
+            from mechgraph.synthesis import syntheses as home
+        case "function" | "path" | "poses" | "positions":
+            from mechgraph.synthesis import tasks as home
         case "Study" | "study":
             from mechgraph.variants import study as home
         case _:

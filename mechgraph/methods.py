@@ -16,6 +16,7 @@ Name = Literal[
     "view",
     "draw_assemblies",
     "draw_branches",
+    "draw_syntheses",
     "film_of",
     "cutter_path",
     "write_curve",

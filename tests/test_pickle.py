@@ -47,6 +47,7 @@ def things() -> dict[str, Any]:
         "flagged": mg.solve(spatial.replace(drives=["D"]), {"D": 2.0}, on_reach="flag"),
         "pair result": s["A"], "link result": s.link(m.links[1].name), "checks": s.checks, "state": s.state(0), "work": s.work,
         "free body": mg.free_body(s, m.links[1].name), "over time": mg.over_time(mg.solve(m, {"A": mg.Motion(THETA, velocity=1.0)})),
+        "synthesis setup": mg.SynthesisSetup(mg.function("A", "D", [(0, 0), (0.1, 0.2)]), ["B.point"], bounds={"B.point.x": (0, 1)}),
         "response setup": mg.ResponseSetup((0, 1), start={"A": 0.1}, motions={"D": mg.Motion([0, 1], t=[0, 1])}, events=mg.Event("A")),
         "study": mg.study(m, {f"{m.links[1].name}.mass": [1.0, 2.0], "B.point.x": [0.001, 0.0]}, ["A.effort"], n=4),
         "FileError": mg.FileError("a.toml", "is missing"), "DeclarationError": mg.DeclarationError("a", ["b", "c"]),

@@ -393,7 +393,7 @@ def test_the_stored_schema_is_the_one_of_the_code(golden: Callable[[str, str], N
 
 def test_the_tables_of_the_readme_are_those_of_the_code(golden: Callable[[str, str], None]) -> None:
     text = (library_path() / "README.md").read_text(encoding="utf-8")
-    assert text.count("<!-- fields: ") == 13
+    assert text.count("<!-- fields: ") == 14
     golden("../../library/README.md", with_field_tables(text))
     assert SCHEMA["properties"]["schema"]["const"] == NUMBER
 

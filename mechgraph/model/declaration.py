@@ -46,6 +46,7 @@ from mechgraph.model.motion import Drive
 from mechgraph.model.pair import NO_POINTS, Link, Marker, Pair, largest_cosine
 from mechgraph.model.plane import plane_faults
 from mechgraph.model.response_setup import ResponseSetup
+from mechgraph.model.synthesis_setup import SynthesisSetup
 from mechgraph.pairs.contact_types import travels
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.quantities import BASE_UNITS, LENGTH, PURE, column, is_numeric, shown, unknown, without_units, wrong
@@ -104,6 +105,10 @@ class DeclaredParts(Formatted, Once):
     response: Annotated[
         ResponseSetup | None,
         TABLE("what `respond` takes where it is given nothing else", table="response", default="none"),
+    ]
+    synthesis: Annotated[
+        SynthesisSetup | None,
+        TABLE("what `synthesize` takes where it is given nothing else", table="synthesis", default="none"),
     ]
     expected: Annotated[Mapping[str, Any], FACTS("facts that a test checks; any names", default="empty")]
 
@@ -499,6 +504,10 @@ def _reference_faults(m: DeclaredParts) -> list[str]:
         faults += m.response.faults(m)
     elif m.response is not None:
         faults.append(wrong(m.response, "response", "an mg.ResponseSetup"))
+    if isinstance(m.synthesis, SynthesisSetup):
+        faults += m.synthesis.faults()
+    elif m.synthesis is not None:
+        faults.append(wrong(m.synthesis, "synthesis", "an mg.SynthesisSetup"))
     return faults
 
 

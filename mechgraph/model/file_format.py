@@ -24,6 +24,7 @@ from mechgraph.model.meshes import Mesh
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Misfit, Pair, Stiffness
 from mechgraph.model.response_setup import Event, ResponseSetup, Stop
+from mechgraph.model.synthesis_setup import SynthesisSetup, SynthesisTask
 from mechgraph.pairs.cam_laws import CamLaw, Segment
 from mechgraph.pairs.contact_types import Hertz
 from mechgraph.pairs.factors import Bookkeeping, Component, Freedom
@@ -169,6 +170,10 @@ TABLES_OF_FILE: dict[str, FileTable] = {
         sweep=_SWEEP,
     ),
     "response": _table(ResponseSetup),
+    "synthesis": _table(SynthesisSetup),
+    "synthesis_task": _table(
+        SynthesisTask, words="What is asked at every position: a function, a path, poses, or positions."
+    ),
     "event": _table(Event, words="A time at which the coordinate of a freedom, or one of its rates, passes a value."),
     "stop": _table(Stop, words="Limits of a freedom, which it strikes."),
     "law": _table(ForceTable, needed=("force",), rules=_one_of("anyOf", "x", "v", f"x{DEGREES}", f"v{DEGREES}")),

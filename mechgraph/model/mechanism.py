@@ -35,6 +35,7 @@ from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.model.parts import Parts
 from mechgraph.model.plane import in_space, is_flat, pair_in_plane, pair_in_space, spatial_row
 from mechgraph.model.response_setup import ResponseSetup
+from mechgraph.model.synthesis_setup import SynthesisSetup
 from mechgraph.pairs.contact_types import row_of, travels
 from mechgraph.pairs.pair_type import TABLE, PairType
 from mechgraph.pairs.plane import in_plane
@@ -153,6 +154,10 @@ def _response(m: DeclaredParts) -> Iterator[Block]:
     yield from _listed([] if m.response is None else [repr(m.response)])
 
 
+def _synthesis(m: DeclaredParts) -> Iterator[Block]:
+    yield from _listed([] if m.synthesis is None else [repr(m.synthesis)])
+
+
 def _start(m: DeclaredParts) -> Iterator[Block]:
     yield from _listed(f"{name} = {value:.6g}" for name, value in m.start.items() if value)
 
@@ -166,7 +171,7 @@ def _listed(items: Iterable[str]) -> Iterator[Block]:
 
 PARTS: Mapping[str, Any] = {
     "Links": _links, "Pairs": _pairs, "Drivers": _drives, "Gears": _gears, "Couplings": _couplings, "Loads": _loads,
-    "Response": _response, "Start": _start,
+    "Response": _response, "Synthesis": _synthesis, "Start": _start,
 }  # fmt: skip
 """The parts of the document by title."""
 
@@ -211,6 +216,8 @@ class Mechanism(DeclaredParts, Shown):
         Accuracy of directions [rad] and distances (relative to L), see ``snapped``. Default: exact.
     response : ResponseSetup, optional
         Default arguments of ``respond``.
+    synthesis : SynthesisSetup, optional
+        Default arguments of ``synthesize``.
     planar : bool
         It moves in the x-y plane alone: points, centers and forces may have two numbers, inertias and moments one (about z), R needs no
         axis, P one in the plane. What leaves the plane is zero by the model; 3 closure equations a loop, 3 equilibrium equations a link.
@@ -258,6 +265,7 @@ class Mechanism(DeclaredParts, Shown):
         units: Mapping[str, str] | None = None,
         tol: float | None = None,
         response: ResponseSetup | None = None,
+        synthesis: SynthesisSetup | None = None,
         planar: bool = False,
         source: str = "",
         description: str = "",
@@ -280,6 +288,7 @@ class Mechanism(DeclaredParts, Shown):
             units=MappingProxyType(dict(units) if isinstance(units, Mapping) else {}),
             tol=plain(tol),
             response=response,
+            synthesis=synthesis,
             planar=planar,
             source=source,
             description=description,
@@ -595,6 +604,9 @@ class Mechanism(DeclaredParts, Shown):
         faults = [wrong(unit, name, "the name of a unit") for name, unit in units.items() if not isinstance(unit, str)]
         if faults:
             raise DeclarationError("to_units", faults)
+        if self.synthesis is not None:
+            what = "its synthesis is in units of its own; leave it out with m.replace(synthesis=None)"
+            raise DeclarationError("to_units", [f"mechanism {self.name!r}: {what}"])
         base, turns = base_factors(self.units, units), self.turns
         return self.replace(
             links=[link.in_units(base) for link in self.links],

@@ -293,7 +293,7 @@ def _with_six(reader: _Reader, fields: dict[str, Any], where: str) -> None:
             fields[key] = tuple(value)
 
 
-NESTED = ("response", "cam_law")
+NESTED = ("response", "cam_law", "synthesis")
 """Tables whose arrays of tables hold objects."""
 READ_FIRST = {
     "motion": _with_sweep, "pair": _with_type, "pair_type": _with_parts, "bookkeeping": _with_lists,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain, combinations, pairwise
 from textwrap import wrap
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -38,6 +38,9 @@ from mechgraph.show.canvas import (
 )
 from mechgraph.show.curves import Abscissa, lay_out
 from mechgraph.show.skeleton import draw_skeleton
+
+if TYPE_CHECKING:
+    from mechgraph.synthesis.syntheses import Syntheses
 from mechgraph.variants.study import Study
 
 LETTER, CLEARED = (0.045, 0.11), 1.3
@@ -790,9 +793,29 @@ def draw_assemblies(modes: Assemblies) -> Any:
         where there is none.
     """
     drawn = [*zip(modes.modes, modes.kinds, strict=True), *((one.point, "continuum") for one in modes.continua)]
+    return _side_by_side(modes.mechanism, drawn, "there is no real assembly to draw")
+
+
+def draw_syntheses(found: Syntheses) -> Any:
+    """The skeletons of all mechanisms found side by side, numbered, with their worst transmission angles; the figure.
+
+    Raises
+    ------
+    DeclarationError
+        where there is none.
+    """
+    drawn = [
+        (m, f"{'good' if fit.good else 'defect'}, {np.rad2deg(fit.transmission):.3g} deg")
+        for m, fit in zip(found, found.fitness, strict=True)
+    ]
+    return _side_by_side(found.mechanism, drawn, "there is no mechanism to draw")
+
+
+def _side_by_side(m: Mechanism, drawn: Sequence[tuple[Mechanism, str]], none: str) -> Any:
+    """Skeletons of mechanisms like ``m``, numbered, and what is said of each."""
     if not drawn:
-        raise DeclarationError(f"picture of {modes.mechanism.name!r}", ["there is no real assembly to draw"])
-    # most assemblies drawn side by side
+        raise DeclarationError(f"picture of {m.name!r}", [none])
+    # most drawn side by side
     shown = drawn[:16]
     columns = int(np.ceil(np.sqrt(len(shown))))
     rows = -(-len(shown) // columns)

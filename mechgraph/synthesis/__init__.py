@@ -1,0 +1,1 @@
+"""All mechanisms of a declared topology that do what is asked."""

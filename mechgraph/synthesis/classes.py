@@ -1,0 +1,427 @@
+"""The class of a task: random complex mechanisms of the topology, and the tasks that they do; tracks of their dimensions between tasks.
+
+Known dimensions move as in ``modes.family``, such that loops keep the groups in which they move; what is asked is whatever a random
+mechanism does at random positions, so that a class holds tasks which can be done. Of every row of the task as many equations count as
+the closure has independent ones in its coordinates and the unknowns; beyond the coordinates that it settles these are its conditions.
+
+A step of Newton's method eliminates row by row: with ``J_i dq_i + B_i dz = b_i`` and ``N_i`` the left null space of ``J_i``, at last
+
+    (N_i B_i) dz = N_i b_i,    dq_i = J_i^+ (b_i - B_i dz).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from copy import copy
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from mechgraph.graph.linkgraph import link_graph
+from mechgraph.kinematics.assembly import close_all
+from mechgraph.kinematics.state import Configuration
+from mechgraph.maths.linear import complement, rank_of, singular_values
+from mechgraph.maths.se3 import Index, cross, finite_twist, pose_exp, rotation_exp
+from mechgraph.maths.tolerances import MODES
+from mechgraph.modes.family import NO_NUMBERS, Array, Family, common, generated
+from mechgraph.modes.homotopy import ENDLESS_STATE, Equations, Mask, rounding, solved
+from mechgraph.synthesis.system import Numbers, Problem, Rows
+from mechgraph.variants.numbers import MARKER
+
+
+@dataclass(frozen=True)
+class Member:
+    """Mechanisms, their ``numbers`` of markers, and the values asked of them ``drive (R, d, n)``; what is not asked is ignored."""
+
+    numbers: Numbers
+    drive: Array
+
+    def taken(self, which: Index) -> Member:
+        """Some of them; one serves for all."""
+        return self if self.drive.shape[-1] == 1 else Member(self.numbers.taken(which), self.drive[..., which])
+
+    @staticmethod
+    def joined(members: Sequence[Member]) -> Member:
+        """Several, one after the other."""
+        drive = np.concatenate([m.drive for m in members], axis=-1)
+        return Member(Numbers.joined([m.numbers for m in members]), drive)
+
+
+class NoClass(Exception):
+    """No random mechanism of the class could be closed at random positions."""
+
+
+class TaskClass:
+    """Equations of a class of tasks, as ``modes.homotopy`` follows them: states are the unknowns ``z (u,)`` and those of all rows.
+
+    ``free[i]`` are the freedoms of row ``i`` of which nothing is asked, ``mixing[i]`` the independent combinations of its rows,
+    ``settled[i]`` how many freedoms these determine; ``conditions (R,)`` are left for the unknowns.
+
+    Raises
+    ------
+    NoClass
+    """
+
+    idle = 0
+
+    def __init__(self, problem: Problem, rng: np.random.Generator) -> None:
+        self.problem, s = problem, problem.system
+        self.u, self.R, self.nx, self.F = problem.u, len(problem.rows), s.n_state, s.n_freedoms
+        self.given = ~np.isnan(problem.asked[problem.rows])
+        self.free = [complement(problem.columns[given], s.n_freedoms) for given in self.given]
+        start = problem.inside(problem.unknowns.declared[:, None])
+        # declared values may be anything, all in one place too: the class is read at others
+        spread = problem.numbers.with_values(problem.places, start + rng.normal(size=start.shape))
+        here = Configuration(problem.system_with(spread), problem.at_rest[:, None])
+        self.W = spread.norms.size if any(p.array != "point" for own in problem.places for p in own) else 0
+        self.family = self
+        self.of_row = Equations(Family(here, problem.columns, np.zeros((s.n_freedoms, 0))), None)
+        self.algebras = self._algebras(here)
+        self._read(rng)
+
+    # --- the class ---------------------------------------------------------------------------------------------------
+
+    def _algebras(self, here: Configuration) -> list[Array]:
+        """For every pair a basis ``(6, k)`` of the motions by which its place may be moved, in the global frame.
+
+        Of loops of the mechanism itself their own twists tell; of those that only what is asked of a link closes, its poses do too.
+        """
+        P, S = len(self.problem.m.pairs), here.S[:, :, 0]
+        through: list[list[Array]] = [[] for _ in range(P)]
+
+        def pass_through(loops: Iterable[list[int]], pairs: list[int]) -> None:
+            for loop in loops:
+                algebra = generated(np.concatenate([self._motions(k, S) for k in loop], axis=1))
+                for k in set(loop).intersection(pairs):
+                    through[k].append(algebra)
+
+        pass_through(([k for k, _ in loop] for loop in self.problem.m.once(link_graph).loops), list(range(P)))
+        alone = [k for k in range(P) if not through[k]]
+        pass_through(([k for k, _ in loop] for loop in here.system.graph.loops), alone)
+        return [common(algebras) if algebras else np.zeros((6, 0)) for algebras in through]
+
+    def _motions(self, k: int, S: Array) -> Array:
+        """Twists ``(6, n)`` that a pair adds to a loop: its own; of a free pair those to poses asked, where nothing is free."""
+        problem, s = self.problem, self.problem.system
+        columns = np.arange(s.first_column[k], s.first_column[k + 1])
+        at = [int(j[0]) for column in columns if (j := np.flatnonzero(problem.columns == column)).size]
+        values = problem.asked[:, at].T
+        if k < len(problem.m.pairs) or len(values) < 6 or np.isnan(values).any():
+            return S[:, columns]
+        turns = [rotation_exp(np.eye(3)[:, [j]] * values[3 + j]) for j in range(3)]
+        R = np.einsum("iat,abt,bjt->ijt", *turns)
+        e = finite_twist(R, values[:3], np.zeros_like(values[:3]))
+        e[3:] += cross(e[:3], problem.origin[:, None]) / problem.L
+        size = np.abs(e).max(axis=0)
+        return np.asarray(e[:, size > MODES.span] / size[size > MODES.span])
+
+    def _read(self, rng: np.random.Generator) -> None:
+        """Ranks of all rows at a random mechanism of the class, and a start there."""
+        # random mechanisms tried until one closes
+        for _ in range(8):
+            found = self.random_closed(rng)
+            if found is not None:
+                break
+        else:
+            raise NoClass
+        self.start, self.x = found
+        rows = self.at(self.start, self.x[:, None])
+        J, B = rows.by_coordinates[..., 0], rows.by_unknowns[..., 0]
+        n, ranks, settled = J.shape[1], [], []
+        for i, free in enumerate(self.free):
+            settled.append(_rank(J[i][:, free]))
+            ranks.append(_rank(np.concatenate([J[i][:, free], B[i]], axis=1)))
+        self.settled = settled
+        self.conditions = np.array(ranks) - np.array(settled)
+        mix = np.linalg.qr(rng.normal(size=(n, n)) + 1j * rng.normal(size=(n, n)))[0]
+        self.mixing = [None if rank == n else mix[:rank] for rank in ranks]
+
+    def random_closed(self, rng: np.random.Generator) -> tuple[Member, Array] | None:
+        """A random mechanism of the class at random positions: what it does there is a task that it solves."""
+        s, problem, z = self.problem.system, self.problem, _random(rng, self.u)
+        numbers = problem.numbers.moved(self._random_places(rng)).with_values(problem.places, z[:, None])
+        system = problem.system_with(numbers)
+        states = []
+        for _ in range(self.R):
+            # random positions tried until one closes without angles far from real ones
+            for _ in range(6):
+                dq = _random(rng, s.n_freedoms)[:, None]
+                x, error = close_all(system, s.advance(problem.at_rest[:, None].astype(complex), dq), NO_NUMBERS)
+                if error[0] < MODES.member_closed and not self.of_row.far(x, MOST_TURNED)[0]:
+                    break
+            else:
+                return None
+            states.append(x[:, 0])
+        X = np.array(states)
+        norms = numbers.norms.ravel()[: self.W]
+        return Member(numbers, X[:, s.single_rows[problem.columns], None]), np.concatenate([z, norms, X.ravel()])
+
+    def _random_places(self, rng: np.random.Generator) -> Array:
+        """Known places moved at random, such that loops keep the groups in which they move ``(3, 4, 2, P, 1)``."""
+        P = len(self.problem.whole.pairs)
+        moves = np.zeros((6, 2, P, 1), dtype=complex)
+        for k, basis in enumerate(self.algebras):
+            # a place that is declared on each link by itself moves on each by itself
+            sides = [slice(0, 2)] if self.problem.m.pairs[k].on_a is None else [0, 1]
+            for side in sides:
+                moves[:, side, k] = (basis @ (0.5 * _random(rng, basis.shape[1]))).reshape(
+                    6, *(1,) * (2 if side == slice(0, 2) else 1)
+                )
+        return pose_exp(moves)
+
+    def random_member(self, rng: np.random.Generator) -> Member:
+        """A random mechanism and a random task like those that mechanisms of the class do; what is asked of one row is asked of it alone.
+
+        Raises
+        ------
+        NoClass
+        """
+        for _ in range(8):
+            found = self.random_closed(rng)
+            if found is not None:
+                return found[0]
+        raise NoClass
+
+    # --- states ------------------------------------------------------------------------------------------------------
+
+    @property
+    def head(self) -> int:
+        """Numbers of a state before those of rows: unknowns, and norms of directions where these are unknown."""
+        return self.u + self.W
+
+    def _wide(self, values: Array) -> Array:
+        """``(R n, T)`` as ``(n, R T)``."""
+        T = values.shape[1]
+        n = len(values) // self.R
+        return values.reshape(self.R, n, T).transpose(1, 0, 2).reshape(n, self.R * T)
+
+    def _tall(self, values: Array) -> Array:
+        """``(n, R T)`` as ``(R n, T)``."""
+        n = len(values)
+        T = values.shape[1] // self.R
+        return values.reshape(n, self.R, T).transpose(1, 0, 2).reshape(n * self.R, T)
+
+    def advance(self, x: Array, dq: Array) -> Array:
+        """States after increments."""
+        rows = self.problem.system.advance(self._wide(x[self.head :]), self._wide(dq[self.head :]))
+        return np.concatenate([x[: self.head] + dq[: self.head], self._tall(rows)])
+
+    def state_rates(self, x: Array, dq: Array) -> Array:
+        """Rates of states for rates of increments."""
+        rows = self.of_row.state_rates(self._wide(x[self.head :]), self._wide(dq[self.head :]))
+        return np.concatenate([dq[: self.head], self._tall(rows)])
+
+    def normal(self, x: Array) -> Array:
+        """States with unit quaternions."""
+        return np.concatenate([x[: self.head], self._tall(self.of_row.normal(self._wide(x[self.head :])))])
+
+    def far(self, x: Array, angle: float = ENDLESS_STATE[0]) -> Mask:
+        """Which are on their way to infinity."""
+        rows = self.of_row.far(self._wide(x[self.head :]), angle).reshape(self.R, -1).any(axis=0)
+        return np.asarray(rows | (np.abs(x[: self.u]).max(axis=0, initial=0.0) > ENDLESS_STATE[1]))
+
+    def wound(self, change: Array) -> Array:
+        """Largest change ``(T,)`` of an angle."""
+        return self.of_row.wound(self._wide(change[self.head :])).reshape(self.R, -1).max(axis=0)
+
+    def size(self, x: Array, dq: Array) -> Array:
+        """Largest increment ``(T,)``, against the size of lengths."""
+        rows = self.of_row.size(self._wide(x[self.head :]), self._wide(dq[self.head :])).reshape(self.R, -1).max(axis=0)
+        own = (np.abs(dq[: self.u]) / (1.0 + np.abs(x[: self.u]))).max(axis=0, initial=0.0)
+        return np.maximum(rows, own)
+
+    def fingerprints(self, member: Member, x: Array) -> Array:
+        """What tells mechanisms apart: their unknowns."""
+        return x[: self.u]
+
+    # --- equations ---------------------------------------------------------------------------------------------------
+
+    def leg(self, begin: Member, end: Member, which: Index | None = None) -> TaskLeg:
+        """The ways between members."""
+        return TaskLeg(self, begin, end, which)
+
+    @cached_property
+    def turning(self) -> Mask:
+        """Which markers ``(2 P,)`` have unknown directions: the others go on rigidly from member to member."""
+        out = np.zeros((2, len(self.problem.whole.pairs)), dtype=bool)
+        for p in (p for own in self.problem.places for p in own if p.array != "point"):
+            out[p.side, p.pair] = True
+        return out.ravel()
+
+    def goal(self, numbers: Numbers) -> Member:
+        """Mechanisms with such numbers, and the task at hand."""
+        drive = np.nan_to_num(self.problem.asked[self.problem.rows])[:, :, None].astype(complex)
+        return Member(numbers, np.repeat(drive, numbers.point.shape[-1], axis=-1))
+
+    def at(self, member: Member, x: Array) -> Rows:
+        """The equations of members at states of which what is asked is set to what they ask."""
+        near = x[self.u : self.head].reshape(2, 2, -1, x.shape[1]) if self.W else None
+        X = x[self.head :].reshape(self.R, self.nx, -1).copy()
+        single = self.problem.system.single_rows[self.problem.columns]
+        for i, given in enumerate(self.given):
+            X[i, single[given]] = member.drive[i, given]
+        return self.problem.equations(member.numbers.with_values(self.problem.places, x[: self.u], near), X)
+
+    def state(self, rows: Rows) -> Array:
+        """The states of equations."""
+        z = [rows.numbers.at(places) for places in self.problem.places]
+        norms = rows.numbers.norms.reshape(-1, rows.T)[: self.W]
+        return np.concatenate([np.array(z).reshape(self.u, rows.T), norms, self._tall(rows.here.x)])
+
+
+MOST_TURNED = 2.0
+"""Imaginary part of an angle up to which a random mechanism serves as a start."""
+
+
+def _random(rng: np.random.Generator, n: int) -> Array:
+    return np.asarray(rng.normal(size=(n, 2)) @ [0.7, 0.5j])
+
+
+def _rank(A: Array) -> int:
+    return rank_of(singular_values(A), MODES.generic) if A.size else 0
+
+
+class TaskLeg:
+    """Straight ways between members ``begin`` and ``end``, one or several; ``which (V,)`` says which of them a track follows."""
+
+    def __init__(self, of: TaskClass, begin: Member, end: Member, which: Index | None = None) -> None:
+        self.equations, self.begin, self.end, self._which = of, begin, end, which
+        M0, M1 = begin.numbers.poses, end.numbers.poses
+        R = np.einsum("ijspb,kjspb->ikspb", M1[:, :3], M0[:, :3])
+        turned = np.einsum("ijspb,jspb->ispb", R, M0[:, 3])
+        eta = finite_twist(R, M1[:, 3] - turned, np.zeros_like(turned))
+        eta[:, of.turning.reshape(2, -1)] = 0.0
+        # rounding of a pose that stands still
+        self._eta = np.where(np.abs(eta).max(axis=(0, 3), keepdims=True) > MODES.slide, eta, 0.0)
+        self._change = [
+            np.where(of.turning.reshape(2, 1, -1, 1), b - a, 0.0)
+            for a, b in zip(begin.numbers.vectors, end.numbers.vectors, strict=True)
+        ]
+        moves = (self._eta != 0).any(axis=(0, 3)) | np.any([(c != 0).any(axis=(1, 3)) for c in self._change], axis=0)
+        self.moving = np.flatnonzero(moves.ravel())
+
+    def prints(self, x: Array, t: Array, tracks: Index) -> Array:
+        """What tells mechanisms apart."""
+        return x[: self.equations.u]
+
+    def at(self, x: Array, t: Array, tracks: Index) -> Arrow:
+        """The equations at states of tracks at ``t (T,)``."""
+        return Arrow(self, t, tracks, x)
+
+    def member(self, t: Array, tracks: Index) -> tuple[Member, Array, Array]:
+        """Members on the way, with the rates of what is asked ``(R, d, T)`` and of all vectors ``(3, 3, 2, P, T)``."""
+        if self._which is None:
+            begin, last, eta, change = self.begin, self.end.drive, self._eta, self._change
+        else:
+            which = self._which[tracks]
+            begin, (last, eta, *change) = (
+                self.begin.taken(which),
+                (v[..., which] if v.shape[-1] > 1 else v for v in (self.end.drive, self._eta, *self._change)),
+            )
+        X = pose_exp(t * eta)
+        vectors = begin.numbers.moved(X).vectors
+        w, (point, axis, second) = eta[:3], (v.swapaxes(0, 1) for v in vectors)
+        rates = np.stack([cross(w, point) + eta[3:], cross(w, axis), cross(w, second)])
+        rates = rates + np.stack([c.swapaxes(0, 1) for c in change])
+        numbers = Numbers.of(*(v + t * c for v, c in zip(vectors, change, strict=True)))
+        drive = last - begin.drive
+        return Member(numbers, begin.drive + t * drive), drive, rates
+
+
+class Arrow:
+    """The equations linearized at a batch of states, row by row."""
+
+    def __init__(self, leg: TaskLeg, t: Array, tracks: Index, x: Array) -> None:
+        self.leg, self.of = leg, leg.equations
+        self.member, self._change, self._rates = leg.member(t, tracks)
+        self.rows = self.of.at(self.member, x)
+
+    @cached_property
+    def x(self) -> Array:
+        """The states."""
+        return self.of.state(self.rows)
+
+    def again(self, x: Array) -> Arrow:
+        """The equations of the same members at other states."""
+        out = copy(self)
+        for name in ("x", "_factored"):
+            vars(out).pop(name, None)
+        out.rows = self.of.at(self.member, x)
+        return out
+
+    def idle(self) -> Array:
+        """None: what equations leave free stays at rest in the least norm."""
+        return np.zeros((self.rows.T, 0, 0))
+
+    @property
+    def noise(self) -> Array:
+        """Rounding ``(T,)`` to be expected of a Newton step."""
+        size = np.abs(self.rows.here.poses).max(axis=(0, 1, 2)).reshape(self.of.R, -1).max(axis=0)
+        return rounding(size)
+
+    def _mixed(self, values: Array) -> list[Array]:
+        """``(R, n, k, T)`` as the combinations of every row, ``(T, rank, k)``."""
+        out = []
+        for M, v in zip(self.of.mixing, values, strict=True):
+            mixed = v if M is None else np.tensordot(M, v, 1)
+            out.append(np.where(np.isfinite(mixed), mixed, 0.0).transpose(2, 0, 1))
+        return out
+
+    @cached_property
+    def _factored(self) -> tuple[list[tuple[Array, Array, Array]], Array]:
+        """``N_i``, ``J_i^+`` and ``B_i`` of all rows, and the matrix of the unknowns."""
+        out = []
+        J, B = (self._mixed(v) for v in (self.rows.by_coordinates, self.rows.by_unknowns))
+        for i, free in enumerate(self.of.free):
+            rank = self.of.settled[i]
+            U, sigma, Vh = np.linalg.svd(J[i][:, :, free])
+            back = (Vh[:, :rank].conj().swapaxes(1, 2) / np.maximum(sigma[:, None, :rank], 1e-300)) @ U[
+                :, :, :rank
+            ].conj().swapaxes(1, 2)
+            out.append((U[:, :, rank:].conj().swapaxes(1, 2), back, B[i]))
+        return out, np.concatenate([N @ B for N, _, B in out], axis=1)
+
+    @property
+    def matrix(self) -> Array:
+        """The matrix of the unknowns ``(T, u, u)``, all else eliminated."""
+        return self._factored[1]
+
+    def solve(self, right: Array) -> Array:
+        """Increments ``(head + R F, T)`` for a right side ``(R, n, T)``; NaN where singular."""
+        of, b = self.of, self._mixed(right[:, :, None])
+        parts, S = self._factored
+        T = self.rows.T
+        dz = solved(S, np.concatenate([N @ own for (N, _, _), own in zip(parts, b, strict=True)], axis=1))
+        dq = np.zeros((of.R, of.F, T), dtype=complex)
+        for i, ((_, back, B), own) in enumerate(zip(parts, b, strict=True)):
+            dq[i][of.free[i]] = (back @ (own - B @ dz))[:, :, 0].T
+        return np.concatenate([dz[:, :, 0].T, np.zeros((of.W, T)), dq.reshape(of.R * of.F, T)])
+
+    def newton(self, idle: Array) -> Array:
+        """The Newton step."""
+        return self.solve(-self.rows.residual)
+
+    def rates(self, idle: Array) -> tuple[Array, Array]:
+        """Rates of increments with ``t``."""
+        of, columns = self.of, self.of.problem.columns
+        change = np.where(of.given[:, :, None], self._change, 0.0)
+        J = self.rows.by_coordinates
+        opened = np.einsum("rndt,rdt->rnt", J[:, :, columns], np.broadcast_to(change, (*change.shape[:2], self.rows.T)))
+        if (moving := self.leg.moving).size:
+            P = len(of.problem.whole.pairs)
+            side, pair = moving // P, moving % P
+            opened = opened + self.rows.moved(side, pair, self._known_rates()[:, :, side, pair]).sum(axis=2)
+        out = self.solve(-opened)
+        whole = out[of.head :].reshape(of.R, of.F, -1)
+        for i, given in enumerate(of.given):
+            whole[i][columns[given]] = change[i, given]
+        return out, idle
+
+    def _known_rates(self) -> Array:
+        """Rates ``(3, 3, 2, P, T)`` of points, axes and second directions that are known."""
+        out = self._rates.copy()
+        for places in self.of.problem.places:
+            for p in places:
+                out[MARKER.index(p.array), p.component, p.side, p.pair] = 0.0
+        return out

@@ -1,0 +1,296 @@
+"""All solutions of a task: start sets by monodromy over tasks, the trace test, and tracks to the task at hand.
+
+A random complex mechanism at random positions gives a task that it solves; as the task and the known dimensions go round, this solution
+is led to others of the first task: finite ones only, and no others than mechanisms of its kind, as the pairs of a random mechanism do not
+coincide. (Plecnik and Fearing, Finding only finite roots to large kinematic synthesis systems, J. Mech. Robotics 9, 2017.)
+
+In the trace test what is asked of one row goes along a line: ``exp(i q)`` of angles and lengths are linear in one number, on which the
+sum of a combination of the unknowns over all solutions depends rationally.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mechgraph.errors import MechgraphError, counted
+from mechgraph.files import cache_folder, whole_file
+from mechgraph.maths.tolerances import MODES
+from mechgraph.modes.family import Array
+from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, follow
+from mechgraph.modes.start_sets import (
+    MISSED,
+    MISSED_AGAIN,
+    NOT_PASSED,
+    Group,
+    Pencil,
+    Trace,
+    distinct,
+    tame,
+    trace_test,
+)
+from mechgraph.modes.targets import TrackRun, run_tracks
+from mechgraph.synthesis.classes import Member, TaskClass
+from mechgraph.synthesis.system import Numbers
+from mechgraph.variants.numbers import MARKER
+
+Progress = Callable[[str], None] | None
+
+
+@dataclass(frozen=True)
+class TaskStart:
+    """All solutions ``x (nx, N)`` known of a task of a class, and what that they are all rests on (see ``modes.start_sets.StartSet``)."""
+
+    member: Member
+    x: Array
+    loops: int
+    chance: float
+    lost: int
+    followed: int
+    trace: Trace
+
+    @property
+    def word(self) -> str:
+        """How sure it is that none is missing."""
+        return "tested" if self.trace.passed and self.chance <= MISSED_AGAIN else "searched"
+
+    @property
+    def evidence(self) -> tuple[str, ...]:
+        """What that rests on."""
+        loops = (
+            f"A random complex task of the class has {counted(self.x.shape[1], 'solution')}: {counted(self.loops, 'loop')} of such tasks "
+            f"brought no further one (chance of one missed {self.chance:.1g} where all permutations are as likely), {self.lost} of "
+            f"{self.followed} tracks lost."
+        )
+        if not self.trace.passed:
+            return (loops, "No trace test passed; solutions may be missing.")
+        return (
+            f"Trace test passed: over {self.trace.samples} tasks on a line a sum over all solutions is a rational function of degree "
+            f"{self.trace.degree} (the singular values of its Loewner matrix end there: {self.trace.last:.1g}, {self.trace.beyond:.1g}).",
+            loops,
+        )
+
+
+class TaskPencil:
+    """Tasks on a line through that of a member: of one row ``exp(i q)`` of angles and lengths grow linearly with ``z``.
+
+    The line leads towards a task that some mechanism does; the other rows leave a curve of mechanisms, which it cuts.
+    """
+
+    first = 16
+    anywhere = staticmethod(Pencil.anywhere)
+
+    def __init__(self, equations: TaskClass, base: Member, rng: np.random.Generator) -> None:
+        self.of, self.base = equations, base
+        row, length = int(np.argmax(equations.conditions)), self._length
+        other = equations.random_member(rng).drive[row, :, 0] - base.drive[row, :, 0]
+        part = rng.normal(size=2) @ [0.7, 0.7j]
+        self.rate = np.zeros(base.drive.shape[:2], dtype=complex)
+        self.rate[row] = part * np.where(length, other, np.exp(1j * np.where(length, 0.0, other)) - 1.0)
+        self.weights = rng.normal(size=(equations.u, 2)) @ [1.0, 1.0j]
+
+    @property
+    def _length(self) -> Array:
+        return self.of.problem.system.is_length[self.of.problem.columns]
+
+    def members(self, phi: Array) -> Member:
+        """Tasks at ``phi (n,)``."""
+        grown = self.rate[:, :, None] * (np.exp(1j * phi) - 1.0)
+        length = self._length
+        drive = self.base.drive + np.where(
+            length[:, None], grown, -1j * np.log(1.0 + np.where(length[:, None], 0.0, grown))
+        )
+        return Member(self.base.numbers.taken(np.zeros(len(phi), dtype=np.intp)), drive)
+
+    def sums(self, x: Array, phi: Array) -> tuple[Array, Array, Array]:
+        """``z``, the sum and weights at pairs of tasks ``phi (n,)`` to both of which all tracks come."""
+        n, N = len(phi), x.shape[1]
+        tracked = follow(self.of.leg(self.base, self.members(phi), np.repeat(np.arange(n), N)), np.tile(x, n), Care())
+        g = (self.weights @ tracked.x[: self.of.u]).reshape(n, N)
+        size = np.maximum(1.0, np.abs(tracked.x[: self.of.u]).max(axis=0, initial=1.0)).reshape(n, N).max(axis=1)
+        good = tracked.arrived.reshape(n, N).all(axis=1) & np.isfinite(g).all(axis=1)
+        good = np.repeat(good.reshape(-1, 2).all(axis=1), 2)
+        z = np.exp(1j * phi)
+        return z[good], g.sum(axis=1)[good], (np.maximum(1.0, np.abs(z)) / size)[good]
+
+
+def start_set(of: TaskClass, rng: np.random.Generator, progress: Progress) -> TaskStart:
+    """All solutions of a random task of a class."""
+    # solutions from which on they are not looked for any further
+    group = Group(of, of.start, of.x[:, None], 20_000)
+    group.grow(MISSED, rng, progress)
+    group.move(*tame(of, group.base, group.x, rng))
+    group.grow(MISSED_AGAIN, rng, progress)
+    trace = (
+        trace_test(of, group.base, group.x, rng, progress, TaskPencil) if group.chance <= MISSED_AGAIN else NOT_PASSED
+    )
+    return TaskStart(group.base, group.x, group.quiet, group.chance, group.lost, group.followed, trace)
+
+
+# --- kept in a folder ----------------------------------------------------------------------------------------------------
+
+
+def key_of(of: TaskClass) -> str:
+    """What a start set serves for: topology, unknowns, what is asked where, and the groups in which loops move."""
+    problem = of.problem
+    spans = [
+        (np.round(basis @ basis.T, 5) + 0.0).tolist() if 0 < basis.shape[1] < 6 else basis.shape[1]
+        for basis in of.algebras
+    ]
+    told = [
+        [(pair.type.symbol, pair.a == problem.m.frame, pair.on_a is None) for pair in problem.whole.pairs],
+        np.array(problem.whole.pair_ends).tolist(),
+        [[(p.array, p.side, p.component, p.pair) for p in places] for places in problem.places],
+        problem.columns.tolist(),
+        of.given.tolist(),
+        spans,
+        of.conditions.tolist(),
+        problem.rows.tolist(),
+        [[(c.coefficients, c.constant) for c in problem.m.couplings]],
+    ]
+    # the first figure is the version of the files
+    return "1-" + hashlib.sha256(json.dumps(told, default=str).encode()).hexdigest()[:32]
+
+
+PACKED = Path(__file__).with_name("start-sets.npz")
+"""Start sets that come with the package, names are ``key/array``; made by ``tests/benchmarks/make_task_starts.py``."""
+
+
+def _kept(of: TaskClass) -> TaskStart | None:
+    """The start set of a class that is kept by the user, or else came with the package, where there is one and it is closed."""
+    key = key_of(of)
+    return _read(of, cache_folder() / f"task-{key}.npz", "") or _read(of, PACKED, f"{key}/")
+
+
+def _read(of: TaskClass, file: Path, prefix: str) -> TaskStart | None:
+    try:
+        with file.open("rb") as handle, np.load(handle, allow_pickle=False) as f:
+            vectors = [f[prefix + name] for name in MARKER]
+            loops, lost, followed, degree, samples = f[prefix + "counts"].tolist()
+            chance, last, beyond = f[prefix + "sizes"].tolist()
+            member, trace = Member(Numbers.of(*vectors), f[prefix + "drive"]), Trace(degree, samples, last, beyond)
+            found = TaskStart(member, f[prefix + "x"], loops, chance, lost, followed, trace)
+        here = of.at(found.member, found.x)
+        size = np.maximum(1.0, np.abs(here.here.poses).max())
+        return found if np.abs(here.residual).max() < MODES.member_closed * size else None
+    except (OSError, ValueError, KeyError, IndexError, EOFError, RuntimeError, zipfile.BadZipFile, TypeError):
+        return None
+
+
+def arrays(of: TaskClass, start: TaskStart) -> dict[str, Any]:
+    """A start set as arrays by name."""
+    known = dict(zip(MARKER, start.member.numbers.vectors, strict=True))
+    sizes = np.array([start.chance, start.trace.last, start.trace.beyond])
+    counts = np.array([start.loops, start.lost, start.followed, start.trace.degree, start.trace.samples])
+    return known | {"drive": start.member.drive, "x": start.x, "sizes": sizes, "counts": counts}
+
+
+def _keep(of: TaskClass, start: TaskStart) -> None:
+    """Keep a start set, as far as the folder allows."""
+    try:
+        cache_folder().mkdir(parents=True, exist_ok=True)
+        with whole_file(cache_folder() / f"task-{key_of(of)}.npz") as temporary, temporary.open("xb") as handle:
+            np.savez_compressed(handle, **arrays(of, start))
+    except (OSError, RuntimeError, MechgraphError):
+        return
+
+
+# --- the task at hand ----------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class TaskEnds:
+    """What tracks to a task came to: regular solutions ``x (nx, n)``, singular ones, and how many went to infinity or were lost."""
+
+    x: Array
+    singular: Array
+    infinite: int
+    lost: int
+    runs: int
+
+
+def ends(
+    of: TaskClass, start: TaskStart, goals: Member, rng: np.random.Generator, progress: Progress
+) -> list[TaskEnds]:
+    """Tracks of all solutions of a start set to tasks; further runs by way of random tasks make up for tracks that are lost."""
+    n, N = goals.drive.shape[-1], start.x.shape[1]
+    every, left = [TaskEnds(start.x[:, :0], start.x[:, :0], 0, N, 0) for _ in range(n)], np.arange(n)
+    # runs of all tracks, at most
+    for run in range(4):
+        if progress is not None:
+            progress(f"{counted(N, 'track')} to {counted(len(left), 'task')}, run {run + 1}")
+        care = Care() if run < 2 else Care().finer
+        begin, x = start.member, start.x
+        if run:
+            begin = of.random_member(rng)
+            there = follow(of.leg(start.member, begin), x, care)
+            x = there.x[:, there.arrived]
+        block = max(1, TRACKS_TOGETHER // max(x.shape[1], 1))
+        for some in np.split(left, np.arange(block, len(left), block)):
+            which = np.repeat(np.arange(len(some)), x.shape[1])
+            if not which.size:
+                continue
+            here = run_tracks(of.leg(begin, goals.taken(some), which), np.tile(x, len(some)), care)
+            for j, place in enumerate(some.tolist()):
+                _account(of, every[place], here.taken(np.flatnonzero(which == j)), N - x.shape[1])
+        left = left[[every[i].lost > 0 for i in left]]
+        if not left.size:
+            break
+    return every
+
+
+def _account(of: TaskClass, known: TaskEnds, run: TrackRun, lost_before: int) -> None:
+    """Put the ends of a run to those that are known."""
+    u, N = of.u, lost_before + len(run.regular)
+    regular = run.x[:, run.regular]
+    new = distinct(regular[:u], known.x[:u])
+    known.x = np.concatenate([known.x, regular[:, new]], axis=1)
+    singular, infinite = run.x[:, run.singular], int(run.infinite.sum())
+    # the run counts in which most is known
+    if not known.runs or singular.shape[1] + infinite > known.singular.shape[1] + known.infinite:
+        known.singular, known.infinite = singular, infinite
+    known.runs += 1
+    known.lost = max(N - known.x.shape[1] - known.singular.shape[1] - known.infinite, 0)
+
+
+def start_of(of: TaskClass, rng: np.random.Generator, cache: bool, progress: Progress) -> TaskStart:
+    """The start set of a class: a kept one, or else one that is made, and kept where it is whole."""
+    known = _kept(of) if cache else None
+    if known is not None:
+        return known
+    made = start_set(of, rng, progress)
+    if cache and made.chance <= MISSED_AGAIN:
+        _keep(of, made)
+    return made
+
+
+# --- real solutions ------------------------------------------------------------------------------------------------------
+
+
+def real_states(of: TaskClass, goal: Member, x: Array) -> tuple[Array, Array, Array]:
+    """Real ones of solutions ``x (nx, n)`` of a task, closed to rounding, their errors in all rows, and which these are ``(n,)``."""
+    size = np.maximum(1.0, np.abs(x[: of.u]).max(axis=0, initial=0.0))
+    near = np.flatnonzero(np.abs(x[: of.u].imag).max(axis=0, initial=0.0) < MODES.real_singular * size)
+    if not near.size:
+        return x[:, near].real, np.zeros(0), near
+    leg, t, tracks = of.leg(goal, goal), np.ones(len(near)), np.arange(len(near))
+    with np.errstate(all="ignore"):
+        here = leg.at(x[:, near].real.astype(complex), t, tracks)
+        # Newton steps to rounding
+        for _ in range(8):
+            here = here.again(of.advance(here.x, here.newton(here.idle())))
+    error = here.rows.here.closure.reshape(of.R, -1).max(axis=0, initial=0.0)
+    moved = np.abs(here.x[: of.u] - x[: of.u, near]).max(axis=0, initial=0.0)
+    imaginary = np.abs(here.x.imag).max(axis=0, initial=0.0)
+    good = (moved < MODES.real_singular * size[near]) & (
+        imaginary < MODES.real_closed * np.abs(here.x).max(axis=0, initial=1.0)
+    )
+    good &= np.isfinite(here.x).all(axis=0)
+    return here.x[:, good].real, error[good], near[good]

@@ -1,0 +1,861 @@
+"""All mechanisms that do what is asked, as they are returned."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cache, partial
+from typing import TYPE_CHECKING, Annotated, Any, get_args
+
+import numpy as np
+
+from mechgraph import methods
+from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table
+from mechgraph.errors import DeclarationError, counted
+from mechgraph.files import optional, plain
+from mechgraph.force.loads import user_poses
+from mechgraph.kinematics.state import Configuration
+from mechgraph.maths.se3 import Array
+from mechgraph.maths.tolerances import MODES
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.synthesis_setup import DefectName, FitName, SynthesisSetup
+from mechgraph.modes.assemblies import weakest
+from mechgraph.modes.homotopy import Mask
+from mechgraph.quantities import Count, door, wrong
+from mechgraph.quantities import Index as Seed
+from mechgraph.synthesis.classes import Member, NoClass, TaskClass
+from mechgraph.synthesis.fitness import Fitness, Measure, fitness, keeps, limits_of
+from mechgraph.synthesis.fits import Fit, Fitted, Point, fitted
+from mechgraph.synthesis.solve import Progress, TaskEnds, TaskStart, ends, real_states, start_of
+from mechgraph.synthesis.symmetries import Symmetry, orbits, symmetries
+from mechgraph.synthesis.system import Numbers, Problem
+from mechgraph.synthesis.tasks import FunctionTask, function, path, poses, positions
+from mechgraph.synthesis.unknowns import Unknowns
+
+if TYPE_CHECKING:
+    import pandas
+
+
+@dataclass(frozen=True)
+class ComplexSyntheses:
+    """Solutions that are not real: ``values (k, u)`` of the unknowns."""
+
+    values: Array
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+
+@dataclass(frozen=True)
+class Degenerate:
+    """Solutions of the equations that are no mechanisms of their own, and that ``total`` does not count."""
+
+    kind: Annotated[str, "double, coincident or reversed"]
+    count: int
+    text: str
+
+
+class Fitnesses(Sequence[Fitness]):
+    """Fitness of mechanisms, each found when first asked for."""
+
+    def __init__(self, makers: Sequence[Callable[[], Fitness]]) -> None:
+        self._makers = tuple(makers)
+
+    def __len__(self) -> int:
+        return len(self._makers)
+
+    def __getitem__(self, i: int | slice) -> Any:
+        return tuple(make() for make in self._makers[i]) if isinstance(i, slice) else self._makers[i]()
+
+
+@dataclass(frozen=True)
+class RejectedAnswer:
+    """A mechanism that does what is asked and fell for a condition."""
+
+    mechanism: Mechanism
+    values: tuple[float, ...]
+    reasons: Annotated[tuple[str, ...], "defects, and conditions that it does not keep"]
+
+
+@dataclass(frozen=True)
+class SynthesesData:
+    """All mechanisms that do what is asked, and how sure it is that these are all."""
+
+    mechanism: str
+    unknown: tuple[str, ...]
+    values: Annotated[tuple[tuple[float, ...], ...], "of every mechanism"]
+    completeness: Annotated[str, "proved, tested or searched"]
+    evidence: tuple[str, ...]
+    total: Annotated[int | None, "over the complex numbers, for general data; none of fits"]
+    classes: Annotated[int | None, "the same, those as one that symmetries make of each other"]
+    complex: Annotated[int, "how many are not real"]
+    infinite: Annotated[int, "how many went to infinity here"]
+    degenerate: tuple[Degenerate, ...]
+    residual: tuple[float, ...]
+    fitness: tuple[Fitness, ...]
+    rejected: Annotated[tuple[tuple[str, ...], ...], "of every mechanism that was left out, why"]
+
+
+@dataclass(frozen=True, repr=False)
+class Syntheses(Shown, Sequence[Mechanism]):
+    """All real mechanisms of a topology that do what is asked, each a Mechanism with ``start`` at row 0. Returned by ``synthesize``.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+        As declared.
+    unknown : tuple of str
+        The numbers that were sought.
+    values : (n, u) array
+        Their values.
+    poses : (n, rows, N, 4, 4) array
+        Poses of all links at every row.
+    coordinates : (n, rows, F) array
+        All freedoms [rad, length].
+    residual : (n,) array
+        Worst error of closure or task at any row (radians, lengths over the size of the task).
+    complex : object
+        ``values (k, u)`` of the solutions that are not real.
+    total : int or None
+        Finite nondegenerate solutions over the complex numbers for general data of this task.
+    classes : int
+        The same, those as one that symmetries make of each other.
+    symmetries : tuple
+        Exchanges of pairs that make a solution of a solution: ``name``, ``order``, ``text``.
+    copies : tuple
+        For each mechanism the numbers of those that symmetries make of it, itself too.
+    degenerate : tuple
+        Solutions that are no mechanisms of their own: ``kind``, ``count``, ``text``.
+    infinite : int
+        How many went to infinity here.
+    completeness : {"tested", "searched"}
+        A trace test passed, and no track was lost; or not.
+    evidence : tuple of str
+        The reasons, with numbers.
+    condition : (n,) array
+        Condition numbers of the unknowns in the conditions.
+    fitness : sequence
+        Of each, see ``Fitness``; found when first asked for.
+    rejected : tuple
+        Mechanisms that ``require``, ``conditions`` and ``bounds`` left out: ``mechanism``, ``values``, ``reasons``.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> links = [mg.Link("frame"), mg.Link("crank"), mg.Link("body")]
+    >>> A = mg.Pair("A", "R", "frame", "crank", point=(0, 0))
+    >>> B = mg.Pair("B", "R", "crank", "body", point=(1, 0))
+    >>> m = mg.Mechanism("crank", links, [A, B], planar=True)
+    >>> poses = mg.poses("body", [[0, 0, 0], [1, 0.5, 0.4], [2, 0.4, 1.1]])
+    >>> s = mg.synthesize(m, poses, ["B.point"])
+    >>> len(s), s.unknown, bool(s.residual[0] < 1e-12)
+    (1, ('B.point.x', 'B.point.y'), True)
+    """
+
+    mechanism: Mechanism
+    mechanisms: tuple[Mechanism, ...]
+    unknown: tuple[str, ...]
+    values: Array
+    poses: Array
+    coordinates: Array
+    residual: Array
+    complex: ComplexSyntheses
+    total: int | None
+    degenerate: tuple[Degenerate, ...]
+    infinite: int
+    completeness: str
+    evidence: tuple[str, ...]
+    condition: Array
+    fitness: Sequence[Fitness]
+    classes: int | None = None
+    symmetries: tuple[Symmetry, ...] = ()
+    copies: tuple[tuple[int, ...], ...] = ()
+    rejected: tuple[RejectedAnswer, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.mechanisms)
+
+    def __getitem__(self, i: int | slice) -> Any:
+        return self.mechanisms[i]
+
+    def __iter__(self) -> Iterator[Mechanism]:
+        return iter(self.mechanisms)
+
+    def field(self, name: str) -> Array:
+        """Values ``(n,)`` of one unknown number.
+
+        Raises
+        ------
+        DeclarationError
+            where it was none.
+        """
+        if name not in self.unknown:
+            raise DeclarationError("syntheses", [f"field {name!r}: unknown were {', '.join(self.unknown)}"])
+        return np.asarray(self.values[:, self.unknown.index(name)])
+
+    def taken(self, which: Sequence[int]) -> Syntheses:
+        """Some of them, in that order; what is said of the whole stays."""
+        k = list(which)
+        place = {old: new for new, old in enumerate(k)}
+        return replace(
+            self,
+            copies=tuple(tuple(sorted(place[j] for j in self.copies[i] if j in place)) for i in k if self.copies),
+            mechanisms=tuple(self.mechanisms[i] for i in k),
+            fitness=Fitnesses([partial(self.fitness.__getitem__, i) for i in k]),
+            **{name: getattr(self, name)[k] for name in ("values", "poses", "coordinates", "residual", "condition")},
+        )
+
+    @property
+    def distinct(self) -> Syntheses:
+        """The first of every set of copies."""
+        return self.taken([i for i in range(len(self)) if not self.copies or self.copies[i][0] == i])
+
+    @property
+    def good(self) -> Syntheses:
+        """Those without a defect that is known; all without a driver, see ``Fitness``."""
+        return self.taken([i for i, fit in enumerate(self.fitness) if fit.good])
+
+    def ranked(self, by: str | Callable[[Mechanism], float] = "transmission") -> Syntheses:
+        """Sort the mechanisms, the best first.
+
+        Parameters
+        ----------
+        by : str or callable
+            ``"transmission"`` (the worst one, falling), ``"size"``, ``"ratio"``, ``"error"``, or a function of a Mechanism, rising.
+
+        Returns
+        -------
+        Syntheses
+
+        Raises
+        ------
+        DeclarationError
+            No such quantity.
+        """
+        names = ("transmission", "size", "ratio", "error")
+        if not callable(by) and by not in names:
+            raise DeclarationError("syntheses", [wrong(by, "by", f"{', '.join(map(repr, names))}, or a function")])
+        values = [float(by(m)) for m in self] if callable(by) else [getattr(fit, by) for fit in self.fitness]
+        sign = -1.0 if by == "transmission" else 1.0
+        return self.taken(
+            sorted(range(len(self)), key=lambda i: (np.isnan(values[i]), sign * np.nan_to_num(values[i]), i))
+        )
+
+    def kept(
+        self, require: Sequence[Any], bounds: Mapping[str, Any], limits: Sequence[Any], driver: str | None
+    ) -> Syntheses:
+        """Those without the defects named, with unknowns within bounds, that keep limits; why others were left out is in ``rejected``."""
+        if not (require or bounds or limits):
+            return self
+        keep, out = [], list(self.rejected)
+        for i, m in enumerate(self):
+            lacks = self.fitness[i].lacks(require) if require else ()
+            why = [f"no {name}" if name == "full_turn" else f"{name} defect" for name in lacks]
+            for name, (least, most) in bounds.items():
+                value = self.field(name)[i]
+                why += [] if keeps(value, least, most) else [f"{name} = {value:.6g}"]
+            for name, measure, least, most in limits:
+                values = measure(m, self.coordinates[i], driver)
+                if not keeps(values, least, most):
+                    ends = dict.fromkeys((float(np.min(values)), float(np.max(values))))
+                    why.append(f"{name} = {' to '.join(f'{end:.6g}' for end in ends)}")
+            if why:
+                out.append(RejectedAnswer(m, tuple(self.values[i].tolist()), tuple(why)))
+            else:
+                keep.append(i)
+        return replace(self.taken(keep), rejected=tuple(out))
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a DataFrame, a row per mechanism: unknowns, fitness, residual.
+
+        Returns
+        -------
+        pandas.DataFrame
+
+        Raises
+        ------
+        MissingExtraError
+            Without pandas.
+        """
+        columns = dict(zip(self.unknown, self.values.T, strict=True))
+        columns |= {f.name: [getattr(fit, f.name) for fit in self.fitness] for f in fields(Fitness)}
+        columns |= {"good": [fit.good for fit in self.fitness], "residual": self.residual}
+        return optional("pandas", "pandas").DataFrame(columns)
+
+    def plot(self) -> Any:
+        """Draw all mechanisms side by side at their first position.
+
+        Returns
+        -------
+        Figure
+            Of matplotlib.
+
+        Raises
+        ------
+        MissingExtraError
+            Without matplotlib.
+        """
+        return methods.call("draw_syntheses", self)
+
+    def document(self) -> Document:
+        """A table of the mechanisms, and how sure it is that these are all."""
+        rows = tuple(
+            (
+                str(i),
+                *(f"{v:.6g}" for v in values),
+                "yes" if fit.good else "no",
+                _degrees(fit.transmission),
+                f"{fit.size:.4g}",
+            )
+            for i, (values, fit) in enumerate(zip(self.values, self.fitness, strict=True))
+        )
+        header = ("mechanism", *self.unknown, "good", "transmission [deg]", "size")
+        told = " ".join([f"Completeness: {self.completeness}.", *self.evidence, *(one.text for one in self.degenerate)])
+        if any(fit.branch is None for fit in self.fitness):
+            told += " No single driver determines the positions: nothing is known of defects and transmission."
+        title = f"{self.mechanism.name}: {counted(len(self), 'mechanism')}"
+        title += "" if self.total is None else f", of {counted(self.total, 'solution')} over the complex numbers"
+        left_out = [f"{', '.join(f'{v:.6g}' for v in one.values)}: {'; '.join(one.reasons)}" for one in self.rejected]
+        blocks: list[Block] = [Table(header, rows), Paragraph(told)]
+        return Document(title, blocks + ([Heading("Left out", 2), Bullets(left_out)] if left_out else []))
+
+    @property
+    def data(self) -> SynthesesData:
+        """Everything but arrays of poses as a record."""
+        return SynthesesData(
+            self.mechanism.name,
+            self.unknown,
+            tuple(map(tuple, self.values.tolist())),
+            self.completeness,
+            self.evidence,
+            self.total,
+            self.classes,
+            len(self.complex),
+            self.infinite,
+            self.degenerate,
+            tuple(self.residual.tolist()),
+            tuple(self.fitness),
+            tuple(one.reasons for one in self.rejected),
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The same as plain data."""
+        return plain(self.data)
+
+
+@dataclass(frozen=True, repr=False)
+class SynthesesOver(Shown, Sequence[Syntheses]):
+    """Mechanisms for several values of what is swept, ``s[k][i]``. Returned by ``synthesize`` with ``sweep``.
+
+    Attributes
+    ----------
+    sweep : mapping
+        The values ``(n,)`` given, by name.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> links = [mg.Link("frame"), mg.Link("crank"), mg.Link("body")]
+    >>> A = mg.Pair("A", "R", "frame", "crank", point=(0, 0))
+    >>> B = mg.Pair("B", "R", "crank", "body", point=(1, 0))
+    >>> m = mg.Mechanism("crank", links, [A, B], planar=True)
+    >>> poses = mg.poses("body", [[0, 0, 0], [1, 0.5, 0.4], [2, 0.4, 1.1]])
+    >>> s = mg.synthesize(m, poses, ["B.point"], sweep={"A.point.x": [0.0, 0.1]})
+    >>> [len(one) for one in s], s.completeness
+    ([1, 1], 'tested')
+    """
+
+    sweep: Mapping[str, Array]
+    positions: tuple[Syntheses, ...]
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def __getitem__(self, k: int | slice) -> Any:
+        return self.positions[k]
+
+    @property
+    def completeness(self) -> str:
+        """The weakest of all."""
+        return weakest(s.completeness for s in self.positions)
+
+    def document(self) -> Document:
+        """How many mechanisms there are for every value."""
+        rows = tuple(
+            (*(f"{v[k]:.6g}" for v in self.sweep.values()), str(len(s)), str(len(s.complex)), s.completeness)
+            for k, s in enumerate(self.positions)
+        )
+        header = (*self.sweep, "real", "not real", "completeness")
+        return Document(f"{self.positions[0].mechanism.name}: syntheses", (Table(header, rows),))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything as plain data."""
+        return {"sweep": plain(dict(self.sweep)), "positions": [s.to_dict() for s in self.positions]}
+
+
+def _degrees(angle: float) -> str:
+    return f"{np.rad2deg(angle):.4g}" if np.isfinite(angle) else "-"
+
+
+class Synthesis:
+    """What ``synthesize`` asks, and its answers."""
+
+    def __init__(
+        self,
+        m: Mechanism,
+        tasks: Any,
+        unknown: Sequence[str],
+        sweep: Mapping[str, Any],
+        seed: int,
+        cache: bool,
+        progress: Progress,
+    ) -> None:
+        self.problem, self.rng, self.cache, self.progress = (
+            Problem(m, tasks, unknown),
+            np.random.default_rng(seed),
+            cache,
+            progress,
+        )
+        self.tasks = tasks
+        p, faults = self.problem, []
+        faults += [
+            f"unknown {name!r}: is no component of a point, an axis or a second direction" for name in p.unknowns.others
+        ]
+        if p.tasks is not None and p.tasks.scaled:
+            faults.append('function with scale="free": the factor is not sought by exact synthesis yet')
+        placed = [pair.name for pair in m.pairs if pair.on_a is not None and pair.contact is None]
+        if placed:
+            faults.append(
+                f"pairs {', '.join(placed)}: are placed on each link by itself; exact synthesis takes pairs by point= and axis= so far"
+            )
+        guided = [pair.name for pair in m.pairs if pair.contact is not None or pair.type.takes_pitch]
+        if guided:
+            faults.append(
+                f"pairs {', '.join(guided)}: screws, curves and surfaces are not served by exact synthesis so far"
+            )
+        if m.couplings:
+            faults.append("couplings: are not served by exact synthesis so far; leave them out (couplings=[])")
+        self.sweep = Unknowns(m, p.whole, list(sweep), faults)
+        faults += [
+            f"sweep {name!r}: is unknown; leave it out there" for name in self.sweep.names if name in p.unknowns.names
+        ]
+        faults += [
+            f"sweep {name!r}: is no component of a point, an axis or a second direction" for name in self.sweep.others
+        ]
+        columns = [np.atleast_1d(np.asarray(v, dtype=float)) for v in sweep.values()]
+        if len({len(c) for c in columns}) > 1 or len(columns) != len(self.sweep.names):
+            faults.append(
+                "sweep: expected single numbers by name, with one list of values each, all of the same length"
+            )
+        if faults:
+            raise DeclarationError(p.name, faults)
+        self.swept = np.array(columns).reshape(len(columns), -1 if columns else 1)
+        try:
+            self.of = TaskClass(p, self.rng)
+        except NoClass:
+            raise DeclarationError(
+                p.name, ["no random mechanism of this kind could be closed at random positions"]
+            ) from None
+        self._count()
+        self.symmetries = symmetries(p)
+
+    def _count(self) -> None:
+        """As many conditions as unknowns.
+
+        Raises
+        ------
+        DeclarationError
+        """
+        p, wanted = self.problem, int(self.of.conditions.sum())
+        if wanted == p.u:
+            return
+        names = [p.unknowns.names[k] for k in p.sought]
+        each = ", ".join(f"{c} at row {row}" for row, c in zip(p.rows, self.of.conditions, strict=True))
+        counts = f"{counted(wanted, 'condition')} ({each}) for {counted(p.u, 'unknown')} ({', '.join(names)})"
+        if wanted < p.u:
+            free = p.u - wanted
+            fault = f"{counts}: fix {free} of these (leave out of unknown, or give values by sweep=), or ask for more"
+        else:
+            fault = f"{counts}: {wanted - p.u} too many; leave something unasked, let more numbers be unknown, or fit (fit=)"
+        raise DeclarationError(p.name, [fault])
+
+    def answers(self) -> list[Syntheses]:
+        """For every value swept."""
+        p = self.problem
+        start = start_of(self.of, self.rng, self.cache, self.progress)
+        n = self.swept.shape[1]
+        numbers = p.numbers.taken(np.zeros(n, dtype=np.intp))
+        if self.sweep.names:
+            numbers = numbers.with_values(self.sweep.places, p.scaled(self.sweep.places, self.swept))
+        goals = self.of.goal(numbers)
+        found = ends(self.of, start, goals, self.rng, self.progress)
+        return [
+            self._answer(start, goals.taken(np.array([i])) if n > 1 else goals, one, i) for i, one in enumerate(found)
+        ]
+
+    def _answer(self, start: TaskStart, goal: Member, found: TaskEnds, i: int) -> Syntheses:
+        p, of = self.problem, self.of
+        x, error, which = real_states(of, goal, found.x)
+        fits = error <= CLOSED_TO
+        told = [*start.evidence, self._tracks(start, found)]
+        if which.size and not fits.any():
+            raise DeclarationError(
+                p.name,
+                [
+                    f"more is asked than such mechanisms can do: what meets independent conditions misses others by {error.min():.2g}"
+                ],
+            )
+        real = which[fits]
+        x, error = self._upright(goal, x[:, fits])
+        against, merged = error > CLOSED_TO, self._merged(goal, x)
+        x, error = x[:, ~merged & ~against], error[~merged & ~against]
+        others = np.delete(found.x[: of.u], real, axis=1)
+        values = p.outside(x[: of.u]).T
+        order = np.lexsort(np.round(values, 9).T[::-1]) if len(values) else np.zeros(0, dtype=np.intp)
+        x, error, values = x[:, order], error[order], values[order]
+        copies = {k: mine for mine in orbits(x[: of.u], self.symmetries) for k in mine}
+        made = [self._mechanism(goal, x[:, k], values[k], i) for k in range(len(values))]
+        shape = (p.tasks.rows if p.tasks else 0, len(p.m.links), 4, 4)
+        degenerate = [
+            Degenerate(
+                "double",
+                found.singular.shape[1],
+                f"{counted(found.singular.shape[1], 'track')} ended where solutions meet.",
+            )
+        ]
+        degenerate += [
+            Degenerate(kind, int(these.sum()), f"In {counted(int(these.sum()), 'solution')} {what}.")
+            for kind, these, what in (
+                ("coincident", merged & ~against, "elements of a link coincide"),
+                ("reversed", against, "an axis that is sought points against the motion that is asked about it"),
+            )
+        ]
+        names = (*p.unknowns.names, *self.sweep.names)
+        swept = np.repeat(self.swept[:, i][None], len(values), axis=0)
+        out = Syntheses(
+            p.m,
+            tuple(m for m, _, _ in made),
+            names,
+            np.concatenate([values, swept], axis=1),
+            np.array([poses for _, _, poses in made]).reshape(-1, *shape),
+            np.array([q for _, q, _ in made]).reshape(len(made), shape[0], len(p.m.freedom_names())),
+            error,
+            ComplexSyntheses(p.outside(others).T),
+            start.x.shape[1],
+            tuple(one for one in degenerate if one.count),
+            found.infinite,
+            start.word if not found.lost else "searched",
+            tuple(told),
+            self._conditions(goal, x),
+            Fitnesses([cache(partial(self._fitness, m, q)) for m, q, _ in made]),
+            len(orbits(start.x[: of.u], self.symmetries)),
+            self.symmetries,
+            tuple(tuple(copies[k]) for k in range(len(values))),
+        )
+        # of a sweep nothing is said of fitness, which takes longer than the solutions, until it is asked for
+        return out if self.sweep.names else out.taken(sorted(range(len(out)), key=lambda k: _rank(out.fitness[k], k)))
+
+    def _tracks(self, start: TaskStart, found: TaskEnds) -> str:
+        N = start.x.shape[1]
+        return (
+            f"{counted(N, 'track')} to this task in {counted(found.runs, 'run')}: {found.x.shape[1]} regular, {found.singular.shape[1]} "
+            f"singular, {found.infinite} at infinity, {found.lost} failed."
+        )
+
+    def _upright(self, goal: Member, x: Array) -> tuple[Array, Array]:
+        """States ``x (nx, n)`` with norms of directions above zero, as those of a Mechanism, and what they leave open.
+
+        Tracks may turn the sign of a norm. Its direction is the opposite one then: motions along it change their signs too, and where
+        such a motion is asked, its states do not close.
+        """
+        of, s, n = self.of, self.problem.system, x.shape[1]
+        turned = x.copy()
+        if of.W:
+            second, axis = np.sign(x[of.u : of.head]).reshape(2, 2, -1, n)[::-1, 0]
+            twists = np.array([f.twist for pair in s.m.pairs for f in pair.type.freedoms])
+            along = (twists**2).reshape(-1, 2, 3).sum(axis=1) / (twists**2).sum(axis=1, keepdims=True)
+            sign = np.einsum("fi,ifn->fn", along, np.stack([second, axis * second, axis])[:, s.pair_of_freedom])
+            states = x[of.head :].reshape(of.R, of.nx, n).swapaxes(0, 1).reshape(of.nx, -1)
+            states = s.state_of(s.coordinates_of(states) * np.tile(sign, of.R))
+            turned[of.u : of.head] = np.abs(x[of.u : of.head])
+            turned[of.head :] = states.reshape(of.nx, of.R, n).swapaxes(0, 1).reshape(-1, n)
+        here = of.at(goal, turned.astype(complex)).here
+        return turned, here.closure.reshape(of.R, n).max(axis=0)
+
+    def _merged(self, goal: Member, x: Array) -> Mask:
+        """Which solutions ``(n,)`` have elements of a link that fall together, where those of a random mechanism do not."""
+        of, pairs = self.of, _neighbors(self.problem.m)
+        here, there = of.at(of.start, of.x[:, None]).here, of.at(goal, x.astype(complex)).here
+        s, out = here.system, np.zeros(x.shape[1], dtype=bool)
+        for i, j in pairs:
+            columns = np.r_[s.first_column[i] : s.first_column[i + 1], s.first_column[j] : s.first_column[j + 1]]
+            wanted = np.linalg.matrix_rank(here.S[:, columns, 0], MODES.generic)
+            S = there.S[:, columns, : x.shape[1]].transpose(2, 0, 1)
+            out |= np.linalg.matrix_rank(S, MODES.generic) < wanted
+        return out
+
+    def _conditions(self, goal: Member, x: Array) -> Array:
+        """Condition numbers ``(n,)`` of the unknowns."""
+        if not x.shape[1]:
+            return np.zeros(0)
+        here = self.of.leg(goal, goal).at(x.astype(complex), np.ones(x.shape[1]), np.arange(x.shape[1]))
+        return np.asarray(np.linalg.cond(here.matrix))
+
+    def _mechanism(self, goal: Member, x: Array, values: Array, i: int) -> tuple[Mechanism, Array, Array]:
+        """The mechanism of a solution, its coordinates ``(rows, F)`` and poses ``(rows, N, 4, 4)``."""
+        p, of, F = self.problem, self.of, len(self.problem.m.freedom_names())
+        m = p.unknowns.mechanism(values)
+        if self.sweep.names:
+            m = replace_fields(self.sweep, m, self.swept[:, i])
+        states = x[of.head :].reshape(of.R, of.nx).T
+        if p.closed_at_start:
+            states = np.concatenate([p.at_rest[:, None], states], axis=1)
+        s = p.system
+        q = s.coordinates_of(states).T
+        start = s.start_coordinates(p.m.start)
+        period = s.in_user_units(of.of_row.family.periods)
+        asked = np.zeros((q.shape[0], s.n_freedoms), dtype=bool)
+        asked[:, p.columns] = ~np.isnan(p.asked)
+        free = np.isfinite(period) & (s.single_rows >= 0)
+        whole = np.where(free, np.round((q - start) / np.where(free, period, 1.0)), 0.0)
+        q = np.where(asked, q, q - whole * np.where(free, period, 0.0))
+        numbers = goal.numbers.with_values(p.places, x[: of.u, None])
+        poses = user_poses(Configuration(p.system_with(Numbers(*(v.real for v in vars(numbers).values()))), states))
+        begin = dict(zip(m.freedom_names(), q[0, :F].tolist(), strict=True))
+        return m.replace(start=begin), q[:, :F], np.moveaxis(poses, 1, 0)
+
+    def _fitness(self, m: Mechanism, q: Array) -> Fitness:
+        driver, output = driver_of(m, self.tasks)
+        return fitness(m, q, driver, output)
+
+
+CLOSED_TO = 1e-10
+"""Error of closure and task up to which a real solution does what is asked; it is closed to rounding, unless it cannot be."""
+
+
+def _rank(fit: Fitness, k: int) -> tuple[Any, ...]:
+    """Good ones first, then by worst transmission, then by size."""
+    transmission = fit.transmission if np.isfinite(fit.transmission) else -1.0
+    return (not fit.good, -round(transmission, 9), round(fit.size, 9), k)
+
+
+def _neighbors(m: Mechanism) -> list[tuple[int, int]]:
+    """Pairs that share a link."""
+    ends = [{pair.a, pair.b} for pair in m.pairs]
+    return [(i, j) for i in range(len(ends)) for j in range(i) if ends[i] & ends[j]]
+
+
+def replace_fields(of: Unknowns, m: Mechanism, values: Array) -> Mechanism:
+    """A mechanism with numbers of these values too."""
+    other = Unknowns(m, of.whole, list(of.names), [])
+    return other.mechanism(values)
+
+
+def driver_of(m: Mechanism, tasks: Any) -> tuple[str | None, str | None]:
+    """The freedom that drives the mechanism through the rows, and that in which its task comes out."""
+    every = tasks if isinstance(tasks, list | tuple) else [tasks]
+    for task in every:
+        if isinstance(task, FunctionTask):
+            return task.input, task.output
+    timed = [name for task in every for name in getattr(task, "at", {})]
+    names = timed or [drive.freedom for drive in m.drives]
+    return (names[0], None) if len(names) == 1 else (None, None)
+
+
+class FittedSynthesis:
+    """What a fit asks, and its answers."""
+
+    def __init__(self, m: Mechanism, tasks: Any, unknown: Sequence[str], bounds: Mapping[str, Any], over: Any) -> None:
+        self.problem = Problem(m, tasks, unknown)
+        self.fit, self.bounds, self.over = Fit(self.problem, tasks), bounds, over
+        self.driver, self.output = driver_of(m, tasks)
+
+    def rows(self, here: Point) -> tuple[Mechanism, Array]:
+        """The mechanism of fitted rows, and its coordinates ``(rows, F)``."""
+        p = self.problem
+        q = p.system.coordinates_of(here.x).T[:, : len(p.m.freedom_names())]
+        m = p.unknowns.mechanism(p.outside(here.z[:, None])[:, 0])
+        return m.replace(start=dict(zip(m.freedom_names(), q[0].tolist(), strict=True))), q
+
+    def measured(self, what: Any, sign: float = 1.0, none: float = 1e3) -> Callable[[Point], Array]:
+        """A quantity of fitted rows, times a sign; ``none`` where it has no value."""
+        measure = what if isinstance(what, Measure) else Measure(self.problem.m, what, self.over)
+        return lambda here: np.nan_to_num(sign * measure(*self.rows(here), self.driver), nan=none)
+
+    def answer(self, found: Fitted) -> Syntheses:
+        """The optima found, the best first."""
+        p, points = self.problem, found.points
+        made = [self.rows(here) for here in points]
+        errors = [float(self.fit.errors(here).max(initial=0.0)) for here in points]
+        shape = (self.fit.rows, len(p.m.links), 4, 4)
+        closed = [float(np.abs(here.at.residual).max(initial=0.0)) for here in points]
+        return Syntheses(
+            p.m,
+            tuple(m for m, _ in made),
+            p.unknowns.names,
+            np.array([p.outside(here.z[:, None])[:, 0] for here in points]).reshape(len(points), len(p.unknowns.names)),
+            np.array([np.moveaxis(user_poses(here.at.here), 1, 0) for here in points]).reshape(-1, *shape),
+            np.array([q for _, q in made]).reshape(len(made), self.fit.rows, len(p.m.freedom_names())),
+            np.array(closed),
+            ComplexSyntheses(np.zeros((0, len(p.unknowns.names)))),
+            None,
+            (),
+            0,
+            "searched",
+            found.evidence,
+            np.array([1.0 / self.fit.margins(here).min() for here in points]),
+            tuple(fitness(m, q, self.driver, self.output, e) for (m, q), e in zip(made, errors, strict=True)),
+        )
+
+
+@door
+def synthesize(
+    m: Mechanism,
+    tasks: Any = None,
+    unknown: Sequence[str] | None = None,
+    *,
+    fit: FitName | None = None,
+    bounds: Mapping[str, Any] | None = None,
+    conditions: Mapping[Any, Any] | None = None,
+    require: Sequence[DefectName] = (),
+    minimize: Any = None,
+    maximize: Any = None,
+    sweep: Mapping[str, Any] | None = None,
+    over: Mapping[str, Any] | None = None,
+    starts: Count = 64,
+    seed: Seed = 0,
+    cache: bool = True,
+    progress: Callable[[str], None] | None = None,
+) -> Any:
+    """Find all mechanisms of a declared topology that do what is asked, or those that come nearest to it.
+
+    As many conditions as unknowns: all solutions, by monodromy over complex tasks of the same class and a parameter homotopy to the task at
+    hand. Source: Plecnik and Fearing, J. Mech. Robotics 9, 2017. More conditions: ``fit``. Fewer: ``sweep``, ``minimize`` or ``maximize``.
+
+    Parameters
+    ----------
+    m : Mechanism
+        Its links and pairs; declared values of unknown numbers do not matter, but that fits begin with them.
+    tasks : task or list
+        ``poses``, ``path``, ``function``, ``positions``; row 0 is the declared configuration. Default, as all others: ``m.synthesis``.
+    unknown : list of str
+        Numbers as ``study`` names them (``"B.point.x"``), or elements: ``"B.point"``, ``"B.axis"``, ``"coupler.tip"``, ``"B"``.
+    fit : {"least_squares", "minimax"}, optional
+        Make the sum of the squares of the errors of all positions least, or the largest of them. Default: all are met exactly.
+    bounds : mapping, optional
+        Unknown number -> (least, greatest), None for no end.
+    conditions : mapping, optional
+        Quantity -> (least, greatest) at the positions: ``"size"``, ``"ratio"``, ``"transmission D"`` [rad], an output of ``study``, or a
+        function of a Solution. Exact solutions that do not keep them are left out, see ``Syntheses.rejected``.
+    require : sequence of str
+        Of ``"branch"``, ``"circuit"``, ``"order"`` (no such defect) and ``"full_turn"``; others are left out.
+    minimize, maximize : quantity, optional
+        On which freedom is spent where fewer conditions are given than unknowns.
+    sweep : mapping, optional
+        Numbers that are known, with a list of values each.
+    over : mapping, optional
+        Driver -> values at which conditions hold, in place of the positions.
+    starts : int
+        From how many dimensions a fit begins: the declared ones, then random ones about these or in ``bounds``.
+    seed : int
+        Seed of all random numbers; exact results do not depend on it.
+    cache : bool
+        Keep start solutions in the user's folder.
+    progress : callable, optional
+        Called with a line of text now and then.
+
+    Returns
+    -------
+    Syntheses or SynthesesOver
+
+    Raises
+    ------
+    DeclarationError
+        Faults of tasks and unknowns; other numbers of conditions than of unknowns.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> links = [mg.Link("frame"), mg.Link("crank"), mg.Link("body")]
+    >>> A = mg.Pair("A", "R", "frame", "crank", point=(0, 0))
+    >>> B = mg.Pair("B", "R", "crank", "body", point=(1, 0))
+    >>> m = mg.Mechanism("crank", links, [A, B], planar=True)
+    >>> s = mg.synthesize(m, mg.poses("body", [[0, 0, 0], [1, 0.5, 0.4], [2, 0.4, 1.1]]), ["B.point"])
+    >>> len(s), s.total
+    (1, 1)
+    """
+    where, faults = f"synthesis of {m.name!r}", list[str]()
+    if tasks is None and unknown is None and m.synthesis is not None:
+        return synthesize(m, **_stored(m.synthesis), seed=seed, cache=cache, progress=progress)
+    if tasks is None or unknown is None:
+        raise DeclarationError(where, ["tasks and unknown: expected both, or a mechanism with synthesis="])
+    unknown = [unknown] if isinstance(unknown, str) else list(unknown)
+    limits, within = limits_of(m, conditions, over, faults), dict(bounds or {})
+    goals = [(what, sign) for what, sign in ((minimize, 1.0), (maximize, -1.0)) if what is not None]
+    fitting = fit is not None or bool(goals)
+    faults += [
+        wrong(name, "require", ", ".join(map(repr, get_args(DefectName))))
+        for name in require
+        if name not in get_args(DefectName)
+    ]
+    if len(goals) > 1 or (goals and fit is not None):
+        faults.append("fit, minimize, maximize: expected one of them")
+    if fit is not None and fit not in get_args(FitName):
+        faults.append(wrong(fit, "fit", " or ".join(map(repr, get_args(FitName)))))
+    if fitting and sweep:
+        faults.append("sweep: expected for exact syntheses alone; give the numbers values in the mechanism")
+    odd = {name: ends for name, ends in within.items() if np.shape(ends) != (2,)}
+    faults += [wrong(ends, f"bounds[{name!r}]", "(least, greatest), None for no end") for name, ends in odd.items()]
+    if faults:
+        raise DeclarationError(where, faults)
+    if fitting:
+        return _fitted(m, tasks, unknown, fit, within, limits, goals, require, over, int(starts), int(seed), progress)
+    found = Synthesis(m, tasks, unknown, dict(sweep or {}), int(seed), cache, progress)
+    _refuse_other_names(found.problem, within)
+    driver, _ = driver_of(m, tasks)
+    answers = [one.kept(require, within, limits, driver) for one in found.answers()]
+    if sweep:
+        return SynthesesOver(dict(zip(found.sweep.names, found.swept, strict=True)), tuple(answers))
+    return answers[0]
+
+
+def _stored(setup: SynthesisSetup) -> dict[str, Any]:
+    """The arguments that a mechanism carries."""
+    calls: dict[str, Callable[..., Any]] = {"function": function, "path": path, "poses": poses, "positions": positions}
+    out = {name: getattr(setup, name) for name in setup.formats}
+    return out | {
+        "tasks": [calls[task.kind](**task.arguments()) for task in setup.tasks],
+        "unknown": list(setup.unknown),
+    }
+
+
+def _refuse_other_names(p: Problem, bounds: Mapping[str, Any]) -> None:
+    others = [name for name in bounds if name not in p.unknowns.names]
+    if others:
+        known = ", ".join(p.unknowns.names)
+        raise DeclarationError(p.name, [f"bounds[{name!r}]: is not unknown; unknown are {known}" for name in others])
+
+
+def _fitted(
+    m: Mechanism,
+    tasks: Any,
+    unknown: list[str],
+    fit: FitName | None,
+    bounds: Mapping[str, Any],
+    limits: Sequence[Any],
+    goals: Sequence[tuple[Any, float]],
+    require: Sequence[DefectName],
+    over: Any,
+    starts: int,
+    seed: int,
+    progress: Progress,
+) -> Syntheses:
+    """What comes nearest to what is asked, or meets it and is best in something else."""
+    of = FittedSynthesis(m, tasks, unknown, bounds, over)
+    _refuse_other_names(of.problem, bounds)
+    goal = of.measured(*goals[0]) if goals else None
+    ends = [
+        (of.measured(measure, none=1e3 if least is None else -1e3), least, most) for _, measure, least, most in limits
+    ]
+    found = fitted(of.fit, fit, iter(()), starts, bounds, goal, ends, seed, progress)
+    return of.answer(found).kept(require, bounds, limits, of.driver)

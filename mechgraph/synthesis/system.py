@@ -1,0 +1,349 @@
+"""The equations of synthesis: the closure of the declared graph at every row, with unknown dimensions ``z`` and coordinates ``q_i``.
+
+    F(z, q_i) = 0 at every row i,    q_i = what is asked, where something is
+
+Where all pairs are placed by point and axis the declared configuration is closed whatever ``z`` is, and row 0 adds nothing.
+The Jacobian is an arrow: a block ``F_q`` per row and a border ``F_z`` of u columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mechgraph.errors import DeclarationError
+from mechgraph.kinematics.prescribed import DriverMotion
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
+from mechgraph.maths.se3 import Array, Index, cross, move_twist
+from mechgraph.model.gears import moving_lines
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.parameters import Declared, declared
+from mechgraph.synthesis.tasks import asked_of
+from mechgraph.synthesis.unknowns import Place, Unknowns, marker_twists, norms_of, unit_rates
+from mechgraph.variants.numbers import MARKER
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """``point, axis, second (2, 3, P, B)`` of all markers, points over L about the origin of the problem; complex for members.
+
+    ``norms (2, 2, P, B)`` are those of both directions, see ``unknowns.norms_of``.
+    """
+
+    point: Array
+    axis: Array
+    second: Array
+    norms: Array
+
+    @staticmethod
+    def of(point: Array, axis: Array, second: Array, near: Array | None = None) -> Numbers:
+        """Numbers with norms, nearest to others."""
+        return Numbers(point, axis, second, norms_of(axis.swapaxes(0, 1), second.swapaxes(0, 1), near))
+
+    @staticmethod
+    def joined(numbers: Sequence[Numbers]) -> Numbers:
+        """Several, one after the other."""
+        parts = zip(*(vars(n).values() for n in numbers), strict=True)
+        return Numbers(*(np.concatenate(part, axis=-1) for part in parts))
+
+    def taken(self, which: Index) -> Numbers:
+        """Some of them."""
+        return Numbers(*(v[..., which] for v in vars(self).values()))
+
+    @property
+    def vectors(self) -> tuple[Array, Array, Array]:
+        """Points, axes and second directions."""
+        return self.point, self.axis, self.second
+
+    def at(self, places: Sequence[Place]) -> Array:
+        """What stands at the places of a number, ``(B,)``."""
+        p = places[0]
+        return np.asarray(getattr(self, p.array)[p.side, p.component, p.pair])
+
+    def moved(self, X: Array) -> Numbers:
+        """Markers moved rigidly by poses ``X (3, 4, 2, P, B)``."""
+        point, axis, second = (np.einsum("ijspb,sjpb->sipb", X[:, :3], v) for v in self.vectors)
+        norms = np.broadcast_to(self.norms, (*self.norms.shape[:-1], X.shape[-1]))
+        return Numbers(point + X[:, 3].swapaxes(0, 1), axis, second, norms)
+
+    def with_values(self, places: Sequence[Sequence[Place]], z: Array, near: Array | None = None) -> Numbers:
+        """The same with unknowns ``z (u, B)`` at their places, and norms nearest to others."""
+        B, out = z.shape[1], []
+        for v in self.vectors:
+            out.append(np.array(np.broadcast_to(v, (*v.shape[:-1], B)), dtype=np.result_type(v, z)))
+        for value, own in zip(z, places, strict=True):
+            for p in own:
+                out[MARKER.index(p.array)][p.side, p.component, p.pair] = value
+        point, axis, second = out
+        if all(p.array == "point" for own in places for p in own):
+            return Numbers(point, axis, second, np.broadcast_to(self.norms, (*self.norms.shape[:-1], B)))
+        return Numbers.of(point, axis, second, near)
+
+    @property
+    def poses(self) -> Array:
+        """Poses of the markers ``(3, 4, 2, P, B)``."""
+        point, z, x = (v.swapaxes(0, 1) for v in self.unit())
+        return np.stack(np.broadcast_arrays(x, cross(z, x), z, point), axis=1)
+
+    def unit(self) -> tuple[Array, Array, Array]:
+        """Points, unit axes, and unit second directions across them."""
+        z = self.axis / self.norms[0][:, None]
+        return self.point, z, (self.second - (z * self.second).sum(axis=1, keepdims=True) * z) / self.norms[1][:, None]
+
+
+class Problem:
+    """What is asked of a mechanism, what is unknown, and the equations of both.
+
+    Attributes
+    ----------
+    whole, system : the mechanism with free pairs for points and links of which something is asked; its places and rows.
+    columns (d,), asked (rows, d) : freedoms of which something is asked, and their values in internal units; NaN where nothing is.
+    rows (R,) : numbers of the rows with coordinates of their own; the declared one is among them where it is not closed by itself.
+    origin (3,), L : of the internal lengths.
+
+    Raises
+    ------
+    DeclarationError
+        with all that is wrong with tasks and unknowns.
+    """
+
+    def __init__(self, m: Mechanism, tasks: Any, unknown: Sequence[str]) -> None:
+        faults: list[str] = []
+        self.m = m
+        self.name = f"synthesis of {m.name!r}"
+        self.tasks = asked_of(m, tasks, faults)
+        if moving := m.once(moving_lines):
+            faults.append(f"the relation of the coupling {moving[0]!r} is no polynomial; leave it out (couplings=)")
+        if self.tasks is None or not m.has_geometry:
+            bare = [] if m.has_geometry else ["the pairs have no geometry; a topology can be counted, not dimensioned"]
+            raise DeclarationError(self.name, [*faults, *bare])
+        values = self.tasks.values
+        filled = {
+            name: np.where(np.isnan(v), np.nanmean(v) if np.isfinite(v).any() else 0.0, v) for name, v in values.items()
+        }
+        given = DriverMotion(m, filled, asked="synthesis of")
+        self.free = given.free
+        self.whole = given.m.replace(pairs=[*given.m.pairs, *given.free], drives=given.names)
+        self.unknowns = Unknowns(m, self.whole, unknown, faults)
+        if faults:
+            raise DeclarationError(self.name, faults)
+        user = np.array([values.get(name, values.get(self._user_name(name))) for name in given.names]).T
+        numbers = declared(self.whole)
+        self.origin, self.L = self._unit(numbers)
+        par = numbers.parameters(self.whole, np.repeat(self.origin[:, None], len(m.links), axis=1), self.origin, self.L)
+        self.system = System(self.whole, None, par)
+        s = self.system
+        places = [self.whole.freedom(name) for name in given.names]
+        self.columns: Index = np.array([s.first_column[k] + j for k, j in places], dtype=np.intp)
+        self.asked = user / np.where(s.is_length[self.columns], self.L, 1.0)
+        self.numbers = Numbers.of((numbers.point - self.origin[:, None, None]) / self.L, numbers.axis, numbers.second)
+        self.closed_at_start = all(pair.on_a is None and pair.contact is None for pair in m.pairs)
+        self.rows: Index = np.arange(1 if self.closed_at_start else 0, self.tasks.rows)
+        self._read_declared_row()
+
+    def _user_name(self, name: str) -> str:
+        """The name by which a coordinate of a free pair was asked."""
+        pair, _, part = name.rpartition(".")
+        return f"{pair.rstrip(chr(39))}.{part}"
+
+    def _unit(self, numbers: Declared) -> tuple[Array, float]:
+        """Middle and size of what is given: of points of pairs and of places asked."""
+        assert self.tasks is not None
+        points = numbers.point[:, :, : len(self.m.pairs), 0].transpose(0, 2, 1).reshape(-1, 3)
+        sides: list[Array] = [points]
+        for name, column in self.tasks.values.items():
+            stem, _, part = name.rpartition(".")
+            if part in ("Tx", "Ty", "Tz") and stem not in self.m.pair_index:
+                place = np.zeros((len(column), 3))
+                for k, other in enumerate(("Tx", "Ty", "Tz")):
+                    place[:, k] = np.nan_to_num(self.tasks.values.get(f"{stem}.{other}", place[:, k]))
+                sides.append(place)
+        every = np.concatenate(sides)
+        middle = 0.5 * (every.max(axis=0) + every.min(axis=0))
+        size = float(np.abs(every - middle).max(initial=0.0))
+        return middle, size or 1.0
+
+    def _read_declared_row(self) -> None:
+        """What is asked at row 0 has to be so there, where that row is closed by itself; unknown points stand where they are asked."""
+        s, faults = self.system, []
+        self.known: dict[int, float] = {}
+        if not self.closed_at_start:
+            return
+        pinned = {
+            (p.pair, p.component): k
+            for k, places in enumerate(self.unknowns.places)
+            for p in places
+            if p.pair >= len(self.m.pairs)
+        }
+        at_rest = self.at_rest
+        for j, column in enumerate(self.columns.tolist()):
+            want, have = self.asked[0, j], at_rest[s.single_rows[column]]
+            pair, part = int(s.pair_of_freedom[column]), column - int(s.first_column[s.pair_of_freedom[column]])
+            if np.isnan(want):
+                continue
+            if (pair, part) in pinned:
+                self.known[pinned[pair, part]] = float(want - self.origin[part] / self.L)
+            # part of the size of the problem by which a place may be off
+            elif abs(want - have) > 1e-9:
+                name = self.whole.freedom_names()[column]
+                scale = self.L if s.is_length[column] else 1.0
+                faults.append(
+                    f"row 0: {name} = {want * scale:g} is asked, and is {have * scale:g} where the mechanism is declared; "
+                    "begin there" + (", or let the point be unknown" if s.is_length[column] else "")
+                )
+        if faults:
+            raise DeclarationError(self.name, faults)
+        places = [self.unknowns.places[k] for k in self.known]
+        self.numbers = self.numbers.with_values(places, np.array(list(self.known.values())).reshape(-1, 1))
+
+    @cached_property
+    def at_rest(self) -> Array:
+        """State ``(nx,)`` of the declared configuration, free pairs too: all coordinates zero but those of named points."""
+        s = self.system
+        q = np.zeros((s.n_freedoms, 1))
+        for k in range(len(self.m.pairs), len(self.whole.pairs)):
+            for j in range(int(s.first_column[k + 1] - s.first_column[k])):
+                column = int(s.first_column[k]) + j
+                if s.is_length[column]:
+                    axis = s.m.pairs[k].type.freedoms[j].twist[3:]
+                    a, b = s.m.pairs[k].markers
+                    q[column, 0] = float(
+                        np.asarray(a.pose())[:3, :3] @ axis @ (np.asarray(b.point) - np.asarray(a.point))
+                    )
+        return s.state_of(q)[:, 0]
+
+    # --- the unknowns ------------------------------------------------------------------------------------------------
+
+    @property
+    def u(self) -> int:
+        """Number of unknown dimensions that are sought: row 0 says where an unknown point is, as far as it asks for its place."""
+        return len(self.places)
+
+    @cached_property
+    def sought(self) -> Index:
+        """Numbers of the unknowns that are sought."""
+        return np.array([k for k in range(len(self.unknowns.names)) if k not in self.known], dtype=np.intp)
+
+    @cached_property
+    def places(self) -> list[list[Place]]:
+        """Places of the unknowns that are sought."""
+        return [self.unknowns.places[k] for k in self.sought]
+
+    @cached_property
+    def _scales(self) -> tuple[Array, Array]:
+        """Origins and units ``(u, 1)`` of the unknowns: points are counted in L from the origin of the problem."""
+        origin, unit = (np.full((len(self.unknowns.names), 1), value) for value in (0.0, 1.0))
+        for k, places in enumerate(self.unknowns.places):
+            if places and places[0].array == "point":
+                origin[k], unit[k] = self.origin[places[0].component], self.L
+        return origin, unit
+
+    def inside(self, values: Array) -> Array:
+        """Unknowns that are sought ``z (u, T)`` in internal units, from values of all ``(names, T)`` in those of the user."""
+        origin, unit = self._scales
+        return np.asarray(((values - origin) / unit)[self.sought])
+
+    def outside(self, z: Array) -> Array:
+        """Values ``(names, T)`` of all unknowns in the units of the user."""
+        origin, unit = self._scales
+        every = np.empty((len(origin), z.shape[1]), dtype=z.dtype)
+        every[self.sought] = z
+        for k, value in self.known.items():
+            every[k] = value
+        return np.asarray(origin + unit * every)
+
+    def mechanism(self, values: Array) -> Mechanism:
+        """The mechanism with unknown dimensions of these values ``(u,)``, in the units of the user."""
+        return self.unknowns.mechanism(values)
+
+    def scaled(self, places: Sequence[Sequence[Place]], values: Array) -> Array:
+        """Values ``(n, B)`` of components of points and directions, of the user, in internal units."""
+        out = np.array(values)
+        for row, own in zip(out, places, strict=True):
+            if own[0].array == "point":
+                row -= self.origin[own[0].component]
+                row /= self.L
+        return out
+
+    @cached_property
+    def loop_signs(self) -> Array:
+        """How every loop passes the pairs ``(loops, P)``."""
+        graph = self.system.graph
+        out = np.zeros((graph.n_loops, len(self.whole.pairs)))
+        for i, loop in enumerate(graph.loops):
+            for pair, sign in loop:
+                out[i, pair] = sign
+        return out
+
+    # --- the equations -----------------------------------------------------------------------------------------------
+
+    def system_with(self, numbers: Numbers) -> System:
+        """The system with other markers."""
+        point, axis, second = numbers.unit()
+        n = replace(self.whole.once(declared), point=point, axis=axis, second=second)
+        zero = np.zeros((3, len(self.m.links)))
+        par = n.parameters(self.whole, zero, zero[:, 0], 1.0)
+        old = self.system.par
+        par = replace(par, offset=old.offset, frame=old.frame, origin=old.origin, L=old.L, pitch=old.pitch)
+        return self.system.with_parameters(par)
+
+    def equations(self, numbers: Numbers, x: Array) -> Rows:
+        """The equations of tracks with such numbers of markers (unknowns among them) at states ``x (R, nx, T)``, in internal units."""
+        R, _, T = x.shape
+        system = self.system_with(numbers)
+        if R > 1 and system.par.batch > 1:
+            system = system.cases(np.tile(np.arange(T), R))
+        return Rows(self, numbers, Configuration(system, x.transpose(1, 0, 2).reshape(x.shape[1], R * T)), R)
+
+
+class Rows:
+    """The closure of all rows at a batch of ``T`` tracks, the rows one after the other in the batch of ``here``."""
+
+    def __init__(self, problem: Problem, numbers: Numbers, here: Configuration, R: int) -> None:
+        self.problem, self.numbers, self.here, self.R = problem, numbers, here, R
+        self.T = here.T // R
+
+    def _by_row(self, values: Array) -> Array:
+        """``(..., R T) -> (R, ..., T)``."""
+        return np.moveaxis(values.reshape(*values.shape[:-1], self.R, self.T), -2, 0)
+
+    @cached_property
+    def residual(self) -> Array:
+        """What the closure leaves open ``(R, n, T)``."""
+        return self._by_row(self.here.residual)
+
+    @cached_property
+    def by_coordinates(self) -> Array:
+        """Derivatives ``(R, n, F, T)`` by all freedoms of the row, those asked too."""
+        return self._by_row(self.here.J)
+
+    @cached_property
+    def by_unknowns(self) -> Array:
+        """Derivatives ``(R, n, u, T)`` by the unknown dimensions."""
+        places = self.problem.places
+        every = [p for own in places for p in own]
+        which = np.repeat(np.arange(len(places)), [len(own) for own in places])
+        each = self.moved(np.array([p.side for p in every]), np.array([p.pair for p in every]), unit_rates(every))
+        out = np.zeros((*each.shape[:2], len(places), self.T), dtype=each.dtype)
+        for i, k in enumerate(which):
+            out[:, :, k] += each[:, :, i]
+        return out
+
+    def moved(self, side: Index, pair: Index, rates: Array) -> Array:
+        """Derivatives ``(R, n, k, T)`` for markers, one on a side of a pair each, of which the numbers grow at ``rates (3, 3, k, B)``."""
+        here, s, n = self.here, self.here.system, self.numbers
+        vectors = [v[side, :, pair].swapaxes(0, 1) for v in n.vectors]
+        eta = marker_twists(vectors, n.norms[:, side, pair], rates)
+        eta = np.tile(np.broadcast_to(eta, (*eta.shape[:2], self.T)), self.R)
+        V = move_twist(here.poses[:, :, np.where(side == 0, s.a[pair], s.b[pair])], eta)
+        out = np.zeros((len(here.residual), len(pair), here.T), dtype=V.dtype)
+        C = np.where(side == 0, 1.0, -1.0) * self.problem.loop_signs[:, pair]
+        loops = V[:, None] * C[:, :, None]
+        loops[3:] += cross(loops[:3], here.middles[:, :, None])
+        out[: s.graph.loop_rows] = loops[s.graph.span].swapaxes(0, 1).reshape(s.graph.loop_rows, *V.shape[1:])
+        return self._by_row(out)

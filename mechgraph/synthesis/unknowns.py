@@ -1,0 +1,208 @@
+"""Unknown dimensions: which declared numbers are sought, and where they stand among the numbers that the kernel reads.
+
+Of an element only what matters is sought. Let a pair do the motions ``g``, and let its place move with a twist ``eta``; the pair then does
+``exp(eta) g exp(-eta)``, the same motions where ``eta - Ad_g eta`` is a motion of the pair at every ``g``. So a line is 4 numbers for a
+turn about it, a direction 2 for a slide, a point 3 for a ball. Of the components of a point, an axis and a second direction those are
+sought that tell these apart best; the others stay as they are declared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy
+
+from mechgraph.fields import XYZ
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
+from mechgraph.maths.linear import rank_of, singular_values
+from mechgraph.maths.se3 import Array, cross, move_twist
+from mechgraph.maths.tolerances import MODES
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.parameters import declared
+from mechgraph.modes.family import span
+from mechgraph.variants.numbers import MARKER, AnyField, Field, ItemField, clashes, field_values, find_field, varied
+
+
+@dataclass(frozen=True)
+class Place:
+    """A component of ``point``, ``axis`` or ``second`` of the marker of a pair on one side."""
+
+    array: str
+    side: int
+    component: int
+    pair: int
+
+
+class Unknowns:
+    """The numbers sought, in the order given: ``names (u,)``, and ``places`` where each stands; ``m`` is the mechanism as declared.
+
+    ``whole`` is the mechanism with free pairs behind its own, whose markers at named points are places of these. Faults of ``given``
+    are put to ``faults``.
+    """
+
+    def __init__(self, m: Mechanism, whole: Mechanism, given: Sequence[str], faults: list[str]) -> None:
+        self.m, self.whole = m, whole
+        self.fields: dict[str, AnyField] = {}
+        for name in given:
+            for one in self._expanded(name):
+                found = find_field(m, one)
+                if isinstance(found, str):
+                    faults.append(f"unknown {found}")
+                elif one in self.fields:
+                    faults.append(f"unknown {one!r} is named twice")
+                else:
+                    self.fields[one] = found
+        faults += clashes(m, self.fields)
+
+    def _expanded(self, name: str) -> list[str]:
+        """The numbers of an element: of a pair, of its point or direction, of a named point; a number is itself."""
+        axes = XYZ[:2] if self.m.planar else XYZ
+        for link in self.m.links:
+            if name.startswith(f"{link.name}.") and name.removeprefix(f"{link.name}.") in link.points:
+                return [f"{name}.{at}" for at in axes]
+        owner, _, what = name.partition(".")
+        if owner not in self.m.pair_index or what not in ("", *MARKER):
+            return [name]
+        k = self.m.pair_index[owner]
+        if self.m.pairs[k].on_a is not None or self.m.pairs[k].contact is not None:
+            return [name]
+        candidates = [f"{owner}.{field}.{at}" for field in ([what] if what else MARKER) for at in axes]
+        return mattering(self.m, k, candidates) or [name]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all numbers."""
+        return tuple(self.fields)
+
+    @cached_property
+    def declared(self) -> Array:
+        """Their declared values ``(u,)``."""
+        return np.array(list(field_values(self.m, self.fields).values()), dtype=float)
+
+    @cached_property
+    def others(self) -> list[str]:
+        """Those that are no components of points and directions: the closure is no algebraic function of them."""
+        return [name for name, places in zip(self.names, self.places, strict=True) if not places]
+
+    @cached_property
+    def places(self) -> list[list[Place]]:
+        """For every number its places, of which none is known for others than components of points and directions."""
+        return [self._places_of(name, field) for name, field in self.fields.items()]
+
+    def _places_of(self, name: str, field: AnyField) -> list[Place]:
+        if isinstance(field, Field) and field.array in MARKER:
+            (side, component, pair), *_ = field.places
+            return [Place(field.array, s, component, pair) for s in ((0, 1) if side == slice(None) else (side,))]
+        if isinstance(field, ItemField) and field.what == "links":
+            at = field.place[0]
+            owner = name.rpartition(".")[0]
+            return [
+                Place("point", 1, int(at), k)
+                for k, pair in enumerate(self.whole.pairs[len(self.m.pairs) :], len(self.m.pairs))
+                if pair.name.rstrip("'") == owner
+            ]
+        return []
+
+    def mechanism(self, values: Array) -> Mechanism:
+        """The mechanism with the numbers ``values (u,)``."""
+        points = {
+            name: value for (name, field), value in zip(self.fields.items(), values, strict=True) if _on_link(field)
+        }
+        rest = {name: field for name, field in self.fields.items() if name not in points}
+        kept = np.array([[v] for name, v in zip(self.fields, values, strict=True) if name in rest]).reshape(-1, 1)
+        m = varied(self.m, rest, kept).one(0) if rest else self.m
+        if not points:
+            return m
+        links = list(m.links)
+        for name, value in points.items():
+            field = self.fields[name]
+            assert isinstance(field, ItemField)
+            links[field.index] = field.changed(links[field.index], float(value))
+        return m.replace(links=links)
+
+    def values_of(self, m: Mechanism) -> Array:
+        """The numbers ``(u,)`` that a mechanism has."""
+        return np.array(list(field_values(m, self.fields).values()), dtype=float)
+
+
+def _on_link(field: AnyField) -> bool:
+    return isinstance(field, ItemField) and field.what == "links"
+
+
+def mattering(m: Mechanism, k: int, candidates: Sequence[str]) -> list[str]:
+    """Of numbers of the place of a pair as many as the motions that it does depend on, those that tell them apart best."""
+    fields = {name: find_field(m, name) for name in candidates}
+    known = [name for name, field in fields.items() if isinstance(field, Field)]
+    if not known:
+        return []
+    places = []
+    for field in map(fields.__getitem__, known):
+        assert isinstance(field, Field)
+        places.append(Place(field.array, 0, field.places[0][1], k))
+    numbers, here = declared(m), [k] * len(places)
+    vectors = [getattr(numbers, name)[0][:, here] for name in MARKER]
+    twists = marker_twists(vectors, norms_of(*vectors[1:]), unit_rates(places))
+    told = _told(m, k) @ twists[:, :, 0]
+    # all places of directions are counted alike, whatever the length of the declared vector
+    size = np.abs(told).max(axis=0)
+    told = told / np.where(size > MODES.span, size, 1.0) * (size > MODES.span)
+    rank = rank_of(singular_values(told), MODES.generic)
+    picked = scipy.linalg.qr(told, pivoting=True, mode="r")[1][:rank]
+    return [known[i] for i in sorted(picked.tolist())]
+
+
+def _told(m: Mechanism, k: int) -> Array:
+    """Rows ``(n, 6)`` that vanish for twists of the place of a pair by which its motions stay the same."""
+    pair = m.pairs[k]
+    alone = Mechanism(pair.name, [m.link(pair.a), m.link(pair.b)], [pair], planar=m.planar)
+    zero = np.zeros((3, 2))
+    s = System(alone, None, declared(alone).parameters(alone, zero, zero[:, 0], 1.0))
+    rng, rows = np.random.default_rng(0), []
+    # positions at which the motions are compared, each of which may tell in one direction alone
+    for _ in range(8):
+        dq = rng.uniform(-1.0, 1.0, (s.n_freedoms, 1))
+        here = Configuration(s, s.advance(s.state_of(np.zeros((s.n_freedoms, 1))), dq))
+        D, basis = here.poses[:, :, s.b[0]], span(here.S[:, :, 0])
+        change = np.eye(6) - move_twist(D, np.eye(6))
+        rows.append(change - basis @ (basis.T @ change))
+    return np.concatenate(rows)
+
+
+def marker_twists(numbers: Sequence[Array], norms: Array, rates: Array) -> Array:
+    """Twists ``(6, n, B)`` of markers, in the frames of their links, for rates ``(3, 3, n, B)`` of their points, axes, second directions.
+
+    With ``z = a / |a|`` of an axis ``a (3, n, B)`` and ``x`` of ``s - (z . s) z``, unit, of a second direction ``s``:
+    ``z' = (a' - z (z . a')) / |a|``, ``w = (x x x' + y x y' + z x z') / 2``, ``v = p' - w x p`` of a point ``p``. ``norms (2, n, B)`` are
+    those of both directions, which over the complex numbers have a sign each.
+    """
+    (point, axis, second), (dp, da, ds) = numbers, rates
+    z = axis / norms[0]
+    x = (second - (z * second).sum(axis=0) * z) / norms[1]
+    dz = (da - z * (z * da).sum(axis=0)) / norms[0]
+    draw = ds - ((dz * second).sum(axis=0) + (z * ds).sum(axis=0)) * z - (z * second).sum(axis=0) * dz
+    dx = (draw - x * (x * draw).sum(axis=0)) / norms[1]
+    y, dy = cross(z, x), cross(dz, x) + cross(z, dx)
+    w = 0.5 * (cross(x, dx) + cross(y, dy) + cross(z, dz))
+    return np.concatenate(np.broadcast_arrays(w, dp + cross(point, w)))
+
+
+def norms_of(axis: Array, second: Array, near: Array | None = None) -> Array:
+    """Norms ``(2, ...)`` of axes and of what second directions ``(3, ...)`` have across them, of the signs nearest to others."""
+    out: list[Array] = []
+    for i in range(2):
+        raw = axis if not i else second - (axis * second).sum(axis=0) / out[0] ** 2 * axis
+        size = np.sqrt((raw * raw).sum(axis=0))
+        out.append(size if near is None else np.where(np.abs(size - near[i]) <= np.abs(size + near[i]), size, -size))
+    return np.stack(np.broadcast_arrays(*out))
+
+
+def unit_rates(places: Sequence[Place]) -> Array:
+    """Rates ``(3, 3, n, 1)`` of points, axes and second directions of which a component grows at rate one."""
+    out = np.zeros((3, 3, len(places), 1))
+    for i, place in enumerate(places):
+        out[MARKER.index(place.array), place.component, i] = 1.0
+    return out

@@ -1,0 +1,40 @@
+"""Make the start sets of synthesis that come with the package: those of the ladder of tasks.
+
+    PYTHONPATH=tests python tests/benchmarks/make_task_starts.py [words ...]     adds rungs whose names have one of the words
+
+Sets that the package or the user's folder has are taken over. Only sets of which a trace test says that they are all are taken in.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import Any
+
+import numpy as np
+from ladder import LADDER
+
+from mechgraph.synthesis.classes import TaskClass
+from mechgraph.synthesis.solve import PACKED, arrays, key_of, start_of
+from mechgraph.synthesis.system import Problem
+
+
+def main(words: list[str]) -> None:
+    """Work them out and write them."""
+    found: dict[str, Any] = dict(np.load(PACKED)) if PACKED.exists() else {}
+    for name, rung in LADDER.items():
+        if words and not any(word in name for word in words):
+            continue
+        m, task, unknown, total = rung()
+        rng, begin = np.random.default_rng(0), time.process_time()
+        of = TaskClass(Problem(m, task, unknown), rng)
+        start = start_of(of, rng, True, None)
+        N = start.x.shape[1]
+        print(f"{name}: {N} of {total}, {start.word}, {time.process_time() - begin:.1f} s", flush=True)
+        if start.word == "tested":
+            found |= {f"{key_of(of)}/{part}": value for part, value in arrays(of, start).items()}
+            np.savez_compressed(PACKED, **found)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,92 @@
+"""Tasks of synthesis with known numbers of solutions: a mechanism, what is asked of it, what is unknown, and how many over C."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+import mechgraph as mg
+
+Rung = tuple[mg.Mechanism, Any, list[str], int]
+
+
+def four_bar(**points: tuple[float, float]) -> mg.Mechanism:
+    """A planar four-bar with pivots A, B, C, D and a point on its coupler."""
+    at = {"A": (0.0, 0.0), "B": (0.3, 1.0), "C": (2.0, 1.5), "D": (2.2, 0.0), "tip": (1.5, 1.2)} | points
+    links = [mg.Link("frame"), mg.Link("crank"), mg.Link("coupler", points={"tip": at["tip"]}), mg.Link("rocker")]
+    ends = {"A": ("frame", "crank"), "B": ("crank", "coupler"), "C": ("coupler", "rocker"), "D": ("frame", "rocker")}
+    pairs = [mg.Pair(name, "R", *links_of, point=at[name]) for name, links_of in ends.items()]
+    return mg.Mechanism("four-bar", links, pairs, drives=["A"], planar=True)
+
+
+def dyad() -> mg.Mechanism:
+    """A crank that guides a body, in a plane."""
+    links = [mg.Link("frame"), mg.Link("crank"), mg.Link("body")]
+    ends = {"A": ("frame", "crank"), "B": ("crank", "body")}
+    pairs = [mg.Pair(name, "R", *of, point=(i, 0)) for i, (name, of) in enumerate(ends.items())]
+    return mg.Mechanism("dyad", links, pairs, planar=True)
+
+
+def slider_crank() -> mg.Mechanism:
+    """A planar slider-crank."""
+    links = [mg.Link("frame"), mg.Link("crank"), mg.Link("rod"), mg.Link("slider")]
+    pairs = [
+        mg.Pair("A", "R", "frame", "crank", point=(0, 0)),
+        mg.Pair("B", "R", "crank", "rod", point=(1, 0)),
+        mg.Pair("C", "R", "rod", "slider", point=(3, 0.2)),
+        mg.Pair("D", "P", "frame", "slider", point=(3, 0), axis=(1, 0)),
+    ]
+    return mg.Mechanism("slider-crank", links, pairs, drives=["A"], planar=True)
+
+
+def spatial(name: str, *pairs: tuple[str, tuple[float, ...], tuple[float, ...] | None]) -> mg.Mechanism:
+    """An open or closed chain of pairs O, P, Q, ... (type, point, axis) from the frame on; closed where there are three or more."""
+    last = len(pairs) - 1
+    links = ["frame", *(f"link{i}" for i in range(1, last + 1)), "frame" if last > 1 else "body"]
+    made = [
+        mg.Pair("OPQR"[i], symbol, links[i], links[i + 1], point=point, **({"axis": axis} if axis else {}))
+        for i, (symbol, point, axis) in enumerate(pairs)
+    ]
+    return mg.Mechanism(name, pairs=made, drives=["O"] if last > 1 else [])
+
+
+def turned(n: int, shift: float) -> np.ndarray:
+    """Poses ``(n, 4, 4)``, the first the identity."""
+    out = np.tile(np.eye(4), (n, 1, 1))
+    out[1:, :3, :3] = Rotation.from_rotvec(np.random.default_rng(3).normal(size=(n - 1, 3))).as_matrix()
+    out[1:, :3, 3] = shift * np.random.default_rng(4).normal(size=(n - 1, 3))
+    return out
+
+
+def _rows(n: int, columns: int, first: tuple[float, ...] = ()) -> np.ndarray:
+    out = np.random.default_rng(5).uniform(-1.0, 1.0, (n, columns))
+    out[0] = first or 0.0
+    return out
+
+
+ONE, TWO = (0.0, 0.2, 1.0), (0.0, 1.0, 0.4)
+LADDER: dict[str, Callable[[], Rung]] = {
+    "R-R dyad, 5 poses": lambda: (dyad(), mg.poses("body", _rows(5, 3)), ["A.point", "B.point"], 4),
+    "R-R dyad, 3 poses": lambda: (dyad(), mg.poses("body", _rows(3, 3)), ["B.point"], 1),
+    "R-R dyad, 4 poses": lambda: (dyad(), mg.poses("body", _rows(4, 3)), ["A.point.y", "B.point"], 3),
+    "four-bar function, 5 pairs": lambda: (four_bar(), mg.function("A", "D", _rows(5, 2)), ["B.point", "C.point"], 3),
+    "slider-crank function, 5 pairs": lambda: (
+        slider_crank(), mg.function("A", "D", _rows(5, 2)), ["B.point", "C.point"], 3,
+    ),
+    "spherical R-R, 5 orientations": lambda: (
+        spatial("spherical", ("R", (0, 0, 0), ONE), ("R", (0, 0, 0), (1.0, 0.4, 0.1))),
+        mg.poses("body", turned(5, 0.0)), ["O.axis", "P.axis"], 6,
+    ),
+    "R-Sp-R function, 6 pairs": lambda: (
+        spatial("R-Sp-R", ("R", (0, 0, 0), ONE), ("Sp", (1, 0.3, 0.1), (0.2, 0.4, 1)), ("R", (2, 0.2, 0.5), TWO)),
+        mg.function("O", "Q", _rows(6, 2)), ["P"], 3,
+    ),
+    "four-bar path, 5 points, timed": lambda: (
+        four_bar(), mg.path("coupler.tip", _rows(5, 2, (1.5, 1.2)), at={"A": _rows(5, 1)[:, 0]}),
+        ["A.point", "B.point", "C.point", "D.point"], 12,
+    ),
+    "four-bar of two dyads, 5 poses": lambda: (
+        four_bar(), mg.poses("coupler", _rows(5, 3)), ["A.point", "B.point", "C.point", "D.point"], 12,
+    ),
+}  # fmt: skip

@@ -1,0 +1,156 @@
+"""Synthesis: all mechanisms that do what is asked, their number, and that each one does it."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from ladder import LADDER, dyad, four_bar, slider_crank, spatial
+
+import mechgraph as mg
+
+QUICK = [name for name in LADDER if name.split(",")[0] in ("R-R dyad", "four-bar function", "spherical R-R")]
+LONG = [name for name in LADDER if name not in QUICK]
+
+
+def ladder_holds(name: str, **options: Any) -> None:
+    """The number of solutions over C, and that real ones do what is asked."""
+    m, task, unknown, total = LADDER[name]()
+    s = mg.synthesize(m, task, unknown, **options)
+    assert (s.total, s.completeness) == (total, "tested"), s.evidence
+    assert len(s) + len(s.complex) + s.infinite + sum(one.count for one in s.degenerate) == total
+    assert (s.residual < 1e-12).all()
+    for one, q in zip(s, s.coordinates, strict=True):
+        assert does(one, q, task) < 1e-10
+
+
+def does(m: mg.Mechanism, q: np.ndarray, task: Any) -> float:
+    """By how much a mechanism fails to do what is asked at its own coordinates ``(rows, F)``, driven from there."""
+    names, worst = m.freedom_names(), 0.0
+    for i, row in enumerate(q):
+        here = m.replace(start=dict(zip(names, row.tolist(), strict=True)))
+        if hasattr(task, "pairs"):
+            a, b = (m.full_name(name) for name in (task.input, task.output))
+            s = mg.kinematics(here, {a: task.pairs[i][0]})
+            worst = max(worst, abs(s[b.split(".")[0]].position.item() - task.pairs[i][1]))
+        elif hasattr(task, "places"):
+            X = (
+                mg.kinematics(here.replace(drives=names), dict(zip(names, row.tolist(), strict=True)))
+                .link(task.link)
+                .pose
+            )
+            given = np.asarray(task.places[i])
+            asked = given if given.ndim == 2 else _planar(given)
+            worst = max(worst, float(np.abs(X - asked).max()))
+        else:
+            s = mg.kinematics(here, {"A": row[names.index("A.Rz")]})
+            link, point = task.point.split(".")
+            tip = s.link(link).at(point).position
+            worst = max(worst, float(np.abs(tip[..., :2] - task.points[i]).max()))
+    return worst
+
+
+def _planar(place: np.ndarray) -> np.ndarray:
+    x, y, angle = place
+    out = np.eye(4)
+    out[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    out[:2, 3] = x, y
+    return out
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_all_solutions_are_counted_and_real_ones_do_what_is_asked(name: str) -> None:
+    ladder_holds(name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LONG)
+def test_all_solutions_of_larger_tasks(name: str) -> None:
+    ladder_holds(name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_number_of_solutions_is_that_of_any_seed(seed: int) -> None:
+    ladder_holds("R-R dyad, 5 poses", seed=seed, cache=False)
+
+
+def test_a_four_bar_is_among_those_that_do_its_own_function() -> None:
+    m = four_bar(B=(0.4, 0.9), C=(1.9, 1.6))
+    angles = np.linspace(0.0, 1.2, 5)
+    pairs = np.column_stack([angles, mg.kinematics(m, {"A": angles})["D"].position])
+    s = mg.synthesize(four_bar(), mg.function("A", "D", pairs), ["B.point", "C.point"])
+    assert np.abs(s.values - (0.4, 0.9, 1.9, 1.6)).max(axis=1).min() < 1e-9
+
+
+def test_centre_points_of_four_poses_lie_on_one_cubic() -> None:
+    """Burmester's curve: for every value of one coordinate there are at most three, and all lie on one cubic through ten terms."""
+    poses = np.array([[0, 0, 0], [1.0, 0.4, 0.3], [1.6, 1.1, 0.9], [1.2, 2.0, 1.7]])
+    s = mg.synthesize(
+        dyad(), mg.poses("body", poses), ["A.point.y", "B.point"], sweep={"A.point.x": np.linspace(-3, 3, 6)}
+    )
+    x, y = np.array([v for one in s for v in zip(one.field("A.point.x"), one.field("A.point.y"), strict=True)]).T
+    assert {one.total for one in s} == {3}
+    assert len(x) > 9
+    terms = np.array([x**i * y**j for i in range(4) for j in range(4 - i)]).T
+    sigma = np.linalg.svd(terms / np.abs(terms).max(axis=0), compute_uv=False)
+    assert sigma[-1] < 1e-5 * sigma[-2]
+
+
+def test_counts_are_said_before_anything_is_solved() -> None:
+    pairs = [[0, 0], [0.3, 0.2], [0.6, 0.5]]
+    with pytest.raises(mg.DeclarationError, match=r"2 conditions .*for 4 unknowns .*fix 2 of these"):
+        mg.synthesize(four_bar(), mg.function("A", "D", pairs), ["B.point", "C.point"])
+    with pytest.raises(mg.DeclarationError, match=r"2 conditions .*for 1 unknown .*1 too many"):
+        mg.synthesize(four_bar(), mg.function("A", "D", pairs), ["B.point.x"])
+
+
+def test_faults_of_tasks_and_unknowns_are_told_together() -> None:
+    tasks = [mg.path("coupler.top", [[0, 0], [1, 1]]), mg.function("A", "Z", [[0, 0], [1, 1]])]
+    with pytest.raises(mg.DeclarationError) as caught:
+        mg.synthesize(four_bar(), tasks, ["B.point"])
+    assert len(caught.value.faults) == 2
+    with pytest.raises(mg.DeclarationError, match="is asked, and is"):
+        mg.synthesize(four_bar(), mg.path("coupler.tip", [[0, 0], [1, 1]]), ["B.point"])
+    links = [mg.Link("frame"), mg.Link("crank"), mg.Link("coupler", mass=1, center=(0, 0)), mg.Link("rocker")]
+    heavy = four_bar().replace(links=links)
+    with pytest.raises(mg.DeclarationError, match="no component of a point"):
+        mg.synthesize(heavy, mg.function("A", "D", [[0, 0], [1, 1]]), ["coupler.mass"])
+
+
+def test_what_is_not_served_is_refused_by_name() -> None:
+    pairs = [[0, 0], [0.3, 0.2], [0.6, 0.5]]
+    m = four_bar()
+    marker = mg.Marker((0.3, 1.0))
+    moved = [p if p.name != "B" else mg.Pair("B", "R", "crank", "coupler", on_a=marker, on_b=marker) for p in m.pairs]
+    with pytest.raises(mg.DeclarationError, match="pairs B: are placed on each link"):
+        mg.synthesize(m.replace(pairs=moved), mg.function("A", "D", pairs), ["C.point"])
+    with pytest.raises(mg.DeclarationError, match="the factor is not sought"):
+        mg.synthesize(m, mg.function("A", "D", pairs, scale="free"), ["C.point"])
+    geared = m.replace(couplings=[mg.Coupling({"A": 1, "D": -2})])
+    with pytest.raises(mg.DeclarationError, match="couplings: are not served"):
+        mg.synthesize(geared, mg.function("A", "D", pairs), ["C.point"])
+
+
+def test_of_an_element_only_what_matters_is_sought() -> None:
+    """A line is four numbers, a direction in the plane one, a ball three, a plane with a point on it five."""
+    from mechgraph.synthesis.unknowns import mattering
+
+    lines = LADDER["R-Sp-R function, 6 pairs"]()[0]
+    every = [f"P.{what}.{at}" for what in ("point", "axis", "second") for at in "xyz"]
+    counts = {}
+    for k, pair in enumerate(lines.pairs):
+        counts[pair.name] = len(mattering(lines, k, [name.replace("P", pair.name, 1) for name in every]))
+    assert counts == {"O": 4, "P": 5, "Q": 4}
+    balls = spatial("S-S", ("S", (0, 0, 0), None), ("S", (1, 0.3, 0.1), None))
+    assert len(mattering(balls, 1, every)) == 3
+    planar = slider_crank()
+    assert mattering(planar, 3, [f"D.axis.{at}" for at in "xy"]) == ["D.axis.y"]
+
+
+def test_where_no_solution_is_real_none_is_returned_and_all_are_counted() -> None:
+    pairs = np.deg2rad([[0, 0], [15, 11], [30, 23], [45, 38], [60, 56]])
+    s = mg.synthesize(four_bar(), mg.function("A", "D", pairs), ["B.point", "C.point"])
+    # over the four links
+    assert (len(s), s.total, s.poses.shape) == (0, 3, (0, 5, 4, 4, 4))
+    assert len(s.complex) + s.infinite + sum(one.count for one in s.degenerate) == 3
+    assert "0 mechanisms, of 3 solutions" in str(s)

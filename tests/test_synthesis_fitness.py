@@ -1,0 +1,141 @@
+"""Fitness of mechanisms that meet positions: defects and transmission against closed forms, and against the map of all branches."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mechanisms import FourBarFormula
+
+import mechgraph as mg
+from mechgraph.synthesis.fitness import Fitness, fitness
+
+
+def rows_of(m: mg.Mechanism, starts: list[dict[str, float]]) -> np.ndarray:
+    return np.array([[start[name] for name in ("O0", "O1", "O2", "O3")] for start in starts])
+
+
+def out_of_order(values: np.ndarray, whole: bool) -> bool:
+    steps = np.diff(values)
+    if whole:
+        return bool(min(np.mod(steps, 2 * np.pi).sum(), np.mod(-steps, 2 * np.pi).sum()) >= 2 * np.pi)
+    return bool((steps > 0).any() and (steps < 0).any())
+
+
+def transmission_angle(known: FourBarFormula, angle: float, side: int) -> float:
+    tip, joint = known.joint(angle, side)
+    mu = np.angle((joint - tip) / (joint - known.lengths[3]))
+    return float(np.arcsin(abs(np.sin(mu))))
+
+
+@pytest.mark.daily(12)
+@pytest.mark.parametrize("seed", range(400))
+def test_defects_and_transmission_of_four_bars_are_those_of_closed_forms(seed: int) -> None:
+    known = FourBarFormula(np.random.default_rng(seed))
+    rng, whole = known.rng, not known.folds.size
+    angles = known.angles(4)
+    if len(angles) < 2:
+        return
+    angles = np.roll(np.sort(angles), rng.integers(4)) if rng.random() < 0.7 else angles
+    sides = rng.choice([-1, 1], len(angles)) if rng.random() < 0.3 else np.full(len(angles), rng.choice([-1, 1]))
+    asked = list(zip(angles.tolist(), sides.tolist(), strict=True))
+    m = known.mechanism(*asked[0])
+    found = fitness(m, rows_of(m, [known.start(*at) for at in asked]), "O0", "O3")
+    # cranks that swing about their other dead position count angles from there
+    a, b, c, d = known.lengths
+    values = np.mod(angles, 2 * np.pi) if abs(b - c) > abs(a - d) else angles
+    branch = len({known.branch(*at) for at in asked}) > 1
+    assert found.branch == branch
+    assert found.circuit == (len({known.circuit(*at) for at in asked}) > 1)
+    assert found.order == (not branch and out_of_order(values, whole))
+    assert found.full_turn == whole
+    assert found.transmission == pytest.approx(min(transmission_angle(known, *at) for at in asked), abs=1e-7)
+    if found.good and not whole:
+        between = [transmission_angle(known, angle, sides[0]) for angle in np.linspace(values[0], values[-1], 2001)]
+        assert found.transmission_between == pytest.approx(min(between), abs=1e-3)
+
+
+def test_places_of_a_slider_crank_are_met_on_a_branch_if_the_rod_stays_on_one_side() -> None:
+    """With the slider driven its crank stands on either side of the dead positions: one circuit, two branches."""
+    z, crank, rod = (0.0, 0.0, 1.0), 1.0, 2.5
+    m = mg.Mechanism(
+        "slider-crank",
+        [mg.Link("frame"), mg.Link("crank"), mg.Link("rod"), mg.Link("slider")],
+        [
+            mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=z),
+            mg.Pair("B", "R", "crank", "rod", point=(0, crank, 0), axis=z),
+            mg.Pair("C", "R", "rod", "slider", point=(np.sqrt(rod**2 - crank**2), 0, 0), axis=z),
+            mg.Pair("D", "P", "frame", "slider", point=(0, 0, 0), axis=(1, 0, 0)),
+        ],
+        planar=True,
+    )
+
+    def row(angle: float) -> list[float]:
+        turned, tilt = angle - np.pi / 2, np.arcsin(crank / rod * np.sin(angle)) - np.arcsin(crank / rod)
+        way = crank * np.cos(angle) + np.sqrt(rod**2 - (crank * np.sin(angle)) ** 2) - np.sqrt(rod**2 - crank**2)
+        return [turned, -tilt - turned, tilt, way]
+
+    def of(angles: list[float], driver: str, output: str) -> Fitness:
+        return fitness(m, np.array([row(angle) for angle in angles]), driver, output)
+
+    crank_driven = of([1.5, 3.0, 4.5], "A", "D")
+    assert (crank_driven.good, crank_driven.full_turn) == (True, True)
+    assert np.cos(crank_driven.transmission) == pytest.approx(crank / rod * max(abs(np.sin([1.5, 3.0, 4.5]))), abs=1e-9)
+    # least where the crank is square to the slide, between the second place and the third
+    assert np.cos(crank_driven.transmission_between) == pytest.approx(crank / rod, abs=1e-4)
+    slider_driven = of([1.0, 2.0, 3.0], "D", "A")
+    assert (slider_driven.good, slider_driven.full_turn) == (True, False)
+    beyond = of([1.0, 2.0, 4.0], "D", "A")
+    assert (beyond.branch, beyond.circuit, beyond.good) == (True, False, False)
+    assert of([1.0, 3.0, 2.0], "D", "A").order
+    assert (crank_driven.size, crank_driven.ratio) == pytest.approx((rod, rod))
+
+
+def test_verdicts_on_a_spatial_mechanism_are_those_of_the_map_of_its_branches() -> None:
+    """RSSR, of which the ball-jointed rod may spin: places of one branch, of two, of another circuit."""
+    m = mg.load("rssr")
+    b = mg.branches(m, "A", samples=8, points=64)
+    names = m.freedom_names()
+    for number, one in enumerate(b.branches):
+        rows = one.coordinates[[3, 20, 40]]
+        found = fitness(m, rows, "A", "D")
+        assert (found.branch, found.circuit, found.order) == (False, False, False)
+        assert found.full_turn == b.full_turn[number]
+        for other, two in enumerate(b.branches):
+            mixed = np.concatenate([rows[:1], two.coordinates[[20]]])
+            defects = b.defects([dict(zip(names, q.tolist(), strict=True)) for q in mixed])
+            told = fitness(m, mixed, "A", "D")
+            assert (
+                (told.branch, told.circuit) == (defects.branch, defects.circuit) == (other != number, other != number)
+            )
+
+
+def test_without_a_driver_nothing_is_said_of_defects() -> None:
+    m = mg.load("four-bar")
+    found = fitness(m, np.zeros((1, len(m.freedom_names()))))
+    assert (found.branch, found.circuit, found.order, found.full_turn, found.good) == (None, None, None, None, True)
+    assert np.isnan(found.transmission)
+    assert found.lacks(["branch", "full_turn"]) == ("branch", "full_turn")
+
+
+def test_from_a_dead_point_a_driver_leads_nowhere_and_two_drivers_leave_defects_unknown() -> None:
+    """A slider-crank driven by its slider, with crank and rod in line; a five-bar of which one of two drives is asked."""
+    m = mg.Mechanism(
+        "slider-crank",
+        pairs=[
+            mg.Pair("A", "R", "frame", "crank", point=(0, 0)),
+            mg.Pair("B", "R", "crank", "rod", point=(1, 0)),
+            mg.Pair("C", "R", "rod", "slider", point=(3, 0)),
+            mg.Pair("D", "P", "frame", "slider", point=(3, 0), axis=(1, 0)),
+        ],
+        planar=True,
+    )
+    dead = fitness(m, np.zeros((2, len(m.freedom_names()))), "D", "A")
+    assert (dead.branch, dead.circuit, dead.good) == (True, None, False)
+    assert fitness(m, np.zeros((1, len(m.freedom_names()))), "A", "D").good
+    at = [(0, 0), (0, 1), (1, 2), (2, 1), (2, 0)]
+    ends = ["frame", "left", "upper left", "upper right", "right", "frame"]
+    pairs = [mg.Pair("ABCDE"[i], "R", ends[i], ends[i + 1], point=at[i]) for i in range(5)]
+    five = mg.Mechanism("five-bar", pairs=pairs, drives=["A", "E"], planar=True)
+    found = fitness(five, np.zeros((2, len(five.freedom_names()))), "A")
+    assert (found.branch, found.full_turn) == (None, None)
+    assert np.isnan([found.transmission, found.transmission_between]).all()
