@@ -23,6 +23,7 @@ from mechgraph.cli.commands import (
     save,
     solve,
     structure,
+    synthesize,
 )
 from mechgraph.cli.options import DONE, EXIT_STATUS, in_plane, outcome, warned, write
 
@@ -72,6 +73,19 @@ def _main(
 
 
 app.command("list")(list_library)
-for command in (check, structure, equations, solve, respond, save, plot, loads, report, assemblies, branches):
+for command in (
+    check,
+    structure,
+    equations,
+    solve,
+    respond,
+    save,
+    plot,
+    loads,
+    report,
+    assemblies,
+    branches,
+    synthesize,
+):
     app.command(command.__name__)(in_plane(command))
 app.command("compile")(in_plane(compile_))

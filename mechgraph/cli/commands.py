@@ -697,6 +697,50 @@ def branches(
         raise typer.Exit(opt.NO_ANSWER)
 
 
+def synthesize(
+    mechanism: opt.Named,
+    good: Annotated[bool, typer.Option("--good", help="Only mechanisms without defects.")] = False,
+    rank: Annotated[
+        Literal["transmission", "size", "ratio", "error"] | None,
+        typer.Option("--rank", help="What the best mechanism is best in. Default: good ones first, then transmission."),
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Write a mechanism as a TOML file.", metavar="FILE")] = None,
+    solution: Annotated[
+        int, typer.Option("--solution", help="Which one is written, counted from 0.", metavar="NUMBER", min=0)
+    ] = 0,
+    plot: Annotated[Path | None, opt.option("--plot", "Also plot them side by side.", "FILE")] = None,
+    json: opt.AsJson = False,
+) -> None:
+    """Find the mechanisms that do what [synthesis] of a file asks, and report whether the list is complete.
+
+    Example: mechgraph synthesize function.toml --good --rank size --out best.toml
+
+    Exit status: 0 success; 1 where no mechanism is left; 2 usage or input error.
+    """
+    opt.check_out(plot, mechanism, PICTURES)
+    if out is not None:
+        opt.refuse_own_file(out, mechanism)
+    m = opt.loaded(mechanism)
+    if m.synthesis is None:
+        opt.refuse("synthesize", "what is asked? The mechanism has no [synthesis] that says it")
+    if m.synthesis.sweep:
+        opt.refuse("synthesize", "[synthesis] has a sweep, which has no command; call mg.synthesize")
+    with opt.working(f"synthesis of {m.name}"):
+        found = mg.synthesize(m)
+        found = found.good if good else found
+        found = found if rank is None else found.ranked(rank)
+        figure = found.plot() if plot is not None and len(found) else None
+    if found and solution >= len(found):
+        opt.refuse("synthesize", f"--solution {solution}: there are {counted(len(found), 'mechanism')}, counted from 0")
+    if out is not None and found:
+        mg.save(found[solution], out)
+    _tell_found("synthesize", found, figure, plot, json)
+    if out is not None and found and not json:
+        opt.write(f"\nWrote mechanism {solution} to {out}.\n")
+    if not found:
+        raise typer.Exit(opt.NO_ANSWER)
+
+
 def _tell_found(command: str, found: Any, figure: Any, out: Path | None, json: bool) -> None:
     """What was found, as a table or a record, and the picture."""
     drawn = None if figure is None or out is None else out

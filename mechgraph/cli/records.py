@@ -20,6 +20,7 @@ from mechgraph.modes.assemblies import AssembliesData, BranchesData
 from mechgraph.response.respond import ResponseData
 from mechgraph.result.over_time import OverTimeData
 from mechgraph.result.summary import SolutionData
+from mechgraph.synthesis.syntheses import SynthesesData
 
 
 @dataclass(frozen=True)
@@ -325,6 +326,7 @@ COMMANDS: dict[str, Callable[[Json], Json]] = {
     "plot": _record(PlotData),
     "structure": _record(StructureData),
     "assemblies": _record(AssembliesData, file=Annotated[str | None, "the picture that was drawn"]),
+    "synthesize": _record(SynthesesData, file=Annotated[str | None, "the picture that was drawn"]),
     "branches": _record(BranchesData, file=Annotated[str | None, "the picture that was drawn"]),
 }
 """The schema of what every command prints."""

@@ -1,0 +1,156 @@
+"""``[synthesis]`` in a file: read and written without loss, faults all at once."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import tomllib
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+from program import bad, run, schema
+
+import mechgraph as mg
+
+FILE = """
+schema = 1
+name = "function"
+planar = true
+pair = [
+    { name = "A", type = "R", a = "frame", b = "crank", point = [0, 0] },
+    { name = "B", type = "R", a = "crank", b = "coupler", point = [0, 1] },
+    { name = "C", type = "R", a = "coupler", b = "rocker", point = [3, 2] },
+    { name = "D", type = "R", a = "frame", b = "rocker", point = [3, 0] },
+]
+
+[synthesis]
+unknown = ["B.point", "C.point"]
+conditions = { "D.effort" = [-inf, 40] }
+
+[[synthesis.task]]
+kind = "function"
+input = "A"
+output = "D"
+pairs_deg = [[0, 0], [20, 31], [45, 52]]
+"""
+
+
+def four_bar() -> mg.Mechanism:
+    z = (0, 0, 1)
+    ends = {"A": ("frame", "crank"), "B": ("crank", "coupler"), "C": ("coupler", "rocker"), "D": ("frame", "rocker")}
+    at = {"A": (0, 0, 0), "B": (0, 1, 0), "C": (3, 2, 0), "D": (3, 0, 0)}
+    pairs = [mg.Pair(name, "R", *ends[name], point=at[name], axis=z) for name in ends]
+    links = [
+        mg.Link(name, points={"tip": (1, 2, 0)} if name == "coupler" else {})
+        for name in ("frame", "crank", "coupler", "rocker")
+    ]
+    return mg.Mechanism("four-bar", links, pairs, drives=["A"], planar=True)
+
+
+def test_a_file_is_read_with_its_degrees_and_keeps_the_schema(tmp_path: Path) -> None:
+    jsonschema.validate(tomllib.loads(FILE), schema("mechanism"))
+    path = tmp_path / "function.toml"
+    path.write_text(FILE, encoding="utf-8")
+    asked = mg.load(path).synthesis
+    assert asked.unknown == ("B.point", "C.point")
+    assert asked.conditions == {"D.effort": (-np.inf, 40.0)}
+    (task,) = asked.tasks
+    assert np.allclose(task.pairs, np.deg2rad([[0, 0], [20, 31], [45, 52]]), rtol=0, atol=1e-15)
+
+
+ASKED = {
+    "function": mg.SynthesisSetup(mg.function("A", "D", [(0, 0), (0.2, 0.3)]), "B.point.x", fit="minimax", starts=3),
+    "path": mg.SynthesisSetup(
+        mg.path("coupler.tip", [(1, 2), (1.1, 2.2)], at={"A": [0, 0.1]}),
+        ["B"],
+        bounds={"B.point.x": (None, 2)},
+        require=["branch"],
+    ),
+    "poses": mg.SynthesisSetup(
+        [mg.poses("coupler", [[0, 0, 0], [0.1, 0.2, 0.3]])], ["B"], sweep={"A.point.x": [0.0, 0.1]}
+    ),
+    "matrices": mg.SynthesisSetup(
+        [mg.poses("coupler", [np.eye(4), np.eye(4)])], ["B"], minimize="size", over={"A": [0, 1]}
+    ),
+    "positions": mg.SynthesisSetup(
+        mg.positions([{"A": 0.0, "coupler.tip": (1, 2)}, {"A": 0.1}]), ["B"], maximize="transmission D"
+    ),
+}
+
+
+@pytest.mark.parametrize("name", ASKED)
+def test_what_is_written_is_read_again(name: str, tmp_path: Path) -> None:
+    m = four_bar().replace(synthesis=ASKED[name])
+    mg.save(m, tmp_path / "m.toml")
+    text = (tmp_path / "m.toml").read_text(encoding="utf-8")
+    jsonschema.validate(tomllib.loads(text), schema("mechanism"))
+    assert mg.load(tmp_path / "m.toml") == m == pickle.loads(pickle.dumps(m))
+    assert mg.load(tmp_path / "m.toml").replace(synthesis=None) != m
+    assert type(m.synthesis).__name__ in str(m)
+
+
+def test_angles_of_poses_are_degrees_in_the_file_and_radians_in_the_call(tmp_path: Path) -> None:
+    (task,) = ASKED["poses"].tasks
+    assert task.places[1] == pytest.approx((0.1, 0.2, np.rad2deg(0.3)))
+    assert np.allclose(task.arguments()["places"], [[0, 0, 0], [0.1, 0.2, 0.3]], rtol=0, atol=1e-15)
+
+
+def test_all_that_is_wrong_is_said_at_once() -> None:
+    bad = mg.SynthesisSetup(
+        ["A", mg.function("A", "", None)], ["B"], require=["turn"], bounds={"B.point.x": (2, 1)}, fit="best", starts=0
+    )
+    with pytest.raises(mg.DeclarationError) as caught:
+        four_bar().replace(synthesis=bad)
+    said = "\n".join(caught.value.faults)
+    for part in ("task 1", "output is missing", "pairs is missing", "bounds['B.point.x']", "fit", "require", "starts"):
+        assert part in said
+    with pytest.raises(mg.DeclarationError, match=r"an mg\.SynthesisSetup"):
+        four_bar().replace(synthesis={"unknown": ["B"]})
+
+
+def test_what_a_file_may_not_hold_is_said(tmp_path: Path) -> None:
+    m = four_bar().replace(synthesis=mg.SynthesisSetup(mg.function("A", "D", [(0, 0)]), ["B"], minimize=len))
+    with pytest.raises(mg.FileError, match="callable"):
+        mg.save(m, tmp_path / "m.toml")
+    with pytest.raises(mg.DeclarationError, match="synthesis is in units of its own"):
+        m.to_units(length="mm")
+
+
+FITTED = FILE.replace("[synthesis]", '[synthesis]\nfit = "least_squares"\nstarts = 1').replace(
+    "[[0, 0], [20, 31], [45, 52]]", "[[0, 0], [20, 16], [40, 31], [60, 44], [80, 53], [100, 60]]"
+)
+FITTED = FITTED.replace('conditions = { "D.effort" = [-inf, 40] }', "")
+"""A fit: more pairs than can be met exactly."""
+
+
+def test_a_mechanism_is_found_ranked_drawn_and_written_by_the_program(tmp_path: Path) -> None:
+    path, best, picture = tmp_path / "f.toml", tmp_path / "best.toml", tmp_path / "s.svg"
+    path.write_text(FITTED, encoding="utf-8")
+    result = run("synthesize", path, "--good", "--rank", "size", "--out", best, "--plot", picture)
+    assert result.exit_code == 0
+    assert "Completeness: searched" in result.output
+    assert picture.read_text(encoding="utf-8").startswith("<?xml")
+    told = json.loads(run("synthesize", path, "--json").output)
+    jsonschema.validate(told, schema("output"))
+    assert told["fitness"][0]["error"] < 0.02
+    # what was written does what was asked of it, to the error that is told
+    m = mg.load(best)
+    crank, rocker = np.deg2rad([[0, 20, 40, 60, 80, 100], [0, 16, 31, 44, 53, 60]])
+    assert (
+        np.abs(mg.kinematics(m, {"A": crank})["D"].position[:, 0] - rocker).max() <= told["fitness"][0]["error"] + 1e-9
+    )
+    assert [m.pair("B").point[0], m.pair("C").point[1]] == pytest.approx(
+        [told["values"][0][0], told["values"][0][3]], abs=1e-6
+    )
+
+
+def test_the_program_says_where_nothing_is_left_and_what_is_not_there(tmp_path: Path) -> None:
+    path = tmp_path / "f.toml"
+    path.write_text(FITTED.replace("starts = 1", "starts = 1\nconditions = { size = [-inf, 0.5] }"), encoding="utf-8")
+    result = run("synthesize", path)
+    assert result.exit_code == 1
+    assert "no [synthesis]" in bad("synthesize", "four-bar")
+    path.write_text(FITTED + '\n[synthesis.sweep]\n"A.point.x" = [0, 1]\n', encoding="utf-8")
+    assert "sweep" in bad("synthesize", path)
