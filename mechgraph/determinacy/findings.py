@@ -41,6 +41,7 @@ from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import independent_rows, rank_of, singular_values
 from mechgraph.maths.se3 import Array, Index, rotation_exp
 from mechgraph.maths.tolerances import MOTIONS
+from mechgraph.model.friction import Friction
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.toml import to_data
@@ -540,7 +541,7 @@ class Advice(Finding):
         return patch(to_data(self.mechanism), to_data(self.apply()))
 
     def apply(self) -> Mechanism:
-        """The changed mechanism, at the position of the report."""
+        """The changed mechanism, at the position of the report; without the friction of a pair that changes."""
         m = self.mechanism
         if self.effect is None:
             kept = [d for d in m.drives if m.full_name(d.freedom) not in self.replaced]
@@ -552,6 +553,7 @@ class Advice(Finding):
             if old == RIGID:
                 m = with_spline(m, name)
                 continue
+            m = m.replace(loads=[load for load in m.loads if not (isinstance(load, Friction) and load.of == name)])
             m = m.with_pair_type(name, new)
             if turn:
                 m = m.replace(pairs=[_turned(p, np.radians(turn)) if p.name == name else p for p in m.pairs])

@@ -28,7 +28,8 @@ class Friction(Load):
     A turn about an axis rubs as a journal: couple ``rho |F|`` of the radial force F, ``rho = radius sin(atan mu)`` (the friction
     circle), and ``mu thrust_radius |F_axial|`` where ``thrust_radius`` is given. A slide: ``mu |F|`` at the shoes, ``width`` puts
     them off the axis and bears the moment about it. Turn and slide along one axis share one force. A screw: ``radius |Q| (tan(lead
-    +- phi) - +-tan lead)``, ``tan phi = mu / cos flank``. A ball: ``rho |F|`` against the relative angular velocity. A contact:
+    +- phi) - +-tan lead)``, ``tan phi = mu / cos an``, ``tan an = tan(flank) cos(lead)`` of the normal section. A ball: ``rho |F|``
+    against the relative angular velocity. A contact:
     ``mu N`` against its sliding. A plane: ``mu |F|`` at the center of pressure against the velocity there, its turn through
     ``radius``. With ``length`` two places ``+-length / 2`` along the axis carry ``F / 2 +- M x z / length``.
 

@@ -506,23 +506,24 @@ def _notes_of_pair(values: Trajectory, load: Friction) -> Iterator[FrictionNote]
         yield FrictionNote(
             load.of, f"{where}model='total' gives couples {more:.2g} % larger than the circle; say which is meant"
         )
-    borne = [c.name for c in row.reactions or () if c.is_couple and not (load.width is not None and c.name == "Mz")]
-    if load.length is None and borne and any("length" in way.takes and way.of(row) for way in WAYS):
-        parts = np.stack([np.nan_to_num(result.components[name]) for name in borne], axis=-1)
-        if load.on == "b":
-            # about marker B all but the couple along the axis, which is the same about both markers
-            along = 0.0 if "Mz" in borne else result.components.get("Mz", 0.0)
-            if row.takes_pitch:
-                along = values.whole.pair(load.of).pitch_per_radian * result.components["Fz"]
-            parts = np.sqrt(np.abs((np.nan_to_num(result.moment) ** 2).sum(axis=-1) - np.nan_to_num(along) ** 2))[
-                ..., None
-            ]
-        moment = np.linalg.norm(parts, axis=-1)
-        # a bearing as long as its diameter bears it by more than its force; of a guide any moment that is no rounding
-        arm = 1e-6 * values.radius if load.radius is None else load.radius
-        if (moment > arm * np.nan_to_num(result.magnitude)).any():
-            most = f"{moment.max():.4g} {unit_of(values.mechanism.units, MOMENT)}".rstrip()
-            why = f"{where}a moment of up to {most} across the axis rubs nothing; give length=, the distance at which it is borne"
+    takes = {name for way in WAYS if way.of(row) for name in way.takes}
+    couples = {c.name: np.nan_to_num(result.components[c.name]) for c in row.reactions or () if c.is_couple}
+    # the axis is in the plane of a planar mechanism, and the couple across it
+    about = None if values.whole.planar else couples.pop("Mz", None)
+    across = np.linalg.norm(np.stack([*couples.values(), np.zeros(values.batch)]), axis=0)
+    if load.on == "b" and couples:  # about marker B, where the couple along the axis is the same
+        along = np.zeros(values.batch) if about is None else about
+        if row.takes_pitch:
+            along = values.whole.pair(load.of).pitch_per_radian * np.nan_to_num(result.components["Fz"])
+        across = np.sqrt(np.abs((np.nan_to_num(result.moment) ** 2).sum(axis=-1) - along**2))
+    # a bearing as long as its diameter bears it by more than its force; of a guide any moment that is no rounding
+    arm = 1e-6 * values.radius if load.radius is None else load.radius
+    for name, how, moment in (("length", "across", across), ("width", "about", about)):
+        if moment is None or name not in takes or getattr(load, name) is not None:
+            continue
+        if (np.abs(moment) > arm * np.nan_to_num(result.magnitude)).any():
+            most = f"{np.abs(moment).max():.4g} {unit_of(values.mechanism.units, MOMENT)}".rstrip()
+            why = f"{where}a moment of up to {most} {how} the axis rubs nothing; give {name}=, the distance at which it is borne"
             yield FrictionNote(load.of, why)
 
 
