@@ -22,7 +22,7 @@ from mechgraph.modes.assemblies import Question
 from mechgraph.modes.certificate import Ball, certificate, curvature, loop_rows, rows, told_apart
 from mechgraph.modes.family import Family, Labelling
 from mechgraph.modes.homotopy import Care, Equations, Leg, Linear, follow
-from mechgraph.modes.start_sets import MISSED, Group, kept
+from mechgraph.modes.start_sets import MISSED, TrackGroup, kept
 from mechgraph.modes.targets import EquationGroup, Undivided, groups_of
 
 ON_A_COUPLER = {
@@ -310,12 +310,12 @@ def test_loops_are_followed_in_one_go_where_many_assemblies_need_many(monkeypatc
     assert start is not None
     rounds: list[int] = []
 
-    def back(group: Group, _: Family, loops: int, __: np.random.Generator) -> np.ndarray:
+    def back(group: TrackGroup, _: Family, loops: int, __: np.random.Generator) -> np.ndarray:
         rounds.append(loops)
         return np.tile(group.x, loops)
 
-    monkeypatch.setattr(Group, "_round", back)
-    group = Group(Equations(family, start.mixing), start.member, start.x, 100)
+    monkeypatch.setattr(TrackGroup, "_round", back)
+    group = TrackGroup(Equations(family, start.mixing), start.member, start.x, 100)
     group.grow(MISSED, np.random.default_rng(0), None)
     assert rounds == [4]
     assert group.chance == pytest.approx(17.0**-4)

@@ -8,7 +8,7 @@ import scipy.optimize
 
 import mechgraph as mg
 from mechgraph.synthesis.fits import Fit, fitted
-from mechgraph.synthesis.system import Problem
+from mechgraph.synthesis.system import RowProblem
 
 Z = (0.0, 0.0, 1.0)
 PAIRS = {"A": (0.0, 0.0, 0.0), "B": (0.0, 1.0, 0.0), "C": (3.0, 2.5, 0.0), "D": (3.0, 0.0, 0.0)}
@@ -27,7 +27,7 @@ def ellipse(n: int) -> np.ndarray:
 
 
 def asked(task: object, unknown: list[str]) -> Fit:
-    return Fit(Problem(four_bar(), task, unknown), task)
+    return Fit(RowProblem(four_bar(), task, unknown), task)
 
 
 EVERYTHING = ["A.point", "B.point", "C.point", "D.point", "coupler.tip"]
@@ -61,7 +61,7 @@ def test_a_curve_of_the_mechanism_is_met_and_the_driver_of_every_row_is_found() 
         pairs=[p.replace(point=np.add(p.point, (0.07, -0.05, 0))) if p.name in "BC" else p for p in m.pairs]
     )
     task = mg.path("coupler.tip", points)
-    fit = Fit(Problem(off, task, ["B.point", "C.point"]), task)
+    fit = Fit(RowProblem(off, task, ["B.point", "C.point"]), task)
     found = fitted(fit, "least_squares", iter([]), 1, {})
     best = found.points[0]
     assert fit.errors(best).max() < 1e-8

@@ -302,7 +302,7 @@ def _bears(row: PairType) -> bool:
     return sum(not c.is_couple for c in row.reactions or ()) >= (2 if row.normal is None else 1)
 
 
-class _Way(NamedTuple):
+class _RubsBy(NamedTuple):
     """A way in which pairs rub: which ones, and the arguments of ``Friction`` that it needs and takes."""
 
     of: Callable[[PairType], bool]
@@ -313,12 +313,12 @@ class _Way(NamedTuple):
 OF_PAIRS = ("static", "stribeck", "model", "viscous", "preload", "on")
 """Arguments that all pairs take."""
 WAYS = (
-    _Way(rubs_as_journal, ("radius",), ("thrust_radius", "length")),
-    _Way(rubs_as_slide, (), ("length", "width")),
-    _Way(rubs_as_screw, ("radius",), ("length", "flank")),
-    _Way(rubs_as_ball, ("radius",)),
-    _Way(rubs_as_plane, (), ("radius",)),
-    _Way(rubs_as_contact),
+    _RubsBy(rubs_as_journal, ("radius",), ("thrust_radius", "length")),
+    _RubsBy(rubs_as_slide, (), ("length", "width")),
+    _RubsBy(rubs_as_screw, ("radius",), ("length", "flank")),
+    _RubsBy(rubs_as_ball, ("radius",)),
+    _RubsBy(rubs_as_plane, (), ("radius",)),
+    _RubsBy(rubs_as_contact),
 )
 
 

@@ -503,7 +503,7 @@ def _permuted(
     known = bound(equations.family)
     # assemblies of one member from which on they are not looked for any further
     most_found = 1200
-    group = Group(equations, base, x[:, None], most_found if known is None else known.count)
+    group = TrackGroup(equations, base, x[:, None], most_found if known is None else known.count)
     group.grow(MISSED, rng, progress)
     group.move(*tame(equations, group.base, group.x, rng))
     group.grow(MISSED_AGAIN, rng, progress)
@@ -517,7 +517,7 @@ def _permuted(
     )
 
 
-class Group:
+class TrackGroup:
     """Assemblies ``x (nx, N)`` known of a member ``base``, and the loops that brought no further one."""
 
     def __init__(self, equations: Equated, base: Any, x: Array, most: int) -> None:

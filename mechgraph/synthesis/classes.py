@@ -26,26 +26,26 @@ from mechgraph.maths.se3 import Index, cross, finite_twist, pose_exp, rotation_e
 from mechgraph.maths.tolerances import MODES
 from mechgraph.modes.family import NO_NUMBERS, Array, Family, common, generated
 from mechgraph.modes.homotopy import ENDLESS_STATE, Equations, Mask, rounding, solved
-from mechgraph.synthesis.system import Numbers, Problem, Rows
+from mechgraph.synthesis.system import ArrowRows, RowNumbers, RowProblem
 from mechgraph.variants.numbers import MARKER
 
 
 @dataclass(frozen=True)
-class Member:
+class ClassMember:
     """Mechanisms, their ``numbers`` of markers, and the values asked of them ``drive (R, d, n)``; what is not asked is ignored."""
 
-    numbers: Numbers
+    numbers: RowNumbers
     drive: Array
 
-    def taken(self, which: Index) -> Member:
+    def taken(self, which: Index) -> ClassMember:
         """Some of them; one serves for all."""
-        return self if self.drive.shape[-1] == 1 else Member(self.numbers.taken(which), self.drive[..., which])
+        return self if self.drive.shape[-1] == 1 else ClassMember(self.numbers.taken(which), self.drive[..., which])
 
     @staticmethod
-    def joined(members: Sequence[Member]) -> Member:
+    def joined(members: Sequence[ClassMember]) -> ClassMember:
         """Several, one after the other."""
         drive = np.concatenate([m.drive for m in members], axis=-1)
-        return Member(Numbers.joined([m.numbers for m in members]), drive)
+        return ClassMember(RowNumbers.joined([m.numbers for m in members]), drive)
 
 
 class NoClass(Exception):
@@ -65,7 +65,7 @@ class TaskClass:
 
     idle = 0
 
-    def __init__(self, problem: Problem, rng: np.random.Generator) -> None:
+    def __init__(self, problem: RowProblem, rng: np.random.Generator) -> None:
         self.problem, s = problem, problem.system
         self.u, self.R, self.nx, self.F = problem.u, len(problem.rows), s.n_state, s.n_freedoms
         self.given = ~np.isnan(problem.asked[problem.rows])
@@ -137,7 +137,7 @@ class TaskClass:
         mix = np.linalg.qr(rng.normal(size=(n, n)) + 1j * rng.normal(size=(n, n)))[0]
         self.mixing = [None if rank == n else mix[:rank] for rank in ranks]
 
-    def random_closed(self, rng: np.random.Generator) -> tuple[Member, Array] | None:
+    def random_closed(self, rng: np.random.Generator) -> tuple[ClassMember, Array] | None:
         """A random mechanism of the class at random positions: what it does there is a task that it solves."""
         s, problem, z = self.problem.system, self.problem, _random(rng, self.u)
         numbers = problem.numbers.moved(self._random_places(rng)).with_values(problem.places, z[:, None])
@@ -155,7 +155,7 @@ class TaskClass:
             states.append(x[:, 0])
         X = np.array(states)
         norms = numbers.norms.ravel()[: self.W]
-        return Member(numbers, X[:, s.single_rows[problem.columns], None]), np.concatenate([z, norms, X.ravel()])
+        return ClassMember(numbers, X[:, s.single_rows[problem.columns], None]), np.concatenate([z, norms, X.ravel()])
 
     def _random_places(self, rng: np.random.Generator) -> Array:
         """Known places moved at random, such that loops keep the groups in which they move ``(3, 4, 2, P, 1)``."""
@@ -170,7 +170,7 @@ class TaskClass:
                 )
         return pose_exp(moves)
 
-    def random_member(self, rng: np.random.Generator) -> Member:
+    def random_member(self, rng: np.random.Generator) -> ClassMember:
         """A random mechanism and a random task like those that mechanisms of the class do; what is asked of one row is asked of it alone.
 
         Raises
@@ -231,13 +231,13 @@ class TaskClass:
         own = (np.abs(dq[: self.u]) / (1.0 + np.abs(x[: self.u]))).max(axis=0, initial=0.0)
         return np.maximum(rows, own)
 
-    def fingerprints(self, member: Member, x: Array) -> Array:
+    def fingerprints(self, member: ClassMember, x: Array) -> Array:
         """What tells mechanisms apart: their unknowns."""
         return x[: self.u]
 
     # --- equations ---------------------------------------------------------------------------------------------------
 
-    def leg(self, begin: Member, end: Member, which: Index | None = None) -> TaskLeg:
+    def leg(self, begin: ClassMember, end: ClassMember, which: Index | None = None) -> TaskLeg:
         """The ways between members."""
         return TaskLeg(self, begin, end, which)
 
@@ -249,12 +249,12 @@ class TaskClass:
             out[p.side, p.pair] = True
         return out.ravel()
 
-    def goal(self, numbers: Numbers) -> Member:
+    def goal(self, numbers: RowNumbers) -> ClassMember:
         """Mechanisms with such numbers, and the task at hand."""
         drive = np.nan_to_num(self.problem.asked[self.problem.rows])[:, :, None].astype(complex)
-        return Member(numbers, np.repeat(drive, numbers.point.shape[-1], axis=-1))
+        return ClassMember(numbers, np.repeat(drive, numbers.point.shape[-1], axis=-1))
 
-    def at(self, member: Member, x: Array) -> Rows:
+    def at(self, member: ClassMember, x: Array) -> ArrowRows:
         """The equations of members at states of which what is asked is set to what they ask."""
         near = x[self.u : self.head].reshape(2, 2, -1, x.shape[1]) if self.W else None
         X = x[self.head :].reshape(self.R, self.nx, -1).copy()
@@ -263,7 +263,7 @@ class TaskClass:
             X[i, single[given]] = member.drive[i, given]
         return self.problem.equations(member.numbers.with_values(self.problem.places, x[: self.u], near), X)
 
-    def state(self, rows: Rows) -> Array:
+    def state(self, rows: ArrowRows) -> Array:
         """The states of equations."""
         z = [rows.numbers.at(places) for places in self.problem.places]
         norms = rows.numbers.norms.reshape(-1, rows.T)[: self.W]
@@ -285,7 +285,7 @@ def _rank(A: Array) -> int:
 class TaskLeg:
     """Straight ways between members ``begin`` and ``end``, one or several; ``which (V,)`` says which of them a track follows."""
 
-    def __init__(self, of: TaskClass, begin: Member, end: Member, which: Index | None = None) -> None:
+    def __init__(self, of: TaskClass, begin: ClassMember, end: ClassMember, which: Index | None = None) -> None:
         self.equations, self.begin, self.end, self._which = of, begin, end, which
         M0, M1 = begin.numbers.poses, end.numbers.poses
         R = np.einsum("ijspb,kjspb->ikspb", M1[:, :3], M0[:, :3])
@@ -309,7 +309,7 @@ class TaskLeg:
         """The equations at states of tracks at ``t (T,)``."""
         return Arrow(self, t, tracks, x)
 
-    def member(self, t: Array, tracks: Index) -> tuple[Member, Array, Array]:
+    def member(self, t: Array, tracks: Index) -> tuple[ClassMember, Array, Array]:
         """Members on the way, with the rates of what is asked ``(R, d, T)`` and of all vectors ``(3, 3, 2, P, T)``."""
         if self._which is None:
             begin, last, eta, change = self.begin, self.end.drive, self._eta, self._change
@@ -324,9 +324,9 @@ class TaskLeg:
         w, (point, axis, second) = eta[:3], (v.swapaxes(0, 1) for v in vectors)
         rates = np.stack([cross(w, point) + eta[3:], cross(w, axis), cross(w, second)])
         rates = rates + np.stack([c.swapaxes(0, 1) for c in change])
-        numbers = Numbers.of(*(v + t * c for v, c in zip(vectors, change, strict=True)))
+        numbers = RowNumbers.of(*(v + t * c for v, c in zip(vectors, change, strict=True)))
         drive = last - begin.drive
-        return Member(numbers, begin.drive + t * drive), drive, rates
+        return ClassMember(numbers, begin.drive + t * drive), drive, rates
 
 
 class Arrow:

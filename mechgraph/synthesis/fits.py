@@ -28,7 +28,7 @@ from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.tolerances import MODES
 from mechgraph.synthesis.fitness import keeps
-from mechgraph.synthesis.system import Problem, Rows
+from mechgraph.synthesis.system import ArrowRows, RowProblem
 from mechgraph.synthesis.tasks import FunctionTask
 
 LEAST_MARGIN = 1e-3
@@ -38,13 +38,13 @@ Bounds = Mapping[str, tuple[float | None, float | None]]
 
 
 @dataclass(frozen=True)
-class Point:
+class FitPoint:
     """Closed rows: unknowns ``z (u,)`` and drivers ``theta (n, d)`` in internal units, states ``x (nx, n)``, and their equations."""
 
     z: Array
     theta: Array
     x: Array
-    at: Rows
+    at: ArrowRows
 
 
 class Fit:
@@ -60,7 +60,7 @@ class Fit:
         Values of the other coordinates asked ``others (k,)``, NaN where nothing is.
     """
 
-    def __init__(self, problem: Problem, tasks: Any) -> None:
+    def __init__(self, problem: RowProblem, tasks: Any) -> None:
         self.p, s = problem, problem.system
         # a fit need not begin exactly where its first row asks it to
         problem.known.clear()
@@ -121,13 +121,13 @@ class Fit:
         """The declared dimensions."""
         return self.p.inside(self.p.unknowns.declared[:, None])[:, 0]
 
-    def _equations(self, z: Array, x: Array) -> Rows:
+    def _equations(self, z: Array, x: Array) -> ArrowRows:
         numbers = self.p.numbers.with_values(self.p.places, z[:, None])
         return self.p.equations(numbers, x.T[:, :, None])
 
     # --- closing ---------------------------------------------------------------------------------------------------------
 
-    def closed(self, z: Array, theta: Array, x: Array) -> Point | None:
+    def closed(self, z: Array, theta: Array, x: Array) -> FitPoint | None:
         """Rows closed from states near by; None where Newton's method does not come to an end there."""
         s = self.p.system
         x = x.copy()
@@ -137,7 +137,7 @@ class Fit:
             at = self._equations(z, x)
             left = at.residual[:, :, 0]
             if np.abs(left).max(initial=0.0) < 1e-12:
-                return Point(z, theta, x, at)
+                return FitPoint(z, theta, x, at)
             dq = np.zeros((s.n_freedoms, self.rows))
             dq[self.free] = -(self._inverse(at) @ left[:, :, None])[:, :, 0].T
             if not np.abs(dq).max() < 1.0:
@@ -145,10 +145,10 @@ class Fit:
             x = s.advance(x, dq)
         return None
 
-    def _inverse(self, at: Rows) -> Array:
+    def _inverse(self, at: ArrowRows) -> Array:
         return np.asarray(np.linalg.pinv(at.by_coordinates[:, :, self.free, 0], 1e-9), dtype=float)
 
-    def rates(self, here: Point) -> tuple[Array, Array]:
+    def rates(self, here: FitPoint) -> tuple[Array, Array]:
         """``dq/dz (n, F, u)`` and ``dq/dtheta (n, F, d)``."""
         inverse, F = self._inverse(here.at), self.p.system.n_freedoms
         by_z, by_theta = np.zeros((self.rows, F, len(here.z))), np.zeros((self.rows, F, len(self.drivers)))
@@ -157,7 +157,7 @@ class Fit:
         by_theta[:, self.drivers] = np.eye(len(self.drivers))
         return by_z, by_theta
 
-    def moved(self, here: Point, z: Array, theta: Array) -> tuple[Point, bool]:
+    def moved(self, here: FitPoint, z: Array, theta: Array) -> tuple[FitPoint, bool]:
         """Rows carried to other dimensions and drivers, in one step or in several; where a row would leave its branch as far as before."""
         at = here
         for parts in (1, 8):
@@ -176,12 +176,12 @@ class Fit:
                 return at, True
         return at, False
 
-    def _sides(self, here: Point) -> Array:
+    def _sides(self, here: FitPoint) -> Array:
         """Signs of the determinants of ``F_q`` at the rows, where it has one."""
         J = here.at.by_coordinates[:, :, self.free, 0]
         return np.asarray(np.linalg.slogdet(J)[0] if J.shape[1] == J.shape[2] else np.ones(self.rows))
 
-    def margins(self, here: Point) -> Array:
+    def margins(self, here: FitPoint) -> Array:
         """How far rows ``(n,)`` are from folds, and links from having no length: least singular value of ``F_q`` over its largest."""
         size = np.linalg.svd(here.at.by_coordinates[:, :, self.free, 0], compute_uv=False)
         return np.asarray(size[:, self.rank - 1] / size[:, 0])
@@ -198,7 +198,7 @@ class Fit:
         )
         return found.x, found.moved
 
-    def begun(self, z: Array) -> Point | None:
+    def begun(self, z: Array) -> FitPoint | None:
         """The rows of a mechanism: open drivers where its path comes nearest to what is asked; None where it does not reach them all."""
         first = self.closed(
             z, np.repeat(self.theta[:1], self.rows, axis=0), np.repeat(self.p.at_rest[:, None], self.rows, axis=1)
@@ -221,7 +221,7 @@ class Fit:
         states, came = self.led(z, theta, x)
         return self.closed(z, theta, states) if came.all() else None
 
-    def safe(self, here: Point) -> bool:
+    def safe(self, here: FitPoint) -> bool:
         """Whether the path leads from the first row to all others."""
         states, came = self.led(here.z, here.theta, here.x[:, 0])
         if not came.all():
@@ -248,11 +248,11 @@ class Fit:
         """Rows and coordinates of what is asked."""
         return np.nonzero(np.isfinite(self.wanted))  # type: ignore[return-value]
 
-    def residual(self, here: Point) -> Array:
+    def residual(self, here: FitPoint) -> Array:
         """By how much each is missed."""
         return self._wrapped(self._coordinates(here.x) - self.wanted)[self.asked]
 
-    def jacobian(self, here: Point) -> Array:
+    def jacobian(self, here: FitPoint) -> Array:
         """Its derivatives by the unknowns and the open drivers."""
         by_z, by_theta = self.rates(here)
         row, k = self.asked
@@ -267,14 +267,14 @@ class Fit:
         """The unit of errors: L where any length is asked, else radians."""
         return self.p.L if self.p.system.is_length[self.others].any() else 1.0
 
-    def errors(self, here: Point) -> Array:
+    def errors(self, here: FitPoint) -> Array:
         """Distances ``(n,)`` from what is asked at the rows, angles as arcs of radius L beside lengths."""
         squares = np.bincount(self.asked[0], self.residual(here) ** 2, minlength=self.rows)
         return self.unit * np.sqrt(squares)
 
     # --- as a vector -------------------------------------------------------------------------------------------------------
 
-    def vector(self, here: Point) -> Array:
+    def vector(self, here: FitPoint) -> Array:
         """Unknowns and open drivers ``(v,)``."""
         return np.concatenate([here.z, here.theta[self.open]])
 
@@ -299,11 +299,11 @@ class Fit:
 class Trials:
     """Trial vectors of an optimizer, each carried from the last one that was kept."""
 
-    def __init__(self, fit: Fit, begin: Point) -> None:
+    def __init__(self, fit: Fit, begin: FitPoint) -> None:
         self.fit, self.kept, self.last = fit, begin, begin
         self.refused = 1e3 * (1.0 + float(np.abs(fit.residual(begin)).max(initial=0.0)))
 
-    def at(self, v: Array) -> Point | None:
+    def at(self, v: Array) -> FitPoint | None:
         """The rows at a vector; None where they cannot be carried there."""
         for known in (self.last, self.kept):
             if np.array_equal(v, self.fit.vector(known)):
@@ -326,7 +326,7 @@ class Trials:
         return self.fit.jacobian(self.kept)
 
 
-Limit = tuple[Callable[[Point], Array], float | None, float | None]
+Limit = tuple[Callable[[FitPoint], Array], float | None, float | None]
 """Numbers of the rows, and what they must not fall below or rise above."""
 
 
@@ -334,7 +334,7 @@ Limit = tuple[Callable[[Point], Array], float | None, float | None]
 class Fitted:
     """Optima found, the best first, and in words how they were."""
 
-    points: tuple[Point, ...]
+    points: tuple[FitPoint, ...]
     evidence: tuple[str, ...]
 
 
@@ -344,7 +344,7 @@ def fitted(
     begins: Iterator[Array],
     starts: int,
     bounds: Bounds,
-    goal: Callable[[Point], Array] | None = None,
+    goal: Callable[[FitPoint], Array] | None = None,
     limits: Sequence[Limit] = (),
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
@@ -356,7 +356,7 @@ def fitted(
     low, high = fit.limits(bounds)
     rng, u = np.random.default_rng(seed), len(fit.z0)
     box = np.where(np.isfinite(low[:u]), low[:u], fit.z0 - 0.5), np.where(np.isfinite(high[:u]), high[:u], fit.z0 + 0.5)
-    begun: list[Point] = []
+    begun: list[FitPoint] = []
     tried = 0
     for z in chain([fit.z0], begins, (rng.uniform(*box) for _ in count())):
         if tried >= starts:
@@ -370,12 +370,12 @@ def fitted(
     if not begun and (evolved := _evolved(fit, *box, seed)) is not None:
         begun.append(evolved)
     order = sorted(range(len(begun)), key=lambda i: _size(fit, begun[i]))
-    ends: list[Point] = []
+    ends: list[FitPoint] = []
     unsafe, lost = 0, 0
     wide: Limit = fit.margins, 20 * LEAST_MARGIN, None
     # the best starts, which are followed to the end
     for i in order[:4]:
-        end: Point | None = least_squares(fit, begun[i], low, high, 200)
+        end: FitPoint | None = least_squares(fit, begun[i], low, high, 200)
         narrow = end is not None and fit.margins(end).min() < 20 * LEAST_MARGIN
         if narrow or way != "least_squares" or limits:
             # an optimum without a margin is none: it is looked for again where it keeps one
@@ -388,14 +388,14 @@ def fitted(
         else:
             ends.append(end)
 
-    def value(here: Point) -> float:
+    def value(here: FitPoint) -> float:
         if way is None:
             return 0.0 if goal is None else float(goal(here).max())
         errors = fit.errors(here)
         return float(errors.max() if way == "minimax" else np.sqrt((errors**2).mean()))
 
     ends.sort(key=value)
-    kept: list[Point] = []
+    kept: list[FitPoint] = []
     for here in ends:
         # difference of dimensions, over L, up to which optima are one
         if all(np.abs(here.z - other.z).max() > 1e-3 for other in kept):
@@ -412,7 +412,7 @@ def fitted(
     return Fitted(tuple(kept), tuple(words))
 
 
-def _evolved(fit: Fit, low: Array, high: Array, seed: int) -> Point | None:
+def _evolved(fit: Fit, low: Array, high: Array, seed: int) -> FitPoint | None:
     """The rows of the best dimensions that differential evolution finds in a box; None where it finds none that reaches all rows."""
 
     def costs(Z: Array) -> Any:
@@ -432,7 +432,7 @@ def _evolved(fit: Fit, low: Array, high: Array, seed: int) -> Point | None:
     return fit.begun(found.x)
 
 
-def least_squares(fit: Fit, begin: Point, low: Array, high: Array, evaluations: int = 100) -> Point:
+def least_squares(fit: Fit, begin: FitPoint, low: Array, high: Array, evaluations: int = 100) -> FitPoint:
     """The rows with the least sum of squares to which a start leads."""
     here = begin
     # times that open drivers are put anew where the path comes nearest
@@ -458,25 +458,25 @@ def least_squares(fit: Fit, begin: Point, low: Array, high: Array, evaluations: 
     return here
 
 
-def _size(fit: Fit, here: Point) -> float:
+def _size(fit: Fit, here: FitPoint) -> float:
     return float((fit.residual(here) ** 2).sum())
 
 
 def constrained(
     fit: Fit,
-    begin: Point,
+    begin: FitPoint,
     low: Array,
     high: Array,
     way: str | None,
-    goal: Callable[[Point], Array] | None,
+    goal: Callable[[FitPoint], Array] | None,
     limits: Sequence[Limit],
-) -> Point | None:
+) -> FitPoint | None:
     """The best rows to which a start leads under limits, by sequential quadratic programs; None where they are not kept there.
 
     ``way`` is ``"least_squares"``, ``"minimax"`` (the least slack ``s`` with ``|r_i|^2 <= s`` at every row), or None: what is asked is met,
     and the ``goal`` is as small as it can be.
     """
-    course = _Course(fit, begin, way, goal)
+    course = _RowCourse(fit, begin, way, goal)
     constraints = [{"type": "ineq", "fun": f, "jac": df} for f, df in course.ends(low, high)]
     if way is None:
         # what the declared configuration meets whatever the dimensions is no condition on them
@@ -501,13 +501,13 @@ def constrained(
     return here if all(keeps(f(here), least, most) for f, least, most in limits) else None
 
 
-class _Course:
+class _RowCourse:
     """Rows as functions of variables ``w``, in which what is missed changes by as much in all directions: ``v = v_0 + P w``.
 
     With ``J / unit = U S V^T`` at the start ``P = V S^-1``, small singular values left out of the inverse. Behind stands the slack.
     """
 
-    def __init__(self, fit: Fit, begin: Point, way: str | None, goal: Callable[[Point], Array] | None) -> None:
+    def __init__(self, fit: Fit, begin: FitPoint, way: str | None, goal: Callable[[FitPoint], Array] | None) -> None:
         self.goal, self.slack = goal, way != "least_squares"
         self.fit, self.trials, self._last = fit, Trials(fit, begin), begin
         self.unit = max(float(np.abs(fit.residual(begin)).max(initial=0.0)), 1e-9)
@@ -528,7 +528,7 @@ class _Course:
         """The vector of variables."""
         return self.v + self.P @ w[: len(self.v)]
 
-    def point(self, w: Array) -> Point:
+    def point(self, w: Array) -> FitPoint:
         """The rows; where they cannot be carried there, as far on the way as they can."""
         if not np.array_equal(w[: len(self.v)], self._asked):
             self._asked = w[: len(self.v)].copy()
@@ -572,7 +572,7 @@ class _Course:
         """Its derivatives."""
         return np.eye(len(w))[-1] - (self.squares_slope(w) if self.goal is None else self.slopes(self.goal, w))
 
-    def slopes(self, f: Callable[[Point], Array], w: Array) -> Array:
+    def slopes(self, f: Callable[[FitPoint], Array], w: Array) -> Array:
         """Forward differences of numbers that have no exact derivatives."""
         here = self.trials.kept = self.point(w)
         v, base, step, u = self.fit.vector(here), f(here), 1e-6, len(here.z)
@@ -590,7 +590,7 @@ class _Course:
                 out[row, np.arange(u, len(v))] = slope[row]
         return self._padded(out)
 
-    def limit(self, f: Callable[[Point], Array], sign: float, end: float) -> dict[str, Any]:
+    def limit(self, f: Callable[[FitPoint], Array], sign: float, end: float) -> dict[str, Any]:
         """A limit as the optimizer wants it."""
         return {
             "type": "ineq",

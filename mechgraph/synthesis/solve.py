@@ -29,16 +29,16 @@ from mechgraph.modes.start_sets import (
     MISSED,
     MISSED_AGAIN,
     NOT_PASSED,
-    Group,
     Pencil,
     Trace,
+    TrackGroup,
     distinct,
     tame,
     trace_test,
 )
 from mechgraph.modes.targets import TrackRun, run_tracks
-from mechgraph.synthesis.classes import Member, TaskClass
-from mechgraph.synthesis.system import Numbers
+from mechgraph.synthesis.classes import ClassMember, TaskClass
+from mechgraph.synthesis.system import RowNumbers
 from mechgraph.variants.numbers import MARKER
 
 Progress = Callable[[str], None] | None
@@ -48,7 +48,7 @@ Progress = Callable[[str], None] | None
 class TaskStart:
     """All solutions ``x (nx, N)`` known of a task of a class, and what that they are all rests on (see ``modes.start_sets.StartSet``)."""
 
-    member: Member
+    member: ClassMember
     x: Array
     loops: int
     chance: float
@@ -87,7 +87,7 @@ class TaskPencil:
     first = 16
     anywhere = staticmethod(Pencil.anywhere)
 
-    def __init__(self, equations: TaskClass, base: Member, rng: np.random.Generator) -> None:
+    def __init__(self, equations: TaskClass, base: ClassMember, rng: np.random.Generator) -> None:
         self.of, self.base = equations, base
         row, length = int(np.argmax(equations.conditions)), self._length
         other = equations.random_member(rng).drive[row, :, 0] - base.drive[row, :, 0]
@@ -100,14 +100,14 @@ class TaskPencil:
     def _length(self) -> Array:
         return self.of.problem.system.is_length[self.of.problem.columns]
 
-    def members(self, phi: Array) -> Member:
+    def members(self, phi: Array) -> ClassMember:
         """Tasks at ``phi (n,)``."""
         grown = self.rate[:, :, None] * (np.exp(1j * phi) - 1.0)
         length = self._length
         drive = self.base.drive + np.where(
             length[:, None], grown, -1j * np.log(1.0 + np.where(length[:, None], 0.0, grown))
         )
-        return Member(self.base.numbers.taken(np.zeros(len(phi), dtype=np.intp)), drive)
+        return ClassMember(self.base.numbers.taken(np.zeros(len(phi), dtype=np.intp)), drive)
 
     def sums(self, x: Array, phi: Array) -> tuple[Array, Array, Array]:
         """``z``, the sum and weights at pairs of tasks ``phi (n,)`` to both of which all tracks come."""
@@ -124,7 +124,7 @@ class TaskPencil:
 def start_set(of: TaskClass, rng: np.random.Generator, progress: Progress) -> TaskStart:
     """All solutions of a random task of a class."""
     # solutions from which on they are not looked for any further
-    group = Group(of, of.start, of.x[:, None], 20_000)
+    group = TrackGroup(of, of.start, of.x[:, None], 20_000)
     group.grow(MISSED, rng, progress)
     group.move(*tame(of, group.base, group.x, rng))
     group.grow(MISSED_AGAIN, rng, progress)
@@ -175,7 +175,10 @@ def _read(of: TaskClass, file: Path, prefix: str) -> TaskStart | None:
             vectors = [f[prefix + name] for name in MARKER]
             loops, lost, followed, degree, samples = f[prefix + "counts"].tolist()
             chance, last, beyond = f[prefix + "sizes"].tolist()
-            member, trace = Member(Numbers.of(*vectors), f[prefix + "drive"]), Trace(degree, samples, last, beyond)
+            member, trace = (
+                ClassMember(RowNumbers.of(*vectors), f[prefix + "drive"]),
+                Trace(degree, samples, last, beyond),
+            )
             found = TaskStart(member, f[prefix + "x"], loops, chance, lost, followed, trace)
         here = of.at(found.member, found.x)
         size = np.maximum(1.0, np.abs(here.here.poses).max())
@@ -217,7 +220,7 @@ class TaskEnds:
 
 
 def ends(
-    of: TaskClass, start: TaskStart, goals: Member, rng: np.random.Generator, progress: Progress
+    of: TaskClass, start: TaskStart, goals: ClassMember, rng: np.random.Generator, progress: Progress
 ) -> list[TaskEnds]:
     """Tracks of all solutions of a start set to tasks; further runs by way of random tasks make up for tracks that are lost."""
     n, N = goals.drive.shape[-1], start.x.shape[1]
@@ -274,7 +277,7 @@ def start_of(of: TaskClass, rng: np.random.Generator, cache: bool, progress: Pro
 # --- real solutions ------------------------------------------------------------------------------------------------------
 
 
-def real_states(of: TaskClass, goal: Member, x: Array) -> tuple[Array, Array, Array]:
+def real_states(of: TaskClass, goal: ClassMember, x: Array) -> tuple[Array, Array, Array]:
     """Real ones of solutions ``x (nx, n)`` of a task, closed to rounding, their errors in all rows, and which these are ``(n,)``."""
     size = np.maximum(1.0, np.abs(x[: of.u]).max(axis=0, initial=0.0))
     near = np.flatnonzero(np.abs(x[: of.u].imag).max(axis=0, initial=0.0) < MODES.real_singular * size)

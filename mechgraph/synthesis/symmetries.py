@@ -17,7 +17,7 @@ import numpy as np
 from mechgraph.maths.se3 import Index
 from mechgraph.modes.family import Array
 from mechgraph.modes.start_sets import distinct
-from mechgraph.synthesis.system import Problem
+from mechgraph.synthesis.system import RowProblem
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Symmetry:
     places: Index
 
 
-def symmetries(problem: Problem) -> tuple[Symmetry, ...]:
+def symmetries(problem: RowProblem) -> tuple[Symmetry, ...]:
     """All exchanges but the one that leaves everything where it is."""
     m, out = problem.m, list[Symmetry]()
     places = {(p.array, p.component, p.side, p.pair): k for k, own in enumerate(problem.places) for p in own}
@@ -47,7 +47,7 @@ def symmetries(problem: Problem) -> tuple[Symmetry, ...]:
     return tuple(out)
 
 
-def _automorphisms(problem: Problem) -> Iterator[dict[int, int]]:
+def _automorphisms(problem: RowProblem) -> Iterator[dict[int, int]]:
     """Exchanges of pairs by which links and pairs stay joined as they are."""
     whole, P = problem.whole, len(problem.m.pairs)
     labels = [_label(problem, k) for k in range(P)]
@@ -71,7 +71,7 @@ def _automorphisms(problem: Problem) -> Iterator[dict[int, int]]:
             yield pairs
 
 
-def _label(problem: Problem, k: int) -> str:
+def _label(problem: RowProblem, k: int) -> str:
     """What a pair is, beside the links that it joins: its type, what is unknown of it, and all else."""
     unknown = {(p.array, p.side, p.component) for own in problem.places for p in own if p.pair == k}
     known: list[Any] = []

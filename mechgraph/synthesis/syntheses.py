@@ -23,12 +23,12 @@ from mechgraph.modes.assemblies import weakest
 from mechgraph.modes.homotopy import Mask
 from mechgraph.quantities import Count, door, wrong
 from mechgraph.quantities import Index as Seed
-from mechgraph.synthesis.classes import Member, NoClass, TaskClass
+from mechgraph.synthesis.classes import ClassMember, NoClass, TaskClass
 from mechgraph.synthesis.fitness import Fitness, Measure, fitness, keeps, limits_of
-from mechgraph.synthesis.fits import Fit, Fitted, Point, fitted
+from mechgraph.synthesis.fits import Fit, FitPoint, Fitted, fitted
 from mechgraph.synthesis.solve import Progress, TaskEnds, TaskStart, ends, real_states, start_of
 from mechgraph.synthesis.symmetries import Symmetry, orbits, symmetries
-from mechgraph.synthesis.system import Numbers, Problem
+from mechgraph.synthesis.system import RowNumbers, RowProblem
 from mechgraph.synthesis.tasks import FunctionTask, function, path, poses, positions
 from mechgraph.synthesis.unknowns import Unknowns
 
@@ -411,7 +411,7 @@ class Synthesis:
         progress: Progress,
     ) -> None:
         self.problem, self.rng, self.cache, self.progress = (
-            Problem(m, tasks, unknown),
+            RowProblem(m, tasks, unknown),
             np.random.default_rng(seed),
             cache,
             progress,
@@ -493,7 +493,7 @@ class Synthesis:
             self._answer(start, goals.taken(np.array([i])) if n > 1 else goals, one, i) for i, one in enumerate(found)
         ]
 
-    def _answer(self, start: TaskStart, goal: Member, found: TaskEnds, i: int) -> Syntheses:
+    def _answer(self, start: TaskStart, goal: ClassMember, found: TaskEnds, i: int) -> Syntheses:
         p, of = self.problem, self.of
         x, error, which = real_states(of, goal, found.x)
         fits = error <= CLOSED_TO
@@ -562,7 +562,7 @@ class Synthesis:
             f"singular, {found.infinite} at infinity, {found.lost} failed."
         )
 
-    def _upright(self, goal: Member, x: Array) -> tuple[Array, Array]:
+    def _upright(self, goal: ClassMember, x: Array) -> tuple[Array, Array]:
         """States ``x (nx, n)`` with norms of directions above zero, as those of a Mechanism, and what they leave open.
 
         Tracks may turn the sign of a norm. Its direction is the opposite one then: motions along it change their signs too, and where
@@ -582,7 +582,7 @@ class Synthesis:
         here = of.at(goal, turned.astype(complex)).here
         return turned, here.closure.reshape(of.R, n).max(axis=0)
 
-    def _merged(self, goal: Member, x: Array) -> Mask:
+    def _merged(self, goal: ClassMember, x: Array) -> Mask:
         """Which solutions ``(n,)`` have elements of a link that fall together, where those of a random mechanism do not."""
         of, pairs = self.of, _neighbors(self.problem.m)
         here, there = of.at(of.start, of.x[:, None]).here, of.at(goal, x.astype(complex)).here
@@ -594,14 +594,14 @@ class Synthesis:
             out |= np.linalg.matrix_rank(S, MODES.generic) < wanted
         return out
 
-    def _conditions(self, goal: Member, x: Array) -> Array:
+    def _conditions(self, goal: ClassMember, x: Array) -> Array:
         """Condition numbers ``(n,)`` of the unknowns."""
         if not x.shape[1]:
             return np.zeros(0)
         here = self.of.leg(goal, goal).at(x.astype(complex), np.ones(x.shape[1]), np.arange(x.shape[1]))
         return np.asarray(np.linalg.cond(here.matrix))
 
-    def _mechanism(self, goal: Member, x: Array, values: Array, i: int) -> tuple[Mechanism, Array, Array]:
+    def _mechanism(self, goal: ClassMember, x: Array, values: Array, i: int) -> tuple[Mechanism, Array, Array]:
         """The mechanism of a solution, its coordinates ``(rows, F)`` and poses ``(rows, N, 4, 4)``."""
         p, of, F = self.problem, self.of, len(self.problem.m.freedom_names())
         m = p.unknowns.mechanism(values)
@@ -620,7 +620,7 @@ class Synthesis:
         whole = np.where(free, np.round((q - start) / np.where(free, period, 1.0)), 0.0)
         q = np.where(asked, q, q - whole * np.where(free, period, 0.0))
         numbers = goal.numbers.with_values(p.places, x[: of.u, None])
-        poses = user_poses(Configuration(p.system_with(Numbers(*(v.real for v in vars(numbers).values()))), states))
+        poses = user_poses(Configuration(p.system_with(RowNumbers(*(v.real for v in vars(numbers).values()))), states))
         begin = dict(zip(m.freedom_names(), q[0, :F].tolist(), strict=True))
         return m.replace(start=begin), q[:, :F], np.moveaxis(poses, 1, 0)
 
@@ -666,18 +666,18 @@ class FittedSynthesis:
     """What a fit asks, and its answers."""
 
     def __init__(self, m: Mechanism, tasks: Any, unknown: Sequence[str], bounds: Mapping[str, Any], over: Any) -> None:
-        self.problem = Problem(m, tasks, unknown)
+        self.problem = RowProblem(m, tasks, unknown)
         self.fit, self.bounds, self.over = Fit(self.problem, tasks), bounds, over
         self.driver, self.output = driver_of(m, tasks)
 
-    def rows(self, here: Point) -> tuple[Mechanism, Array]:
+    def rows(self, here: FitPoint) -> tuple[Mechanism, Array]:
         """The mechanism of fitted rows, and its coordinates ``(rows, F)``."""
         p = self.problem
         q = p.system.coordinates_of(here.x).T[:, : len(p.m.freedom_names())]
         m = p.unknowns.mechanism(p.outside(here.z[:, None])[:, 0])
         return m.replace(start=dict(zip(m.freedom_names(), q[0].tolist(), strict=True))), q
 
-    def measured(self, what: Any, sign: float = 1.0, none: float = 1e3) -> Callable[[Point], Array]:
+    def measured(self, what: Any, sign: float = 1.0, none: float = 1e3) -> Callable[[FitPoint], Array]:
         """A quantity of fitted rows, times a sign; ``none`` where it has no value."""
         measure = what if isinstance(what, Measure) else Measure(self.problem.m, what, self.over)
         return lambda here: np.nan_to_num(sign * measure(*self.rows(here), self.driver), nan=none)
@@ -829,7 +829,7 @@ def _stored(setup: SynthesisSetup) -> dict[str, Any]:
     }
 
 
-def _refuse_other_names(p: Problem, bounds: Mapping[str, Any]) -> None:
+def _refuse_other_names(p: RowProblem, bounds: Mapping[str, Any]) -> None:
     others = [name for name in bounds if name not in p.unknowns.names]
     if others:
         known = ", ".join(p.unknowns.names)

@@ -24,12 +24,12 @@ from mechgraph.model.gears import moving_lines
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Declared, declared
 from mechgraph.synthesis.tasks import asked_of
-from mechgraph.synthesis.unknowns import Place, Unknowns, marker_twists, norms_of, unit_rates
+from mechgraph.synthesis.unknowns import UnknownPlace, Unknowns, marker_twists, norms_of, unit_rates
 from mechgraph.variants.numbers import MARKER
 
 
 @dataclass(frozen=True)
-class Numbers:
+class RowNumbers:
     """``point, axis, second (2, 3, P, B)`` of all markers, points over L about the origin of the problem; complex for members.
 
     ``norms (2, 2, P, B)`` are those of both directions, see ``unknowns.norms_of``.
@@ -41,37 +41,37 @@ class Numbers:
     norms: Array
 
     @staticmethod
-    def of(point: Array, axis: Array, second: Array, near: Array | None = None) -> Numbers:
+    def of(point: Array, axis: Array, second: Array, near: Array | None = None) -> RowNumbers:
         """Numbers with norms, nearest to others."""
-        return Numbers(point, axis, second, norms_of(axis.swapaxes(0, 1), second.swapaxes(0, 1), near))
+        return RowNumbers(point, axis, second, norms_of(axis.swapaxes(0, 1), second.swapaxes(0, 1), near))
 
     @staticmethod
-    def joined(numbers: Sequence[Numbers]) -> Numbers:
+    def joined(numbers: Sequence[RowNumbers]) -> RowNumbers:
         """Several, one after the other."""
         parts = zip(*(vars(n).values() for n in numbers), strict=True)
-        return Numbers(*(np.concatenate(part, axis=-1) for part in parts))
+        return RowNumbers(*(np.concatenate(part, axis=-1) for part in parts))
 
-    def taken(self, which: Index) -> Numbers:
+    def taken(self, which: Index) -> RowNumbers:
         """Some of them."""
-        return Numbers(*(v[..., which] for v in vars(self).values()))
+        return RowNumbers(*(v[..., which] for v in vars(self).values()))
 
     @property
     def vectors(self) -> tuple[Array, Array, Array]:
         """Points, axes and second directions."""
         return self.point, self.axis, self.second
 
-    def at(self, places: Sequence[Place]) -> Array:
+    def at(self, places: Sequence[UnknownPlace]) -> Array:
         """What stands at the places of a number, ``(B,)``."""
         p = places[0]
         return np.asarray(getattr(self, p.array)[p.side, p.component, p.pair])
 
-    def moved(self, X: Array) -> Numbers:
+    def moved(self, X: Array) -> RowNumbers:
         """Markers moved rigidly by poses ``X (3, 4, 2, P, B)``."""
         point, axis, second = (np.einsum("ijspb,sjpb->sipb", X[:, :3], v) for v in self.vectors)
         norms = np.broadcast_to(self.norms, (*self.norms.shape[:-1], X.shape[-1]))
-        return Numbers(point + X[:, 3].swapaxes(0, 1), axis, second, norms)
+        return RowNumbers(point + X[:, 3].swapaxes(0, 1), axis, second, norms)
 
-    def with_values(self, places: Sequence[Sequence[Place]], z: Array, near: Array | None = None) -> Numbers:
+    def with_values(self, places: Sequence[Sequence[UnknownPlace]], z: Array, near: Array | None = None) -> RowNumbers:
         """The same with unknowns ``z (u, B)`` at their places, and norms nearest to others."""
         B, out = z.shape[1], []
         for v in self.vectors:
@@ -81,8 +81,8 @@ class Numbers:
                 out[MARKER.index(p.array)][p.side, p.component, p.pair] = value
         point, axis, second = out
         if all(p.array == "point" for own in places for p in own):
-            return Numbers(point, axis, second, np.broadcast_to(self.norms, (*self.norms.shape[:-1], B)))
-        return Numbers.of(point, axis, second, near)
+            return RowNumbers(point, axis, second, np.broadcast_to(self.norms, (*self.norms.shape[:-1], B)))
+        return RowNumbers.of(point, axis, second, near)
 
     @property
     def poses(self) -> Array:
@@ -96,7 +96,7 @@ class Numbers:
         return self.point, z, (self.second - (z * self.second).sum(axis=1, keepdims=True) * z) / self.norms[1][:, None]
 
 
-class Problem:
+class RowProblem:
     """What is asked of a mechanism, what is unknown, and the equations of both.
 
     Attributes
@@ -141,7 +141,9 @@ class Problem:
         places = [self.whole.freedom(name) for name in given.names]
         self.columns: Index = np.array([s.first_column[k] + j for k, j in places], dtype=np.intp)
         self.asked = user / np.where(s.is_length[self.columns], self.L, 1.0)
-        self.numbers = Numbers.of((numbers.point - self.origin[:, None, None]) / self.L, numbers.axis, numbers.second)
+        self.numbers = RowNumbers.of(
+            (numbers.point - self.origin[:, None, None]) / self.L, numbers.axis, numbers.second
+        )
         self.closed_at_start = all(pair.on_a is None and pair.contact is None for pair in m.pairs)
         self.rows: Index = np.arange(1 if self.closed_at_start else 0, self.tasks.rows)
         self._read_declared_row()
@@ -230,7 +232,7 @@ class Problem:
         return np.array([k for k in range(len(self.unknowns.names)) if k not in self.known], dtype=np.intp)
 
     @cached_property
-    def places(self) -> list[list[Place]]:
+    def places(self) -> list[list[UnknownPlace]]:
         """Places of the unknowns that are sought."""
         return [self.unknowns.places[k] for k in self.sought]
 
@@ -261,7 +263,7 @@ class Problem:
         """The mechanism with unknown dimensions of these values ``(u,)``, in the units of the user."""
         return self.unknowns.mechanism(values)
 
-    def scaled(self, places: Sequence[Sequence[Place]], values: Array) -> Array:
+    def scaled(self, places: Sequence[Sequence[UnknownPlace]], values: Array) -> Array:
         """Values ``(n, B)`` of components of points and directions, of the user, in internal units."""
         out = np.array(values)
         for row, own in zip(out, places, strict=True):
@@ -282,7 +284,7 @@ class Problem:
 
     # --- the equations -----------------------------------------------------------------------------------------------
 
-    def system_with(self, numbers: Numbers) -> System:
+    def system_with(self, numbers: RowNumbers) -> System:
         """The system with other markers."""
         point, axis, second = numbers.unit()
         n = replace(self.whole.once(declared), point=point, axis=axis, second=second)
@@ -292,19 +294,19 @@ class Problem:
         par = replace(par, offset=old.offset, frame=old.frame, origin=old.origin, L=old.L, pitch=old.pitch)
         return self.system.with_parameters(par)
 
-    def equations(self, numbers: Numbers, x: Array) -> Rows:
+    def equations(self, numbers: RowNumbers, x: Array) -> ArrowRows:
         """The equations of tracks with such numbers of markers (unknowns among them) at states ``x (R, nx, T)``, in internal units."""
         R, _, T = x.shape
         system = self.system_with(numbers)
         if R > 1 and system.par.batch > 1:
             system = system.cases(np.tile(np.arange(T), R))
-        return Rows(self, numbers, Configuration(system, x.transpose(1, 0, 2).reshape(x.shape[1], R * T)), R)
+        return ArrowRows(self, numbers, Configuration(system, x.transpose(1, 0, 2).reshape(x.shape[1], R * T)), R)
 
 
-class Rows:
+class ArrowRows:
     """The closure of all rows at a batch of ``T`` tracks, the rows one after the other in the batch of ``here``."""
 
-    def __init__(self, problem: Problem, numbers: Numbers, here: Configuration, R: int) -> None:
+    def __init__(self, problem: RowProblem, numbers: RowNumbers, here: Configuration, R: int) -> None:
         self.problem, self.numbers, self.here, self.R = problem, numbers, here, R
         self.T = here.T // R
 

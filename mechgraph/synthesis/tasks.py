@@ -18,7 +18,7 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import door, items_of
 
 
-class Task(Protocol):
+class Asking(Protocol):
     """Something asked at ``n`` positions."""
 
     def named(self, m: Mechanism, faults: list[str]) -> dict[str, Array]:

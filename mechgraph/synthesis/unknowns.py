@@ -28,7 +28,7 @@ from mechgraph.variants.numbers import MARKER, AnyField, Field, ItemField, clash
 
 
 @dataclass(frozen=True)
-class Place:
+class UnknownPlace:
     """A component of ``point``, ``axis`` or ``second`` of the marker of a pair on one side."""
 
     array: str
@@ -89,19 +89,19 @@ class Unknowns:
         return [name for name, places in zip(self.names, self.places, strict=True) if not places]
 
     @cached_property
-    def places(self) -> list[list[Place]]:
+    def places(self) -> list[list[UnknownPlace]]:
         """For every number its places, of which none is known for others than components of points and directions."""
         return [self._places_of(name, field) for name, field in self.fields.items()]
 
-    def _places_of(self, name: str, field: AnyField) -> list[Place]:
+    def _places_of(self, name: str, field: AnyField) -> list[UnknownPlace]:
         if isinstance(field, Field) and field.array in MARKER:
             (side, component, pair), *_ = field.places
-            return [Place(field.array, s, component, pair) for s in ((0, 1) if side == slice(None) else (side,))]
+            return [UnknownPlace(field.array, s, component, pair) for s in ((0, 1) if side == slice(None) else (side,))]
         if isinstance(field, ItemField) and field.what == "links":
             at = field.place[0]
             owner = name.rpartition(".")[0]
             return [
-                Place("point", 1, int(at), k)
+                UnknownPlace("point", 1, int(at), k)
                 for k, pair in enumerate(self.whole.pairs[len(self.m.pairs) :], len(self.m.pairs))
                 if pair.name.rstrip("'") == owner
             ]
@@ -142,7 +142,7 @@ def mattering(m: Mechanism, k: int, candidates: Sequence[str]) -> list[str]:
     places = []
     for field in map(fields.__getitem__, known):
         assert isinstance(field, Field)
-        places.append(Place(field.array, 0, field.places[0][1], k))
+        places.append(UnknownPlace(field.array, 0, field.places[0][1], k))
     numbers, here = declared(m), [k] * len(places)
     vectors = [getattr(numbers, name)[0][:, here] for name in MARKER]
     twists = marker_twists(vectors, norms_of(*vectors[1:]), unit_rates(places))
@@ -200,7 +200,7 @@ def norms_of(axis: Array, second: Array, near: Array | None = None) -> Array:
     return np.stack(np.broadcast_arrays(*out))
 
 
-def unit_rates(places: Sequence[Place]) -> Array:
+def unit_rates(places: Sequence[UnknownPlace]) -> Array:
     """Rates ``(3, 3, n, 1)`` of points, axes and second directions of which a component grows at rate one."""
     out = np.zeros((3, 3, len(places), 1))
     for i, place in enumerate(places):

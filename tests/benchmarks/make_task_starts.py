@@ -16,7 +16,7 @@ from ladder import LADDER
 
 from mechgraph.synthesis.classes import TaskClass
 from mechgraph.synthesis.solve import PACKED, arrays, key_of, start_of
-from mechgraph.synthesis.system import Problem
+from mechgraph.synthesis.system import RowProblem
 
 
 def main(words: list[str]) -> None:
@@ -27,7 +27,7 @@ def main(words: list[str]) -> None:
             continue
         m, task, unknown, total = rung()
         rng, begin = np.random.default_rng(0), time.process_time()
-        of = TaskClass(Problem(m, task, unknown), rng)
+        of = TaskClass(RowProblem(m, task, unknown), rng)
         start = start_of(of, rng, True, None)
         N = start.x.shape[1]
         print(f"{name}: {N} of {total}, {start.word}, {time.process_time() - begin:.1f} s", flush=True)
