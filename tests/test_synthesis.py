@@ -1,5 +1,6 @@
 """Synthesis: all mechanisms that do what is asked, their number, and that each one does it."""
 
+import pickle
 from typing import Any
 
 import numpy as np
@@ -80,6 +81,7 @@ def test_a_four_bar_is_among_those_that_do_its_own_function() -> None:
     pairs = np.column_stack([angles, mg.kinematics(m, {"A": angles})["D"].position])
     s = mg.synthesize(four_bar(), mg.function("A", "D", pairs), ["B.point", "C.point"])
     assert np.abs(s.values - (0.4, 0.9, 1.9, 1.6)).max(axis=1).min() < 1e-9
+    assert pickle.loads(pickle.dumps(s)).to_dict() == s.to_dict()
 
 
 def test_centre_points_of_four_poses_lie_on_one_cubic() -> None:
@@ -90,6 +92,7 @@ def test_centre_points_of_four_poses_lie_on_one_cubic() -> None:
     )
     x, y = np.array([v for one in s for v in zip(one.field("A.point.x"), one.field("A.point.y"), strict=True)]).T
     assert {one.total for one in s} == {3}
+    assert [one.total for one in pickle.loads(pickle.dumps(s))] == [one.total for one in s]
     assert len(x) > 9
     terms = np.array([x**i * y**j for i in range(4) for j in range(4 - i)]).T
     sigma = np.linalg.svd(terms / np.abs(terms).max(axis=0), compute_uv=False)

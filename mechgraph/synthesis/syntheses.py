@@ -67,6 +67,14 @@ class Fitnesses(Sequence[Fitness]):
     def __getitem__(self, i: int | slice) -> Any:
         return tuple(make() for make in self._makers[i]) if isinstance(i, slice) else self._makers[i]()
 
+    @classmethod
+    def of(cls, found: tuple[Fitness, ...]) -> Fitnesses:
+        """Those that are known."""
+        return cls([partial(found.__getitem__, i) for i in range(len(found))])
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Fitnesses.of, (tuple(self),)  # found before they go elsewhere
+
 
 @dataclass(frozen=True)
 class RejectedAnswer:
