@@ -155,7 +155,7 @@ def test_tables_of_the_file_format_are_read(tmp_path: Path) -> None:
     )
     page = (ROOT / "library" / "README.md").read_text(encoding="utf-8")
     blocks = [body for kind, body in player.BLOCK.findall(page) if kind == "toml"]
-    assert len(blocks) == 8
+    assert len(blocks) == 9
     for block in blocks:
         own = {one["name"] for one in tomllib.loads(block).get("pair", ())}
         parts = [part for part in base.split("[[pair]]\n") if not any(f'name = "{name}"' in part for name in own)]
