@@ -62,7 +62,7 @@ def test_a_curve_of_the_mechanism_is_met_and_the_driver_of_every_row_is_found() 
     )
     task = mg.path("coupler.tip", points)
     fit = Fit(RowProblem(off, task, ["B.point", "C.point"]), task)
-    found = fitted(fit, "least_squares", iter([]), 1, {})
+    found = fitted(fit, "least_squares", 1, {})
     best = found.points[0]
     assert fit.errors(best).max() < 1e-8
     assert np.allclose(np.mod(best.theta[:, 0] + 1e-6, 2 * np.pi), angles, atol=1e-5)
@@ -73,7 +73,7 @@ def test_the_least_largest_error_is_below_that_of_least_squares() -> None:
     """At the best fit in Chebyshev's sense several rows have the largest error: with one alone a step would make it less."""
     angles = np.linspace(0.0, 1.2, 9)
     fit = asked(mg.function("A", "D", np.column_stack([angles, 0.3 * angles**2])), ["C.point"])
-    squares, chebyshev = (fitted(fit, way, iter([]), 1, {}).points[0] for way in ("least_squares", "minimax"))
+    squares, chebyshev = (fitted(fit, way, 1, {}).points[0] for way in ("least_squares", "minimax"))
     errors = fit.errors(chebyshev)
     assert errors.max() < 0.9 * fit.errors(squares).max()
     assert (errors > 0.999 * errors.max()).sum() >= 2
@@ -98,7 +98,7 @@ def formula(z: np.ndarray, targets: np.ndarray) -> float:
 def test_a_path_of_sixty_points_is_met_no_worse_than_by_ten_thousand_evaluations_of_differential_evolution() -> None:
     points = ellipse(60)
     fit = asked(mg.path("coupler.tip", points), EVERYTHING)
-    best = fitted(fit, "least_squares", iter([]), 4, {}).points[0]
+    best = fitted(fit, "least_squares", 4, {}).points[0]
     other = scipy.optimize.differential_evolution(
         formula, [(-4, 4)] * 10, args=(points,), maxiter=66, popsize=15, polish=False, rng=1, tol=0
     )

@@ -154,3 +154,11 @@ def test_the_program_says_where_nothing_is_left_and_what_is_not_there(tmp_path: 
     assert "no [synthesis]" in bad("synthesize", "four-bar")
     path.write_text(FITTED + '\n[synthesis.sweep]\n"A.point.x" = [0, 1]\n', encoding="utf-8")
     assert "sweep" in bad("synthesize", path)
+
+
+def test_what_is_given_beside_a_stored_setup_replaces_it() -> None:
+    m = four_bar().replace(synthesis=ASKED["function"])
+    with pytest.raises(mg.DeclarationError, match="best"):
+        mg.synthesize(m, fit="best")
+    with pytest.raises(mg.DeclarationError, match="starts"):
+        mg.synthesize(m, starts=0)

@@ -14,7 +14,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain, count
 from typing import Any
 
 import numpy as np
@@ -341,7 +340,6 @@ class Fitted:
 def fitted(
     fit: Fit,
     way: str | None,
-    begins: Iterator[Array],
     starts: int,
     bounds: Bounds,
     goal: Callable[[FitPoint], Array] | None = None,
@@ -349,7 +347,7 @@ def fitted(
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
 ) -> Fitted:
-    """The optima to which ``starts`` dimensions lead: the declared ones, those of ``begins``, random ones about the declared ones.
+    """The optima to which ``starts`` dimensions lead: the declared ones, random ones about these.
 
     ``way``, ``goal`` and ``limits`` are those of ``constrained``. All starts are followed a few steps, the best of them to the end.
     """
@@ -357,11 +355,8 @@ def fitted(
     rng, u = np.random.default_rng(seed), len(fit.z0)
     box = np.where(np.isfinite(low[:u]), low[:u], fit.z0 - 0.5), np.where(np.isfinite(high[:u]), high[:u], fit.z0 + 0.5)
     begun: list[FitPoint] = []
-    tried = 0
-    for z in chain([fit.z0], begins, (rng.uniform(*box) for _ in count())):
-        if tried >= starts:
-            break
-        tried += 1
+    for tried in range(1, starts + 1):
+        z = fit.z0 if tried == 1 else rng.uniform(*box)
         here = fit.begun(np.clip(z, low[:u], high[:u]))
         if here is not None:
             begun.append(least_squares(fit, here, low, high, 12))
@@ -371,7 +366,7 @@ def fitted(
         begun.append(evolved)
     order = sorted(range(len(begun)), key=lambda i: _size(fit, begun[i]))
     ends: list[FitPoint] = []
-    unsafe, lost = 0, 0
+    unsafe = lost = early = 0
     wide: Limit = fit.margins, 20 * LEAST_MARGIN, None
     # the best starts, which are followed to the end
     for i in order[:4]:
@@ -380,7 +375,8 @@ def fitted(
         if narrow or way != "least_squares" or limits:
             # an optimum without a margin is none: it is looked for again where it keeps one
             best = begun[i] if narrow or end is None else end
-            end = constrained(fit, best, low, high, way, goal, [*limits, wide] if narrow else limits)
+            end, came = constrained(fit, best, low, high, way, goal, [*limits, wide] if narrow else limits)
+            early += end is not None and not came
         if end is None:
             lost += 1
         elif not fit.safe(end):
@@ -402,13 +398,15 @@ def fitted(
             kept.append(here)
     same = sum(abs(value(here) - value(ends[0])) <= 1e-4 * abs(value(ends[0])) + 1e-12 for here in ends) if ends else 0
     words = [
-        f"{counted(len(begun), 'start')} of {tried} led to all rows; the best {min(4, len(begun))} were followed to the end, "
+        f"{counted(len(begun), 'start')} of {starts} led to all rows; the best {min(4, len(begun))} were followed to the end, "
         f"{same} of them to the best one."
     ]
     if unsafe + lost:
         words.append(
             f"Left out: {unsafe} of which the path does not lead through all rows, {lost} without an end within the limits."
         )
+    if early:
+        words.append(f"Stopped after 100 steps, before the optimum: {early}; better ones may be near.")
     return Fitted(tuple(kept), tuple(words))
 
 
@@ -470,8 +468,9 @@ def constrained(
     way: str | None,
     goal: Callable[[FitPoint], Array] | None,
     limits: Sequence[Limit],
-) -> FitPoint | None:
-    """The best rows to which a start leads under limits, by sequential quadratic programs; None where they are not kept there.
+) -> tuple[FitPoint | None, bool]:
+    """The best rows to which a start leads under limits, by sequential quadratic programs; None where they are not kept there. Also
+    whether the optimizer came to an end before it had to stop.
 
     ``way`` is ``"least_squares"``, ``"minimax"`` (the least slack ``s`` with ``|r_i|^2 <= s`` at every row), or None: what is asked is met,
     and the ``goal`` is as small as it can be.
@@ -497,8 +496,8 @@ def constrained(
     if way is None:  # met to rounding, where the optimizer leaves off before
         here = least_squares(fit, here, low, high, 20)
     if way is None and np.abs(fit.residual(here)).max() > 1e-9:
-        return None
-    return here if all(keeps(f(here), least, most) for f, least, most in limits) else None
+        return None, False
+    return (here if all(keeps(f(here), least, most) for f, least, most in limits) else None), bool(found.success)
 
 
 class _RowCourse:

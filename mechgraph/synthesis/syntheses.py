@@ -745,7 +745,8 @@ def synthesize(
     m : Mechanism
         Its links and pairs; declared values of unknown numbers do not matter, but that fits begin with them.
     tasks : task or list
-        ``poses``, ``path``, ``function``, ``positions``; row 0 is the declared configuration. Default, as all others: ``m.synthesis``.
+        ``poses``, ``path``, ``function``, ``positions``; row 0 is the declared configuration. Default: all that ``m.synthesis``
+        holds, but for what is given here.
     unknown : list of str
         Numbers as ``study`` names them (``"B.point.x"``), or elements: ``"B.point"``, ``"B.axis"``, ``"coupler.tip"``, ``"B"``.
     fit : {"least_squares", "minimax"}, optional
@@ -794,7 +795,12 @@ def synthesize(
     """
     where, faults = f"synthesis of {m.name!r}", list[str]()
     if tasks is None and unknown is None and m.synthesis is not None:
-        return synthesize(m, **_stored(m.synthesis), seed=seed, cache=cache, progress=progress)
+        asked = {
+            "fit": fit, "bounds": bounds, "conditions": conditions, "require": require, "minimize": minimize,
+            "maximize": maximize, "sweep": sweep, "over": over, "starts": starts,
+        }  # fmt: skip
+        given = {name: value for name, value in asked.items() if value != _USUAL[name]}
+        return synthesize(m, **_stored(m.synthesis) | given, seed=seed, cache=cache, progress=progress)
     if tasks is None or unknown is None:
         raise DeclarationError(where, ["tasks and unknown: expected both, or a mechanism with synthesis="])
     unknown = [unknown] if isinstance(unknown, str) else list(unknown)
@@ -825,6 +831,9 @@ def synthesize(
     if sweep:
         return SynthesesOver(dict(zip(found.sweep.names, found.swept, strict=True)), tuple(answers))
     return answers[0]
+
+
+_USUAL = {one.name: one.default for one in fields(SynthesisSetup)}
 
 
 def _stored(setup: SynthesisSetup) -> dict[str, Any]:
@@ -865,5 +874,5 @@ def _fitted(
     ends = [
         (of.measured(measure, none=1e3 if least is None else -1e3), least, most) for _, measure, least, most in limits
     ]
-    found = fitted(of.fit, fit, iter(()), starts, bounds, goal, ends, seed, progress)
+    found = fitted(of.fit, fit, starts, bounds, goal, ends, seed, progress)
     return of.answer(found).kept(require, bounds, limits, of.driver)

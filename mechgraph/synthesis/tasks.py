@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 
@@ -16,13 +16,6 @@ from mechgraph.kinematics.prescribed import Target, coordinate, parts_of, target
 from mechgraph.maths.se3 import Array
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import door, items_of
-
-
-class Asking(Protocol):
-    """Something asked at ``n`` positions."""
-
-    def named(self, m: Mechanism, faults: list[str]) -> dict[str, Array]:
-        """Numbers ``(n,)`` by name of a freedom or a coordinate; what is wrong is put to ``faults``."""
 
 
 def _series(value: Any, shapes: Sequence[tuple[int, ...]], what: str, faults: list[str]) -> Array | None:
