@@ -106,6 +106,37 @@ def test_ring_and_planet():
     assert not any("interfere" in fault for fault in facts(spur((20, 84), 64.0, 2.0, internal=(False, True))).faults)
 
 
+def swept(teeth, bases, tips, distance, working):
+    """How far the tip of a gear stays off the flank of its ring, least over its turns: 0 where they touch as they should."""
+    turn = np.linspace(-2.8, 2.8, 40001)
+    corner = turn - inv(np.arccos(bases[0] / tips[0])) + inv(working)
+    x, y = distance + tips[0] * np.cos(corner), tips[0] * np.sin(corner)
+    r, at = np.hypot(x, y), np.arctan2(y, x) - turn * teeth[0] / teeth[1]
+    r, at = r[r > tips[1]], at[r > tips[1]]
+    return float((r * (inv(working) - inv(np.arccos(bases[1] / r)) - at)).min())
+
+
+def test_tips_of_a_gear_in_a_ring_of_few_teeth_more():
+    """Where the facts say that tips strike, the tip swept through the ring is inside its flank, else outside: 80 random gears."""
+    rng, seen = np.random.default_rng(3), []
+    while len(seen) < 80:
+        z, shifts = int(rng.integers(25, 60)), rng.uniform((0.0, 0.0), (0.4, 0.9))
+        teeth, a = (z, z + int(rng.integers(5, 11))), RAD(rng.choice([20.0, 25.0]))
+        bases, d = [0.5 * N * np.cos(a) for N in teeth], 0.5 * (teeth[1] - teeth[0]) + min(0.0, shifts[1] - shifts[0])
+        working = np.arccos(min(1.0, (bases[1] - bases[0]) / d))
+        tips = 0.5 * teeth[0] + 1.0 + shifts[0], 0.5 * teeth[1] - 1.0 + shifts[1]
+        jams = (inv(working) - inv(a)) * (teeth[1] - teeth[0]) > 2 * np.tan(a) * (shifts[1] - shifts[0])
+        if jams or working == 0.0 or tips[1] <= bases[1] or tips[0] + d <= tips[1]:
+            continue
+        found = facts(spur(teeth, d, 1.0, shift=tuple(shifts), pressure_angle=(a, a), internal=(False, True)))
+        assert found.tip_radii == pytest.approx(tips)
+        gap = swept(teeth, bases, tips, d, working)
+        if not -1e-4 < gap < -1e-8 and not any("involutes" in fault for fault in found.faults):
+            seen.append((gap < -1e-4, any("strike" in fault for fault in found.faults)))
+    assert all(cut == told for cut, told in seen)
+    assert 10 < sum(cut for cut, _ in seen) < 70
+
+
 @pytest.mark.parametrize(
     ("gears", "told"),
     [

@@ -15,7 +15,7 @@ import numpy as np
 
 from mechgraph.errors import DeclarationError
 from mechgraph.model.couplings import Axes, BaseCoupling, BevelGears, Rack, SpurGears
-from mechgraph.model.gears import Gear, tip_radius
+from mechgraph.model.gears import Gear, involute, tip_radius
 from mechgraph.model.meshes import Bevels, Mesh, Parallel, WithRack
 from mechgraph.quantities import door
 
@@ -178,9 +178,13 @@ def _interference(met: Parallel, tips: Any) -> Iterator[str]:
 
 
 def _inside(met: Parallel, tips: Any) -> Iterator[str]:
-    """Interference of the involutes of a gear and its ring; that of tips beside the line of centers is not looked at."""
-    ring, other = (met.one, met.two) if met.one.internal else (met.two, met.one)
-    top = tips[0] if ring is met.one else tips[1]
+    """Interference of a gear and its ring: of the involutes, and of the tips where their circles cross beside the line of centers.
+
+    There, both gears turned by their ratio from the flanks in touch, the tip of the gear must have passed that of the ring (ISO 21771;
+    Litvin and Fuentes, chapter 11): ``(t + inv a - inv w) z / z_r + inv w - inv a_r > t_r`` with t, t_r the angles of the crossing
+    about both centers against the line of centers and a, a_r the pressure angles at both tips.
+    """
+    (ring, top), (other, tip) = sorted(zip((met.one, met.two), tips, strict=True), key=lambda of: -of[0].internal)
     base = abs(ring.base_radius)
     if top <= base:
         yield f"the tip circle {top:.6g} of {ring.name!r} is inside its base circle {base:.6g}; there is no involute there"
@@ -189,6 +193,17 @@ def _inside(met: Parallel, tips: Any) -> Iterator[str]:
     least = 1.0 - tan(acos(base / top)) / tan(met.working_angle)
     if other.teeth / ring.teeth < least:
         yield f"involutes of {other.name!r} and {ring.name!r} interfere: {other.teeth}/{ring.teeth} is below {least:.6g}"
+    d, w = met.distance, involute(met.working_angle)
+    if d + tip <= top or tip <= other.base_radius:
+        return
+    turn, turn_of_ring = acos((top**2 - tip**2 - d**2) / (2 * tip * d)), acos((top**2 - tip**2 + d**2) / (2 * top * d))
+    passed = turn + involute(acos(other.base_radius / tip)) - w
+    room = passed * other.teeth / ring.teeth + w - involute(acos(base / top)) - turn_of_ring
+    if room < 0.0:
+        yield (
+            f"tips of {other.name!r} and {ring.name!r} strike each other beside the line of centers, by {-room * top:.4g}: "
+            f"{ring.teeth} - {other.teeth} = {ring.teeth - other.teeth} teeth are too few; expected more, or a larger shift of the ring"
+        )
 
 
 def _rack(met: WithRack, mesh: Mesh) -> MeshFacts:
