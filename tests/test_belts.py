@@ -493,6 +493,25 @@ def test_numbers_of_belts_and_pulleys_vary():
         mg.study(m, {"w.point.x": [0.2, 0.21]}, "w.Rz", 2, motions={"p": 0.0})
 
 
+def test_outputs_of_a_belt_by_name():
+    """Tensions, wraps and margins of a flat belt as outputs: the closed forms at every radius, each with its unit."""
+    m = drive(pretension=300.0, loads=[mg.Effort("w", 7.0), mg.Friction("B", mu=0.3)], toothed=False)
+    m = m.replace(units={"length": "m", "mass": "kg", "time": "s"})
+    names = ["B.tension.p-w", "B.span.w-p", "B.wrap.w", "B.slip_margin.w", "B.length"]
+    found = mg.study(m, {"gears[1].radius": [0.04, 0.06]}, names, 2, motions={"p": 2.0}, sampling="grid")
+    r = found.parameters["gears[1].radius"]
+    T, l, wrap, margin, length = (found.outputs[name][:, 0] for name in names)
+    off = np.arcsin((r - 0.05) / 0.2)
+    np.testing.assert_allclose(T, 300.0 + 7.0 / (2 * r), rtol=1e-9)
+    np.testing.assert_allclose(l, 0.2 * np.cos(off), rtol=1e-12)
+    np.testing.assert_allclose(wrap, np.pi + 2 * off, rtol=1e-12)
+    np.testing.assert_allclose(margin, np.exp(0.3 * wrap) * (300 - 3.5 / r) / (300 + 3.5 / r) - 1, rtol=1e-9)
+    np.testing.assert_allclose(length, 2 * l + r * wrap + 0.05 * (np.pi - 2 * off), rtol=1e-12)
+    assert [found.units[name] for name in names] == ["N", "m", "", "", "m"]
+    with pytest.raises(mg.DeclarationError, match=r"did you mean B\.wrap\.w\?"):
+        mg.study(m, {"gears[1].radius": [0.04, 0.06]}, "B.wrap.x", 2, motions={"p": 0.0})
+
+
 def test_a_belt_in_the_plane_is_the_spatial_one():
     m = tensioner([mg.Effort("arm", 12.0), mg.Effort("w", 5.0)])
     flat = m.to_planar()

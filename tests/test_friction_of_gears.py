@@ -365,3 +365,31 @@ def test_more_faults() -> None:
         )
     with pytest.raises(mg.DeclarationError, match="gear in a ring"):
         moved(stage(inner=True), 1.0, mg.Effort("w", -LOAD), mg.Friction("t", efficiency=0.1))
+
+
+@pytest.mark.parametrize("name", ["g.pressure_angle", "B.point.x"])
+@pytest.mark.parametrize("function", [False, True])
+def test_studies_over_what_decides_the_loss_of_teeth(name, function):
+    """How far teeth slide follows from each variant's own numbers: every variant as it is solved alone, forces and loss."""
+
+    def variant(value):
+        angle, x = (value, 0.06) if name == "g.pressure_angle" else (0.35, value)
+        pairs = [
+            mg.Pair(k, "R", "frame", link, point=(at, 0, 0), axis=(0, 0, 1))
+            for k, link, at in [("A", "p", 0), ("B", "w", x)]
+        ]
+        teeth = mg.SpurGears("g", "A", "B", teeth=(20, 40), pressure_angle=angle)
+        return mg.Mechanism(
+            "g", pairs=pairs, couplings=[teeth], drives=["A"], loads=[mg.Effort("B", -3.0), mg.Friction("g", mu=0.1)]
+        )
+
+    ends = [0.25, 0.45] if name == "g.pressure_angle" else [0.05, 0.07]
+    drive, outputs = {"A": mg.Motion([0.0, 1.0], velocity=1.0)}, ["g.loss", "g.normal_force", "g.force"]
+    source = (lambda **given: variant(*given.values())) if function else variant(sum(ends) / 2)
+    label = "value" if function else name
+    found = mg.study(source, {label: ends}, outputs, 2, motions=drive, sampling="grid")
+    for i, value in enumerate(found.parameters[label]):
+        c = mg.solve(variant(value), drive).coupling("g")
+        for output, expected in zip(outputs, (c.loss, c.normal_force, c.force), strict=True):
+            np.testing.assert_allclose(found.outputs[output][i], expected, rtol=1e-9, atol=1e-12)
+    assert np.ptp(found.outputs["g.loss" if name == "g.pressure_angle" else "g.normal_force"][:, 0]) > 0.005

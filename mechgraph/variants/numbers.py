@@ -27,6 +27,7 @@ from mechgraph.fields import POINT, XYZ, Described, FieldFormat, PerCase
 from mechgraph.maths.inertia import physical
 from mechgraph.maths.se3 import Array
 from mechgraph.model.belts import BeltDrive
+from mechgraph.model.friction import Friction
 from mechgraph.model.gears import LineCoupling
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import NUMBERS_OF_CHAIN, Mechanism, chain_numbers, markers_of_chain
@@ -500,11 +501,16 @@ def varied(m: Mechanism, fields: Mapping[str, AnyField], values: Array) -> Varia
     placed = any(
         isinstance(field, ChainField) or (isinstance(field, Field) and field.array in MARKER) for field, _ in rows
     )
-    if not own:
+    if not own and not (placed and _rubbing_teeth(m)):
         return made
-    if placed or any(field.one_by_one for field, _ in own):
+    if placed or _rubbing_teeth(m) or any(field.one_by_one for field, _ in own):
         return replace(made, missing=tuple(range(count)))
     return _with_gears(made)
+
+
+def _rubbing_teeth(m: Mechanism) -> bool:
+    """Whether a gear or belt rubs: how far its teeth slide and how far it wraps follow from the places and numbers of one mechanism."""
+    return any(isinstance(load, Friction) and load.of not in m.pair_index for load in m.loads)
 
 
 def _with_gears(of: Variants) -> Variants:
@@ -634,6 +640,8 @@ def _alike(m: Mechanism, other: Mechanism) -> bool:
         for one in (m, other)
     ]
     if kept[0] != kept[1] or along[0] != along[1]:
+        return False
+    if _rubbing_teeth(m) and (m.pairs != other.pairs or m.couplings != other.couplings):
         return False
     for one, two in zip(m.loads, other.loads, strict=True):
         for f in dataclasses.fields(one):

@@ -616,7 +616,8 @@ def study(
         ``scipy.stats`` or numbers.
     outputs : str, iterable or mapping
         Quantities by name (``"A.effort"``, ``"B.force"``, ``"B:Fx"``, ``"coupler.center"``; of a named point ``"coupler.tip"``,
-        ``"coupler.tip.x"``, ``"coupler.tip.velocity"``), or name -> quantity or function of a Solution with the batch
+        ``"coupler.tip.x"``, ``"coupler.tip.velocity"``; of couplings ``"g.normal_force"``,
+        ``"belt.tension.p1-p2"``), or name -> quantity or function of a Solution with the batch
         ``(variants, positions)``.
     n : int
         Number of variants; on a grid, levels of every distribution (lists of numbers are taken as given).

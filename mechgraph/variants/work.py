@@ -11,7 +11,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -33,6 +33,8 @@ from mechgraph.kinetostatics import Pipeline, RedundantName, solve_quietly
 from mechgraph.maths.newton import Paths
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tracker import End, Follower, Tracks
+from mechgraph.model.belts import BeltDrive
+from mechgraph.model.friction import Friction
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.model.parameters import Parameters
@@ -41,7 +43,7 @@ from mechgraph.quantities import items_of, shown, unit_of, wrong
 from mechgraph.result.contacts import LiftOff, Overlap
 from mechgraph.result.film import FILM_DIMENSIONS, FilmResult
 from mechgraph.result.solution import Doubt, Solution
-from mechgraph.result.values import OK, LoadBearing, MisfitsLeftOut, Unbalanced
+from mechgraph.result.values import OK, LoadBearing, MisfitsLeftOut, Unbalanced, coupling_unit
 from mechgraph.result.views import LinkResult, PairResult, link_units, pair_units
 from mechgraph.variants.numbers import ALIKE, AnyField, ItemField, Variants, stacked, topology_of, varied
 
@@ -49,6 +51,14 @@ Output = str | Callable[[Solution], Any]
 
 RESERVED = ("status", "variant", "position", "positions not solved")
 """Names that tables of a study use themselves."""
+OF_COUPLING = {
+    "normal_force": (1, 1, -2), "force": (1, 1, -2), "point": (1, 0, 0), "sliding": (1, 0, -1), "moment": (2, 1, -2),
+    "slip_margin": (0, 0, 0),
+}  # fmt: skip
+OF_BELT = {
+    "tension": (1, 1, -2), "span": (1, 0, 0), "wrap": (0, 0, 0), "friction": (0, 0, 0), "slip_margin": (0, 0, 0),
+}  # fmt: skip
+"""Dimensions of what a solution says of a coupling that acts along a line, and of the spans and pulleys of a belt."""
 OF_SOLUTION = ("shaking",)
 OF_CHECKS = ("closure", "equilibrium", "power", "accuracy")
 
@@ -110,9 +120,10 @@ def _fault(m: Mechanism, name: str, what: Any) -> str | None:
 
 
 def _missing(m: Mechanism, what: Any) -> str:
-    """What there is not: a pair or link of that name, or a quantity of it."""
+    """What there is not: a pair, link or coupling of that name, or a quantity of it."""
     owner = what.rpartition(".")[0] or what.rpartition(":")[0] if isinstance(what, str) else ""
-    if not owner or owner.removesuffix(".film") in (*m.pair_index, *m.link_index):
+    couplings = [getattr(c, "belt", "") or c.name for c in m.couplings]
+    if not owner or owner.removesuffix(".film") in (*m.pair_index, *m.link_index, *couplings):
         return "is no quantity"
     return f"there is no pair or link {shown(owner)} (pairs: {listed(m.pair_index)}; links: {listed(m.link_index)})"
 
@@ -126,9 +137,41 @@ def _known(m: Mechanism, what: str) -> list[str]:
     return [f"{name}.{part}" for name, parts in of if owner in (name, "") for part in parts] + [
         *films,
         *points,
+        *(name for name in m.once(_of_couplings) if owner in (name.rpartition(".")[0], "")),
         *OF_SOLUTION,
         *OF_CHECKS,
     ]
+
+
+Getter = Callable[[Solution], Any]
+
+
+def _of_couplings(m: Mechanism) -> dict[str, tuple[str, Getter]]:
+    """Quantities of couplings by name, ``g.normal_force``, ``belt.tension.p1-p2``, ``belt.wrap.p1``: unit, and how a solution tells it."""
+    rubbing = {load.of for load in m.loads if isinstance(load, Friction)}
+    rows: list[tuple[str, str, str, str]] = []  # owner, quantity, key of a span or pulley, unit
+    for c in m.couplings:
+        if isinstance(c, BeltDrive):
+            rows.append((c.belt, "length", "", unit_of(m.units, (1, 0, 0))))
+            keys = {part: c.span_names if part in ("tension", "span") else c.over for part in OF_BELT}
+            rows += [(c.belt, part, key, unit_of(m.units, of)) for part, of in OF_BELT.items() for key in keys[part]]
+        else:
+            rows += [(c.name, "effort", "", coupling_unit(m, c)), (c.name, "loss", "", unit_of(m.units, (2, 1, -3)))]
+            rows += [
+                (c.name, part, "", unit_of(m.units, of))
+                for part, of in OF_COUPLING.items()
+                if c.steps and (part != "slip_margin" or "wrap" in c.rubs)
+            ]
+    return {
+        f"{owner}.{part}.{key}".removesuffix("."): (unit, partial(_of_coupling, owner, part, key))
+        for owner, part, key, unit in rows
+        if part != "slip_margin" or owner in rubbing
+    }
+
+
+def _of_coupling(owner: str, part: str, key: str, s: Solution) -> Any:
+    value = getattr(s.coupling(owner), part)
+    return value[key] if key else value
 
 
 def _found(m: Mechanism, text: str) -> Callable[[Solution], Any] | None:
@@ -153,6 +196,8 @@ def _found(m: Mechanism, text: str) -> Callable[[Solution], Any] | None:
         if part.startswith("center") and m.link(owner).center is None:
             return None
         return lambda s: getattr(s.link(owner), part)
+    if found := m.once(_of_couplings).get(text):
+        return found[1]
     if point := _point(m, text):
         link, name, rank, part = point
         return lambda s: getattr(s.link(link).at(name), RANKS[rank])[..., part]
@@ -199,6 +244,8 @@ def unit_of_output(m: Mechanism, what: Output) -> str | tuple[str, ...]:
     owner, colon, part = what.partition(":")
     if colon and owner in m.pair_index:
         return str(pair_units(m.units, m.pair(owner).type)["components"][part])
+    if told := m.once(_of_couplings).get(what):
+        return told[0]
     owner, _, part = what.rpartition(".")
     found: Any = ""
     if owner in m.pair_index and part in OF_PAIR:
