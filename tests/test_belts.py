@@ -507,8 +507,8 @@ def test_outputs_of_a_belt_by_name():
     np.testing.assert_allclose(wrap, np.pi + 2 * off, rtol=1e-12)
     np.testing.assert_allclose(margin, np.exp(0.3 * wrap) * (300 - 3.5 / r) / (300 + 3.5 / r) - 1, rtol=1e-9)
     np.testing.assert_allclose(length, 2 * l + r * wrap + 0.05 * (np.pi - 2 * off), rtol=1e-12)
-    assert [found.units[name] for name in names] == ["N", "m", "", "", "m"]
-    with pytest.raises(mg.DeclarationError, match=r"did you mean B\.wrap\.w\?"):
+    assert [found.units[name] for name in names] == ["N", "m", "rad", "", "m"]
+    with pytest.raises(mg.DeclarationError, match=r"is no quantity; did you mean B\.wrap\.w or"):
         mg.study(m, {"gears[1].radius": [0.04, 0.06]}, "B.wrap.x", 2, motions={"p": 0.0})
 
 

@@ -59,6 +59,7 @@ OF_BELT = {
     "tension": (1, 1, -2), "span": (1, 0, 0), "wrap": (0, 0, 0), "friction": (0, 0, 0), "slip_margin": (0, 0, 0),
 }  # fmt: skip
 """Dimensions of what a solution says of a coupling that acts along a line, and of the spans and pulleys of a belt."""
+PURE_NUMBERS = ("friction", "slip_margin")
 OF_SOLUTION = ("shaking",)
 OF_CHECKS = ("closure", "equilibrium", "power", "accuracy")
 
@@ -122,8 +123,8 @@ def _fault(m: Mechanism, name: str, what: Any) -> str | None:
 def _missing(m: Mechanism, what: Any) -> str:
     """What there is not: a pair, link or coupling of that name, or a quantity of it."""
     owner = what.rpartition(".")[0] or what.rpartition(":")[0] if isinstance(what, str) else ""
-    couplings = [getattr(c, "belt", "") or c.name for c in m.couplings]
-    if not owner or owner.removesuffix(".film") in (*m.pair_index, *m.link_index, *couplings):
+    parts = {name.rpartition(".")[0] for name in m.once(_of_couplings)}
+    if not owner or owner.removesuffix(".film") in (*m.pair_index, *m.link_index, *parts):
         return "is no quantity"
     return f"there is no pair or link {shown(owner)} (pairs: {listed(m.pair_index)}; links: {listed(m.link_index)})"
 
@@ -154,11 +155,12 @@ def _of_couplings(m: Mechanism) -> dict[str, tuple[str, Getter]]:
         if isinstance(c, BeltDrive):
             rows.append((c.belt, "length", "", unit_of(m.units, (1, 0, 0))))
             keys = {part: c.span_names if part in ("tension", "span") else c.over for part in OF_BELT}
-            rows += [(c.belt, part, key, unit_of(m.units, of)) for part, of in OF_BELT.items() for key in keys[part]]
+            units = {part: "" if part in PURE_NUMBERS else unit_of(m.units, of) for part, of in OF_BELT.items()}
+            rows += [(c.belt, part, key, unit) for part, unit in units.items() for key in keys[part]]
         else:
             rows += [(c.name, "effort", "", coupling_unit(m, c)), (c.name, "loss", "", unit_of(m.units, (2, 1, -3)))]
             rows += [
-                (c.name, part, "", unit_of(m.units, of))
+                (c.name, part, "", "" if part in PURE_NUMBERS else unit_of(m.units, of))
                 for part, of in OF_COUPLING.items()
                 if c.steps and (part != "slip_margin" or "wrap" in c.rubs)
             ]
