@@ -483,6 +483,12 @@ def drawn_doors(folder: Path) -> list[Door]:
         ("show.draw_structure", show.draw_structure, (m,), {"groups": None, "ax": None}),
         ("show.effort_curve", show.effort_curve, (s, "A"), curve),
         ("show.hodograph", show.hodograph, (s, None), {"of": "velocity", "ax": None}),
+        (
+            "show.least_base_radius",
+            show.least_base_radius,
+            (mg.CamLaw([one.replace(over=np.pi) for one in RISE_AND_FALL]),),
+            {"angles": [0.3, 0.5], "ax": None},
+        ),
         ("show.margin_curve", show.margin_curve, (s,), {"over": None, "ax": None}),
         ("show.point_path", show.point_path, (s, None), {"ax": None}),
         ("show.film_orbit", show.film_orbit, (s, "A", mg.Journal(1.0, 1.0, 0.001, 0.01)), {"ax": None}),

@@ -473,12 +473,24 @@ def test_least_preload_of_a_harmonic_follower(stiffness, expected):
 def test_the_discs_of_a_conjugate_cam_keep_their_rollers_apart():
     """The second disc has the law downwards: both rollers of one follower touch at all angles, here on opposite sides, and on one arm."""
     u = np.linspace(0, 2 * np.pi, 201)
-    first = mg.Curve.cam(law=LAW, base_radius=0.04, roller_radius=0.01, second=(0, 1, 0))
-    second = mg.Curve.cam(law=-LAW, base_radius=0.06, roller_radius=0.01, second=(0, -1, 0))
-    apart = np.linalg.norm(first.at(u)[0] - second.at(u)[0], axis=0)
-    np.testing.assert_allclose(apart, 0.12, rtol=1e-13)
+    for offset in (0.0, 0.007):
+        first = mg.Curve.cam(law=LAW, base_radius=0.04, roller_radius=0.01, second=(0, 1, 0), offset=offset)
+        second = first.conjugate(0.06)
+        apart = first.at(u)[0] - second.at(u)[0]
+        wanted = np.sqrt(0.05**2 - offset**2) + np.sqrt(0.07**2 - offset**2)
+        np.testing.assert_allclose(np.linalg.norm(apart, axis=0), wanted, rtol=1e-13)
+    flat = mg.Curve.cam(law=LAW, base_radius=0.04, follower="flat", second=(0, 1, 0))
+    faces = [c.base_radius + sign * LAW.at(u)[0] for c, sign in ((flat, 1), (flat.conjugate(0.06), -1))]
+    np.testing.assert_allclose(faces[0] + faces[1], 0.1, rtol=1e-13)
+    samples = mg.Curve.cam(
+        angle=[0, 2, 2 * np.pi], lift=[0, 0.01, 0], slope=[0, 0, 0], bend=[0, 0, 0], base_radius=0.04
+    )
+    with pytest.raises(mg.DeclarationError, match="make it of a law"):
+        samples.conjugate(0.06)
+    with pytest.raises(mg.DeclarationError, match="on both sides already"):
+        mg.Curve.barrel(law=LAW, radius=0.05).conjugate(0.06)
     swing, arm = double_dwell(rise=0.3), {"arm": 0.09, "pivot": 0.12}
     one = mg.Curve.arm_cam(law=swing, base_radius=0.04, **arm)
-    other = mg.Curve.arm_cam(law=-swing, base_radius=0.06, mirrored=True, **arm)
+    other = one.conjugate(0.06)
     apart = np.linalg.norm(one.at(u)[0] - other.at(u)[0], axis=0)
     np.testing.assert_allclose(apart, apart[0], rtol=1e-13)

@@ -394,3 +394,12 @@ def test_names_with_dots_work_everywhere(tmp_path: Path, compiled):
     np.testing.assert_allclose(c([0.1]), mg.solve(m, {"jack.lift.Tz": 0.1})["jack.lift"].effort[1], rtol=1e-9)
     c.write(str(tmp_path / "crane.c"), name="crane")
     assert "jack.lift.Tz" in (tmp_path / "crane.h").read_text()
+
+
+def test_a_part_that_there_is_not_is_told_with_those_there_are():
+    with pytest.raises(
+        AttributeError, match=r"mg\.parts has no 'crane'; there are bearings, cardan_shaft, cylinder, .* spring_strut"
+    ):
+        _ = mg.parts.crane
+    assert "cylinder" in dir(mg.parts)
+    assert "np" not in dir(mg.parts)

@@ -339,3 +339,15 @@ def test_pictures_of_a_study(variants: mg.Study) -> None:
         show.study_tornado(variants, "torque"),
     ):
         check_texts(one)
+
+
+def test_least_base_radii_are_drawn_over_the_pressure_angle() -> None:
+    """The curve holds the numbers of ``mg.least_base_radius``; smaller angles ask for larger discs."""
+    law = mg.CamLaw([mg.Segment("cycloidal", rise, np.pi) for rise in (0.02, -0.02)])
+    line = show.least_base_radius(law, angles=np.deg2rad([20, 30]), roller_radius=0.008).get_lines()[0]
+    assert line.get_xdata() == pytest.approx([20, 30])
+    wanted = [mg.least_base_radius(law, max_pressure=np.deg2rad(a), roller_radius=0.008) for a in (20, 30)]
+    assert line.get_ydata() == pytest.approx(wanted)
+    assert wanted[0] > wanted[1]
+    with pytest.raises(mg.DeclarationError, match="angles"):
+        show.least_base_radius(law, angles=["wide"])

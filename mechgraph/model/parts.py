@@ -909,3 +909,13 @@ def slider_crank(
     ends = ((base, crank), (crank, bar), (bar, slider))
     pairs = [Pair(f"{name}.{k}", "R", *ab, point=c, axis=z) for k, ab, c in zip("ABC", ends, at, strict=True)]
     return Parts((*bars, block), (*pairs, Pair(f"{name}.slide", "P", base, slider, point=at[2], axis=x, second=z)))
+
+
+def __dir__() -> list[str]:
+    return sorted(
+        name for name, value in globals().items() if getattr(value, "__module__", "") == __name__ and name[0].islower()
+    )
+
+
+def __getattr__(name: str) -> Any:
+    raise AttributeError(f"mg.parts has no {name!r}; there are {', '.join(__dir__())}")

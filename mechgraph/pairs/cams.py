@@ -112,6 +112,46 @@ class OfLaw(Centred):
         size: dict[str, Any] = {} if base_radius is None else {"base_radius": base_radius}
         return cls(angle=motion.t, **size, **rates, **more)
 
+    def conjugate(self, base_radius: float) -> Self:
+        """Return the second disc of a conjugate cam: it stands on the same axis and touches a second roller or face of the same follower
+        on the other side, so that both discs together guide the follower without a spring.
+
+        Its law is the same downwards; the distance of both rollers of a slide, and the angle between both arms, never change.
+
+        Parameters
+        ----------
+        base_radius : float
+            Radius of the base circle of the second disc [length]: where the follower is at its zero. Its profile comes nearer to the axis
+            by the lift.
+
+        Returns
+        -------
+        Curve
+            The second disc, with the rest of this one.
+
+        Examples
+        --------
+        >>> import mechgraph as mg
+        >>> law = mg.CamLaw(
+        ...     [mg.Segment("cycloidal", 0.01, 3.0), mg.Segment("cycloidal", -0.01, 2 * 3.141592653589793 - 3)]
+        ... )
+        >>> first = mg.Curve.cam(law=law, base_radius=0.04, roller_radius=0.01)
+        >>> second = first.conjugate(0.06)
+        >>> bool(abs((((first.at(0.7)[0] - second.at(0.7)[0]) ** 2).sum()) ** 0.5 - 0.12) < 1e-15)
+        True
+        """
+        if self.law is None:
+            raise DeclarationError(
+                "conjugate", ["the cam is one of samples; make it of a law, mg.CamLaw.read or mg.Curve.cam(law=)"]
+            )
+        return self.replace(law=-self.law, base_radius=base_radius, **self._other_side())
+
+    def _other_side(self) -> dict[str, Any]:
+        """The fields of the second disc of a conjugate cam that differ."""
+        raise DeclarationError(
+            "conjugate", [f"{self.kind}: a groove holds its roller on both sides already, closed='form'"]
+        )
+
     @cached_property
     def pieces(self) -> LawPieces:
         """The exact pieces of the law."""
@@ -333,6 +373,10 @@ class Cam(OfLaw):
         """``-lift'`` towards axis x second."""
         return -self.pieces.at(u, 2)[1] if self.follower == "flat" else super()._on_face(u)
 
+    def _other_side(self) -> dict[str, Any]:
+        """Opposite to ``second``, so that the same line is passed at the other side."""
+        return {"second": tuple(-x for x in self.second), "offset": -self.offset}
+
     @property
     def roller(self) -> float:
         """As declared; a flat face has none."""
@@ -430,6 +474,10 @@ class ArmCam(OfSwing):
             a, b = -self.arm * c, self.arm * s
             a[0] += self.pivot
         return a, self._sense * b, np.zeros_like(a)
+
+    def _other_side(self) -> dict[str, Any]:
+        """On the other side of the line to the pivot."""
+        return {"mirrored": not self.mirrored}
 
     @property
     def _sense(self) -> float:

@@ -5,6 +5,7 @@ from mechgraph.show.curves import (
     film_orbit,
     friction_losses,
     hodograph,
+    least_base_radius,
     margin_curve,
     point_path,
     polar_force,
@@ -24,6 +25,7 @@ from mechgraph.show.skeleton import animate, draw_skeleton, save_picture
 
 __all__ = [
     "animate", "draw_chains", "draw_graph", "draw_skeleton", "draw_sparsity", "draw_structure", "effort_curve",
-    "film_orbit", "friction_losses", "hodograph", "margin_curve", "point_path", "polar_force", "reaction_curve", "reaction_ranges",
+    "film_orbit", "friction_losses", "hodograph", "least_base_radius", "margin_curve", "point_path", "polar_force",
+    "reaction_curve", "reaction_ranges",
     "save_picture", "study_bands", "study_histogram", "study_tornado",
 ]  # fmt: skip

@@ -16,8 +16,10 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import indexed
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import RANKS
+from mechgraph.pairs import cams
+from mechgraph.pairs.cam_laws import CamLaw
 from mechgraph.pairs.journal import Journal
-from mechgraph.quantities import LENGTH, POWER, door, shown, unit_of
+from mechgraph.quantities import LENGTH, POWER, door, real_array, shown, unit_of, wrong
 from mechgraph.response.respond import Response
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import MaterialPoint
@@ -867,3 +869,48 @@ def _letter(axis: Array) -> str:
     """``x`` for the x axis; the direction for what is none of them."""
     k = int(np.argmax(np.abs(axis)))
     return "xyz"[k] if abs(axis[k]) > 1 - 1e-9 else f"along ({', '.join(f'{c:.3g}' for c in axis)})"
+
+
+@door
+def least_base_radius(law: CamLaw, *, angles: Any = None, ax: Axes = None, **follower: Any) -> Any:
+    """Draw the least base radius of a cam disc over the largest pressure angle that is allowed.
+
+    Parameters
+    ----------
+    law : CamLaw
+        Law over 2 pi.
+    angles : array_like, optional
+        Largest pressure angles [rad]. Default: 10 to 50 degrees.
+    ax : Axes, optional
+        Axes of matplotlib. Default: new ones.
+    **follower
+        ``roller_radius``, ``offset``, ``least_radius`` as in ``mg.least_base_radius``.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    DeclarationError
+        As ``mg.least_base_radius``.
+    MissingExtraError
+        Without matplotlib.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> from mechgraph import show
+    >>> law = mg.CamLaw([mg.Segment("cycloidal", 0.02, 3.0), mg.Segment("cycloidal", -0.02, 2 * 3.141592653589793 - 3)])
+    >>> ax = show.least_base_radius(law, roller_radius=0.008)
+    """
+    allowed = np.deg2rad(np.linspace(10.0, 50.0, 41)) if angles is None else real_array(angles)
+    if allowed is None or not allowed.size or not np.isfinite(allowed).all():
+        raise DeclarationError("least base radius", [wrong(angles, "angles", "finite numbers, at least one")])
+    allowed = np.ravel(allowed)
+    radii = [cams.least_base_radius(law, max_pressure=float(a), **follower) for a in allowed]
+    ax = new_axes() if ax is None else ax
+    x = Abscissa(np.rad2deg(allowed)[None], axis_label("largest pressure angle", "deg"), True)
+    draw_curve(ax, x, np.array(radii), "least base radius", color=PALETTE[0])
+    lay_out(ax, x, "least base radius")
+    return ax
