@@ -393,3 +393,17 @@ def test_studies_over_what_decides_the_loss_of_teeth(name, function):
         for output, expected in zip(outputs, (c.loss, c.normal_force, c.force), strict=True):
             np.testing.assert_allclose(found.outputs[output][i], expected, rtol=1e-9, atol=1e-12)
     assert np.ptp(found.outputs["g.loss" if name == "g.pressure_angle" else "g.normal_force"][:, 0]) > 0.005
+
+
+@pytest.mark.parametrize(("preload", "told"), [(0.0, True), (1.0, False)])
+def test_a_belt_without_tension_in_its_slack_strand_is_told_what_to_give(preload, told):
+    pairs = [
+        mg.Pair(k, "R", "frame", link, point=(x, 0, 0), axis=(0, 0, 1))
+        for k, link, x in [("A", "p", 0), ("B", "w", 0.5)]
+    ]
+    m = mg.Mechanism(
+        "belt", pairs=pairs, couplings=[mg.Belt("g", "A", "B", radii=(0.1, 0.2))], drives=["A"],
+        loads=[mg.Effort("B", -3.0), mg.Friction("g", mu=0.3, preload=preload)],
+    )  # fmt: skip
+    words = [str(w) for w in mg.solve(m, {"A": mg.Motion([0.0, 1.0], velocity=1.0)}).warnings]
+    assert [("belt g slips" in w, "preload=" in w) for w in words] == [(True, told)]

@@ -495,6 +495,8 @@ def friction_notes(values: Trajectory) -> Iterator[FrictionNote]:
             )
             if least < 0:
                 why = f"belt {load.of} slips (slip_margin down to {least:.3g}): its strands differ by more than e^(mu wrap)"
+                if not whole and not np.any(load.preload):
+                    why += "; an mg.Belt has no tension in its slack strand, give it by preload="
                 yield FrictionNote(load.of, why)
 
 
