@@ -320,7 +320,7 @@ def attack_call(seed: int, folder: Path) -> None:
         wrong = copy.copy(wrong) if isinstance(wrong, Iterator) else wrong  # what is read once is left for later inputs
         if rng.random() < 0.25:
             wrong = rng.choice([[wrong], (wrong, wrong, wrong), {"A": wrong}, [wrong, 1.0], np.array([0, 1, 2, 3.0])])
-        if callable(wrong) and [*[""] * len(given), *named][i] == "progress":
+        if callable(wrong) and [*[""] * len(given), *named][i] in ("progress", "by"):
             continue  # what a user's function raises is the user's
         if i < len(given):
             given[i] = wrong

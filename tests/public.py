@@ -119,6 +119,8 @@ def made() -> tuple[tuple[Any, dict[str, Any]], ...]:
     study = mg.study(m, {"crank.mass": [1.0, 2.0]}, "A.effort", 2, motions={"A": 0.1}, executor=None)
     lifted = mg.solve(cam, {"A": [0.0, 0.1]})
     state = {"state": s.state(0), "position": 0}
+    dyad, places = dyad_and_places()
+    guided = mg.synthesize(dyad, places, ["B.point"])
     term = f.equations[0].terms[0]
     return (
         (s, {"name": "crank"}),
@@ -136,7 +138,16 @@ def made() -> tuple[tuple[Any, dict[str, Any]], ...]:
         (mg.assemblies(m, {"A": [0.1, 0.2]}), {"i": 0}),
         (study, {"name": "A.effort", "i": 0}),
         (mg.CamLaw(RISE_AND_FALL, turn=2.0), {"angle": 0.1}),
+        (guided, {"name": "B.point.x", "which": [0], "by": "size"}),
     )
+
+
+def dyad_and_places() -> tuple[mg.Mechanism, Any]:
+    """A crank with a body on it, and three poses of the body that one such crank reaches."""
+    A = mg.Pair("A", "R", "frame", "crank", point=(0, 0))
+    B = mg.Pair("B", "R", "crank", "body", point=(1, 0))
+    m = mg.Mechanism("dyad", None, [A, B], planar=True)
+    return m, mg.poses("body", [(0, 0, 0), (1, 0.5, 0.4), (2, 0.4, 1.1)])
 
 
 GIVEN: dict[str, Any] = {
@@ -559,6 +570,19 @@ def further_doors(folder: Path) -> list[Door]:
     on_curve = lambda kind: ready(kind, "Ps")
     on_surface = lambda kind: ready(kind, "Sp")
     frame = {"frame": "minimizing", "guide": None}
+    dyad, places = dyad_and_places()
+    dyad = dyad.replace(links=[one.replace(points={"tip": (1, 1, 0)}) for one in dyad.links])
+    corners = {"A": "frame crank 0 0", "B": "crank rod 0 1", "C": "rod rocker 3 2", "D": "frame rocker 3 0"}
+    sides = [
+        mg.Pair(n, "R", a, b, point=(float(x), float(y)))
+        for n, (a, b, x, y) in ((n, c.split()) for n, c in corners.items())
+    ]
+    flat = mg.Mechanism("flat", None, sides, drives=["A"], planar=True)
+    timed_at = {"A": [0.0, 0.1, 0.2]}
+
+    def sought(task: Any) -> object:
+        return mg.synthesize(dyad, task, ["B.point"], starts=2)
+
     disc = mg.Pulley("q", "w", (1.5, 0, 0), Z, radius=0.1)
 
     def belted(**more: Any) -> object:
@@ -800,6 +824,55 @@ def further_doors(folder: Path) -> list[Door]:
         ),
         ("Event", waiting(mg.Event, "events"), ("A", 1.0), {}),
         ("Stop", waiting(mg.Stop, "stops"), ("A", -1.0, 1.0), {"restitution": 0.5}),
+        ("poses", lambda *a, **k: sought(mg.poses(*a, **k)), ("body", places.places), {"at": {}}),
+        ("path", lambda *a, **k: sought(mg.path(*a, **k)), ("body.tip", [(1, 1), (1, 2), (0, 2)]), {"at": timed_at}),
+        (
+            "function",
+            lambda *a, **k: mg.synthesize(flat, mg.function(*a, **k), ["B.point"]),
+            ("A", "D", [(0, 0), (0.2, 0.1), (0.4, 0.25)]),
+            {"scale": "given"},
+        ),
+        ("positions", lambda *a: sought(mg.positions(*a)), ([{"body": row} for row in places.places],), {}),
+        (
+            "synthesize",
+            mg.synthesize,
+            (dyad, places, ["B.point"]),
+            {
+                "bounds": {"B.point.x": (0, 9)},
+                "conditions": {"size": (None, 9)},
+                "require": [],
+                "seed": 0,
+                "cache": True,
+            },
+        ),
+        (
+            "synthesize over",
+            mg.synthesize,
+            (dyad, places, ["B.point"]),
+            {"sweep": {"A.point.x": [0.0, 0.1]}, "over": {"A": [0.0, 0.1]}, "progress": None},
+        ),
+        (
+            "synthesize nearly",
+            mg.synthesize,
+            (flat, mg.function("A", "D", [(0, 0), (0.2, 0.1), (0.4, 0.25), (0.5, 0.3)]), ["B.point.x"]),
+            {"fit": "least_squares", "minimize": None, "maximize": None, "starts": 2},
+        ),
+        (
+            "SynthesisSetup",
+            lambda *a, **k: mg.synthesize(dyad.replace(synthesis=mg.SynthesisSetup(*a, **k))),
+            (places, ["B.point"]),
+            {
+                "fit": None,
+                "bounds": {"B.point.x": (0, 9)},
+                "conditions": {"size": (None, 9)},
+                "require": ["branch"],
+                "minimize": None,
+                "maximize": None,
+                "sweep": {},
+                "over": {},
+                "starts": 2,
+            },
+        ),
         (
             "ResponseSetup",
             lambda **k: mg.respond(swung.replace(response=mg.ResponseSetup(**k))),

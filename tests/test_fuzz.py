@@ -35,15 +35,6 @@ def test_wrong_types_at_every_door(seed: int, folder: Path) -> None:
 def test_every_public_callable_is_attacked(folder: Path) -> None:
     """Each is there under its own name."""
     public = {*functions(), *(f"{cls.__name__}.{name}" for cls in results() for name in methods(cls))}
-    synthesis = {
-        "poses",
-        "path",
-        "function",
-        "positions",
-        "synthesize",
-        "SynthesisSetup",
-    }  # not attacked: tests/test_synthesis.py has their faults
-    public -= {name for name in public if name.startswith("Syntheses.")} | synthesis
     assert {name.split()[0] for name, *_ in every_door(folder)} == public
 
 

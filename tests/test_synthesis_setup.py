@@ -94,7 +94,7 @@ def test_what_is_written_is_read_again(name: str, tmp_path: Path) -> None:
 def test_angles_of_poses_are_degrees_in_the_file_and_radians_in_the_call(tmp_path: Path) -> None:
     (task,) = ASKED["poses"].tasks
     assert task.places[1] == pytest.approx((0.1, 0.2, np.rad2deg(0.3)))
-    assert np.allclose(task.arguments()["places"], [[0, 0, 0], [0.1, 0.2, 0.3]], rtol=0, atol=1e-15)
+    assert np.allclose(task.arguments()["poses"], [[0, 0, 0], [0.1, 0.2, 0.3]], rtol=0, atol=1e-15)
 
 
 def test_all_that_is_wrong_is_said_at_once() -> None:
@@ -162,3 +162,13 @@ def test_what_is_given_beside_a_stored_setup_replaces_it() -> None:
         mg.synthesize(m, fit="best")
     with pytest.raises(mg.DeclarationError, match="starts"):
         mg.synthesize(m, starts=0)
+
+
+def test_stored_poses_are_asked_as_given_ones_are() -> None:
+    A = mg.Pair("A", "R", "frame", "crank", point=(0, 0))
+    B = mg.Pair("B", "R", "crank", "body", point=(1, 0))
+    m = mg.Mechanism("dyad", None, [A, B], planar=True)
+    asked = mg.poses("body", [(0, 0, 0), (1, 0.5, 0.4), (2, 0.4, 1.1)])
+    stored = mg.synthesize(m.replace(synthesis=mg.SynthesisSetup(asked, ["B.point"])))
+    assert len(stored) == 1
+    assert np.allclose(stored.values, mg.synthesize(m, asked, ["B.point"]).values, rtol=0, atol=1e-12)

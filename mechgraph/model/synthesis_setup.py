@@ -102,9 +102,11 @@ class SynthesisTask(Described):
     def arguments(self) -> dict[str, Any]:
         """Those of the call that it stands for."""
         given = {name: getattr(self, name) for name in _HELD[self.kind]}
-        places = real_array(given.get("places"))
-        if places is not None and places.ndim == 2:
-            given["places"] = np.column_stack([places[:, :2], np.deg2rad(places[:, 2])])
+        if "places" in given:
+            given["poses"] = given.pop("places")
+            places = real_array(given["poses"])
+            if places is not None and places.ndim == 2:
+                given["poses"] = np.column_stack([places[:, :2], np.deg2rad(places[:, 2])])
         return given
 
     def faults(self, where: str) -> list[str]:
@@ -195,14 +197,14 @@ class SynthesisSetup(Described):
             pairs = value.items() if isinstance(value, Mapping) else ()
             found += [] if isinstance(value, Mapping) else [wrong(value, name, "a mapping name -> (least, greatest)")]
             found += [wrong(v, f"{name}[{k!r}]", "(least, greatest)") for k, v in pairs if not _is_interval(v)]
-        if self.fit is not None and self.fit not in get_args(FitName):
+        if self.fit is not None and (not isinstance(self.fit, str) or self.fit not in get_args(FitName)):
             found.append(wrong(self.fit, "fit", " or ".join(map(repr, get_args(FitName)))))
         if not isinstance(self.unknown, tuple) or not all(isinstance(name, str) for name in self.unknown):
             found.append(wrong(self.unknown, "unknown", "names"))
         found += [
             wrong(one, "require", ", ".join(get_args(DefectName)))
-            for one in self.require
-            if one not in get_args(DefectName)
+            for one in items_of(self.require, "require", found)
+            if not isinstance(one, str) or one not in get_args(DefectName)
         ]
         if type(self.starts) is not int or self.starts < 1:
             found.append(wrong(self.starts, "starts", "a whole number above 0"))

@@ -21,7 +21,7 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.synthesis_setup import DefectName, FitName, SynthesisSetup
 from mechgraph.modes.assemblies import weakest
 from mechgraph.modes.homotopy import Mask
-from mechgraph.quantities import Count, door, wrong
+from mechgraph.quantities import Count, door, items_of, place_among, real_array, wrong
 from mechgraph.quantities import Index as Seed
 from mechgraph.synthesis.classes import ClassMember, NoClass, TaskClass
 from mechgraph.synthesis.fitness import Fitness, Measure, fitness, keeps, limits_of
@@ -202,8 +202,17 @@ class Syntheses(Shown, Sequence[Mechanism]):
         return np.asarray(self.values[:, self.unknown.index(name)])
 
     def taken(self, which: Sequence[int]) -> Syntheses:
-        """Some of them, in that order; what is said of the whole stays."""
-        k = list(which)
+        """Some of them, in that order; what is said of the whole stays.
+
+        Raises
+        ------
+        DeclarationError
+            where there is no such one.
+        """
+        faults = list[str]()
+        k = [place_among(i, len(self), "which", "syntheses") for i in items_of(which, "which", faults)]
+        if faults:
+            raise DeclarationError("syntheses", faults)
         place = {old: new for new, old in enumerate(k)}
         return replace(
             self,
@@ -238,18 +247,20 @@ class Syntheses(Shown, Sequence[Mechanism]):
         Raises
         ------
         DeclarationError
-            No such quantity.
+            No such quantity; a function that returns no number.
         """
         names = ("transmission", "size", "ratio", "error")
         if not callable(by) and by not in names:
             raise DeclarationError("syntheses", [wrong(by, "by", f"{', '.join(map(repr, names))}, or a function")])
-        values = [float(by(m)) for m in self] if callable(by) else [getattr(fit, by) for fit in self.fitness]
+        values = [by(m) for m in self] if callable(by) else [getattr(fit, by) for fit in self.fitness]
+        if (numbers := real_array(values)) is None or numbers.shape != (len(self),):
+            raise DeclarationError("syntheses", [wrong(values, "by", "a function that returns a number")])
         sign = -1.0 if by == "transmission" else 1.0
         return self.taken(
-            sorted(range(len(self)), key=lambda i: (np.isnan(values[i]), sign * np.nan_to_num(values[i]), i))
+            sorted(range(len(self)), key=lambda i: (np.isnan(numbers[i]), sign * np.nan_to_num(numbers[i]), i))
         )
 
-    def kept(
+    def _kept(
         self, require: Sequence[Any], bounds: Mapping[str, Any], limits: Sequence[Any], driver: str | None
     ) -> Syntheses:
         """Those without the defects named, with unknowns within bounds, that keep limits; why others were left out is in ``rejected``."""
@@ -450,7 +461,8 @@ class Synthesis:
         faults += [
             f"sweep {name!r}: is no component of a point, an axis or a second direction" for name in self.sweep.others
         ]
-        columns = [np.atleast_1d(np.asarray(v, dtype=float)) for v in sweep.values()]
+        read = [real_array(v) for v in sweep.values()]
+        columns = [np.atleast_1d(v) for v in read if v is not None and v.ndim < 2]
         if len({len(c) for c in columns}) > 1 or len(columns) != len(self.sweep.names):
             faults.append(
                 "sweep: expected single numbers by name, with one list of values each, all of the same length"
@@ -804,6 +816,8 @@ def synthesize(
     if tasks is None or unknown is None:
         raise DeclarationError(where, ["tasks and unknown: expected both, or a mechanism with synthesis="])
     unknown = [unknown] if isinstance(unknown, str) else list(unknown)
+    require = items_of(require, "require", faults)
+    faults += [] if unknown else ["unknown: nothing is sought; name numbers or elements"]
     limits, within = limits_of(m, conditions, over, faults), dict(bounds or {})
     goals = [(what, sign) for what, sign in ((minimize, 1.0), (maximize, -1.0)) if what is not None]
     fitting = fit is not None or bool(goals)
@@ -827,7 +841,7 @@ def synthesize(
     found = Synthesis(m, tasks, unknown, dict(sweep or {}), int(seed), cache, progress)
     _refuse_other_names(found.problem, within)
     driver, _ = driver_of(m, tasks)
-    answers = [one.kept(require, within, limits, driver) for one in found.answers()]
+    answers = [one._kept(require, within, limits, driver) for one in found.answers()]
     if sweep:
         return SynthesesOver(dict(zip(found.sweep.names, found.swept, strict=True)), tuple(answers))
     return answers[0]
@@ -875,4 +889,4 @@ def _fitted(
         (of.measured(measure, none=1e3 if least is None else -1e3), least, most) for _, measure, least, most in limits
     ]
     found = fitted(of.fit, fit, starts, bounds, goal, ends, seed, progress)
-    return of.answer(found).kept(require, bounds, limits, of.driver)
+    return of.answer(found)._kept(require, bounds, limits, of.driver)

@@ -15,15 +15,13 @@ import numpy as np
 from mechgraph.kinematics.prescribed import Target, coordinate, parts_of, target_of
 from mechgraph.maths.se3 import Array
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.quantities import door, items_of
+from mechgraph.quantities import door, items_of, real_array, shown, wrong
 
 
 def _series(value: Any, shapes: Sequence[tuple[int, ...]], what: str, faults: list[str]) -> Array | None:
     """An array ``(n, *shape)`` of numbers, one of the shapes; None, with a fault, where it is none."""
-    try:
-        out = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        out = np.zeros(0)
+    read = real_array(value)
+    out = np.zeros(0) if read is None else read
     if out.ndim and len(out) and any(out.shape[1:] == shape for shape in shapes) and not np.isinf(out).any():
         return out
     wanted = " or ".join(str(("n", *shape)).replace("'", "") for shape in shapes)
@@ -35,7 +33,7 @@ def _timed(m: Mechanism, at: Mapping[str, Any], n: int, faults: list[str]) -> di
     """Prescribed timing: values of freedoms at the same positions."""
     out = {}
     for name, value in at.items():
-        turns = coordinate(m, name)
+        turns = coordinate(m, name) if isinstance(name, str) else f"{shown(name)} is no name"
         if isinstance(turns, str):
             faults.append(f"at: {turns}")
         elif (row := _series(value, [()], f"at[{name!r}]", faults)) is not None:
@@ -47,11 +45,11 @@ def _timed(m: Mechanism, at: Mapping[str, Any], n: int, faults: list[str]) -> di
 
 def _on(m: Mechanism, name: str, point: bool, faults: list[str]) -> Target | None:
     """The link, or point of a link, of that name."""
-    found = target_of(m, name)
+    found = target_of(m, name) if isinstance(name, str) else wrong(name, "name", "a text")
     if isinstance(found, Target) and not found.part and bool(found.point) is point:
         return found
     kind = "a point of a link, e.g. 'coupler.tip'" if point else "a link that moves"
-    faults.append(f"{name!r}: expected {kind}" + (f"; {found}" if isinstance(found, str) else ""))
+    faults.append(f"{shown(name)}: expected {kind}" + (f"; {found}" if isinstance(found, str) else ""))
     return None
 
 
@@ -292,7 +290,7 @@ def asked_of(m: Mechanism, tasks: Any, faults: list[str]) -> Asked | None:
     before, scaled = len(faults), []
     for i, task in enumerate(given):
         if not isinstance(task, kinds):
-            faults.append(f"tasks[{i}]: {task!r} is none; expected mg.poses, mg.path, mg.function or mg.positions")
+            faults.append(f"tasks[{i}]: {shown(task)} is none; expected mg.poses, mg.path, mg.function or mg.positions")
             continue
         for name, column in task.named(m, faults).items():
             known = values.setdefault(name, column)
