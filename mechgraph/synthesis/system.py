@@ -330,9 +330,8 @@ class ArrowRows:
         places = self.problem.places
         every = [p for own in places for p in own]
         which = np.repeat(np.arange(len(places)), [len(own) for own in places])
-        each = self.moved(
-            *(np.array([getattr(p, name) for p in every], dtype=int) for name in ("side", "pair")), unit_rates(every)
-        )
+        side, pair = (np.array([getattr(p, name) for p in every], dtype=int) for name in ("side", "pair"))
+        each = self.moved(side, pair, unit_rates(every))
         out = np.zeros((*each.shape[:2], len(places), self.T), dtype=each.dtype)
         for i, k in enumerate(which):
             out[:, :, k] += each[:, :, i]
