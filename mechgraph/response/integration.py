@@ -358,7 +358,7 @@ class Integration:
         left = (end - t) * RESPONSE.look / (t - self.segments[-RESPONSE.look].begin)
         message = (
             f"at the length of the last {RESPONSE.look} steps of {self.method}, some {left:.0e} more lead to t = {end:g}; "
-            "where loads are stiff, method='Radau' takes far fewer. Smooth discontinuous loads such as dry friction"
+            "where loads are stiff, method='Radau' takes far fewer. Declare dry friction with mg.Friction; smooth other loads that jump"
         )
         # steps to come from which on the motion is given up: hours and days
         if left > 1e8:

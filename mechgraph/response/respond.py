@@ -546,7 +546,8 @@ class Chatter:
                 raise Stopped(
                     f"{law.where}its force jumps by {abs(near[-1]):.4g} where its rate changes sign, as dry friction does; at "
                     f"t = {end:.6g}, x = {x[-1]:.6g}, it holds what it acts on, and steps chatter about a rate of zero. A force law "
-                    "carries no friction that sticks; let it rise over a small rate, as np.tanh(v / v0) does"
+                    "carries no friction that sticks: declare it with mg.Friction, or let the force rise over a small rate, as "
+                    "np.tanh(v / v0) does"
                 )
 
 
