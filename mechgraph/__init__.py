@@ -80,7 +80,8 @@ if TYPE_CHECKING:
     from mechgraph.result.free_body import FreeBody, free_body
     from mechgraph.result.over_time import OverTime, over_time
     from mechgraph.show.page.write import write_report
-    from mechgraph.synthesis.syntheses import Syntheses, SynthesesOver, synthesize
+    from mechgraph.synthesis.answers import Syntheses, SynthesesOver
+    from mechgraph.synthesis.syntheses import synthesize
     from mechgraph.synthesis.tasks import function, path, poses, positions
     from mechgraph.variants.study import Study, study
 
@@ -177,7 +178,9 @@ def __getattr__(name: str) -> Any:
             from mechgraph.show import diagrams as home
         case "view" | "write_report":
             from mechgraph.show.page import write as home
-        case "Syntheses" | "SynthesesOver" | "synthesize":
+        case "Syntheses" | "SynthesesOver":
+            from mechgraph.synthesis import answers as home
+        case "synthesize":
             from mechgraph.synthesis import syntheses as home
         case "function" | "path" | "poses" | "positions":
             from mechgraph.synthesis import tasks as home

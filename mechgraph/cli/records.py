@@ -20,7 +20,7 @@ from mechgraph.modes.assemblies import AssembliesData, BranchesData
 from mechgraph.response.respond import ResponseData
 from mechgraph.result.over_time import OverTimeData
 from mechgraph.result.summary import SolutionData
-from mechgraph.synthesis.syntheses import SynthesesData
+from mechgraph.synthesis.answers import SynthesesData
 
 
 @dataclass(frozen=True)

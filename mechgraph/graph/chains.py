@@ -28,6 +28,7 @@ from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import combinations, combinations_with_replacement, pairwise, product
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -264,7 +265,7 @@ class Chain:
     @cached_property
     def code(self) -> Code:
         """What chains have in common that are the same up to the numbers of links and joints, and only these."""
-        return self._code({}, {})
+        return self.marked_code({})
 
     def code_with_frame(self, frame: int) -> Code:
         """Return a code of an inversion: equal for isomorphic chains with corresponding frame links, and only for these.
@@ -278,10 +279,20 @@ class Chain:
         -------
         Code
         """
-        return self._code({frame: 1}, {})
+        return self.marked_code({frame: 1})
 
-    def _code(self, links: Mapping[int, int], joints: Mapping[int, int]) -> Code:
-        """The code with marks on links and joints."""
+    def marked_code(self, links: Mapping[int, int], joints: Mapping[int, int] = MappingProxyType({})) -> Code:
+        """Return a code of a chain with marks: equal for chains that are the same with their marks, and only for these.
+
+        Parameters
+        ----------
+        links, joints : mapping
+            Number of a link or joint -> its mark, from 1.
+
+        Returns
+        -------
+        Code
+        """
         nodes: list[Hashable] = [("link", links.get(i, 0)) for i in range(self.links)]
         edges: list[Edge] = []
         for k, (joint, kind) in enumerate(zip(self.joints, self.types, strict=True)):
@@ -310,7 +321,7 @@ class Chain:
         -------
         tuple of tuple of int
         """
-        return _alike(range(len(self.joints)), lambda k: self._code({frame: 1}, {k: 1}))
+        return _alike(range(len(self.joints)), lambda k: self.marked_code({frame: 1}, {k: 1}))
 
     def mechanism(self, frame: int = 0, name: str = "") -> Mechanism:
         """Return the chain as a mechanism without geometry: links L0, L1, ..., pairs J0, J1, ...

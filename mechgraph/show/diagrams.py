@@ -40,7 +40,7 @@ from mechgraph.show.curves import Abscissa, lay_out
 from mechgraph.show.skeleton import draw_skeleton
 
 if TYPE_CHECKING:
-    from mechgraph.synthesis.syntheses import Syntheses
+    from mechgraph.synthesis.answers import Syntheses
 from mechgraph.variants.study import Study
 
 LETTER, CLEARED = (0.045, 0.11), 1.3

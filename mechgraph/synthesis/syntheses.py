@@ -1,419 +1,35 @@
-"""All mechanisms that do what is asked, as they are returned."""
+"""``mg.synthesize``: what is asked, and the ways to its answers."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import fields
 from functools import cache, partial
-from typing import TYPE_CHECKING, Annotated, Any, get_args
+from typing import Any, get_args
 
 import numpy as np
 
-from mechgraph import methods
-from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, counted
-from mechgraph.files import optional, plain
 from mechgraph.force.loads import user_poses
+from mechgraph.graph.chains import Chain
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import MODES
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.synthesis_setup import DefectName, FitName, SynthesisSetup
-from mechgraph.modes.assemblies import weakest
 from mechgraph.modes.homotopy import Mask
-from mechgraph.quantities import Count, door, items_of, place_among, real_array, wrong
+from mechgraph.quantities import Count, door, items_of, real_array, wrong
 from mechgraph.quantities import Index as Seed
+from mechgraph.synthesis.answers import ComplexSyntheses, Degenerate, Fitnesses, Syntheses, SynthesesOver
 from mechgraph.synthesis.classes import ClassMember, NoClass, TaskClass
-from mechgraph.synthesis.fitness import Fitness, Measure, fitness, keeps, limits_of
+from mechgraph.synthesis.fitness import Fitness, Measure, fitness, limits_of
 from mechgraph.synthesis.fits import Fit, FitPoint, Fitted, fitted
 from mechgraph.synthesis.solve import Progress, TaskEnds, TaskStart, ends, real_states, start_of
-from mechgraph.synthesis.symmetries import Symmetry, orbits, symmetries
+from mechgraph.synthesis.structures import WHERE, structures
+from mechgraph.synthesis.symmetries import orbits, symmetries
 from mechgraph.synthesis.system import RowNumbers, RowProblem
 from mechgraph.synthesis.tasks import FunctionTask, function, path, poses, positions
 from mechgraph.synthesis.unknowns import Unknowns
-
-if TYPE_CHECKING:
-    import pandas
-
-
-@dataclass(frozen=True)
-class ComplexSyntheses:
-    """Solutions that are not real: ``values (k, u)`` of the unknowns."""
-
-    values: Array
-
-    def __len__(self) -> int:
-        return len(self.values)
-
-
-@dataclass(frozen=True)
-class Degenerate:
-    """Solutions of the equations that are no mechanisms of their own, and that ``total`` does not count."""
-
-    kind: Annotated[str, "double, coincident or reversed"]
-    count: int
-    text: str
-
-
-class Fitnesses(Sequence[Fitness]):
-    """Fitness of mechanisms, each found when first asked for."""
-
-    def __init__(self, makers: Sequence[Callable[[], Fitness]]) -> None:
-        self._makers = tuple(makers)
-
-    def __len__(self) -> int:
-        return len(self._makers)
-
-    def __getitem__(self, i: int | slice) -> Any:
-        return tuple(make() for make in self._makers[i]) if isinstance(i, slice) else self._makers[i]()
-
-    @classmethod
-    def of(cls, found: tuple[Fitness, ...]) -> Fitnesses:
-        """Those that are known."""
-        return cls([partial(found.__getitem__, i) for i in range(len(found))])
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Fitnesses.of, (tuple(self),)  # found before they go elsewhere
-
-
-@dataclass(frozen=True)
-class RejectedAnswer:
-    """A mechanism that does what is asked and fell for a condition."""
-
-    mechanism: Mechanism
-    values: tuple[float, ...]
-    reasons: Annotated[tuple[str, ...], "defects, and conditions that it does not keep"]
-
-
-@dataclass(frozen=True)
-class SynthesesData:
-    """All mechanisms that do what is asked, and how sure it is that these are all."""
-
-    mechanism: str
-    unknown: tuple[str, ...]
-    values: Annotated[tuple[tuple[float, ...], ...], "of every mechanism"]
-    completeness: Annotated[str, "proved, tested or searched"]
-    evidence: tuple[str, ...]
-    total: Annotated[int | None, "over the complex numbers, for general data; none of fits"]
-    classes: Annotated[int | None, "the same, those as one that symmetries make of each other"]
-    complex: Annotated[int, "how many are not real"]
-    infinite: Annotated[int, "how many went to infinity here"]
-    degenerate: tuple[Degenerate, ...]
-    residual: tuple[float, ...]
-    fitness: tuple[Fitness, ...]
-    rejected: Annotated[tuple[tuple[str, ...], ...], "of every mechanism that was left out, why"]
-
-
-@dataclass(frozen=True, repr=False)
-class Syntheses(Shown, Sequence[Mechanism]):
-    """All real mechanisms of a topology that do what is asked, each a Mechanism with ``start`` at row 0. Returned by ``synthesize``.
-
-    Attributes
-    ----------
-    mechanism : Mechanism
-        As declared.
-    unknown : tuple of str
-        The numbers that were sought.
-    values : (n, u) array
-        Their values.
-    poses : (n, rows, N, 4, 4) array
-        Poses of all links at every row.
-    coordinates : (n, rows, F) array
-        All freedoms [rad, length].
-    residual : (n,) array
-        Worst error of closure or task at any row (radians, lengths over the size of the task).
-    complex : object
-        ``values (k, u)`` of the solutions that are not real.
-    total : int or None
-        Finite nondegenerate solutions over the complex numbers for general data of this task.
-    classes : int
-        The same, those as one that symmetries make of each other.
-    symmetries : tuple
-        Exchanges of pairs that make a solution of a solution: ``name``, ``order``, ``text``.
-    copies : tuple
-        For each mechanism the numbers of those that symmetries make of it, itself too.
-    degenerate : tuple
-        Solutions that are no mechanisms of their own: ``kind``, ``count``, ``text``.
-    infinite : int
-        How many went to infinity here.
-    completeness : {"tested", "searched"}
-        A trace test passed, and no track was lost; or not.
-    evidence : tuple of str
-        The reasons, with numbers.
-    condition : (n,) array
-        Condition numbers of the unknowns in the conditions.
-    fitness : sequence
-        Of each, see ``Fitness``; found when first asked for.
-    rejected : tuple
-        Mechanisms that ``require``, ``conditions`` and ``bounds`` left out: ``mechanism``, ``values``, ``reasons``.
-
-    Examples
-    --------
-    >>> import mechgraph as mg
-    >>> links = [mg.Link("frame"), mg.Link("crank"), mg.Link("body")]
-    >>> A = mg.Pair("A", "R", "frame", "crank", point=(0, 0))
-    >>> B = mg.Pair("B", "R", "crank", "body", point=(1, 0))
-    >>> m = mg.Mechanism("crank", links, [A, B], planar=True)
-    >>> poses = mg.poses("body", [[0, 0, 0], [1, 0.5, 0.4], [2, 0.4, 1.1]])
-    >>> s = mg.synthesize(m, poses, ["B.point"])
-    >>> len(s), s.unknown, bool(s.residual[0] < 1e-12)
-    (1, ('B.point.x', 'B.point.y'), True)
-    """
-
-    mechanism: Mechanism
-    mechanisms: tuple[Mechanism, ...]
-    unknown: tuple[str, ...]
-    values: Array
-    poses: Array
-    coordinates: Array
-    residual: Array
-    complex: ComplexSyntheses
-    total: int | None
-    degenerate: tuple[Degenerate, ...]
-    infinite: int
-    completeness: str
-    evidence: tuple[str, ...]
-    condition: Array
-    fitness: Sequence[Fitness]
-    classes: int | None = None
-    symmetries: tuple[Symmetry, ...] = ()
-    copies: tuple[tuple[int, ...], ...] = ()
-    rejected: tuple[RejectedAnswer, ...] = ()
-
-    def __len__(self) -> int:
-        return len(self.mechanisms)
-
-    def __getitem__(self, i: int | slice) -> Any:
-        return self.mechanisms[i]
-
-    def __iter__(self) -> Iterator[Mechanism]:
-        return iter(self.mechanisms)
-
-    def field(self, name: str) -> Array:
-        """Values ``(n,)`` of one unknown number.
-
-        Raises
-        ------
-        DeclarationError
-            where it was none.
-        """
-        if name not in self.unknown:
-            raise DeclarationError("syntheses", [f"field {name!r}: unknown were {', '.join(self.unknown)}"])
-        return np.asarray(self.values[:, self.unknown.index(name)])
-
-    def taken(self, which: Sequence[int]) -> Syntheses:
-        """Some of them, in that order; what is said of the whole stays.
-
-        Raises
-        ------
-        DeclarationError
-            where there is no such one.
-        """
-        faults = list[str]()
-        k = [place_among(i, len(self), "which", "syntheses") for i in items_of(which, "which", faults)]
-        if faults:
-            raise DeclarationError("syntheses", faults)
-        place = {old: new for new, old in enumerate(k)}
-        return replace(
-            self,
-            copies=tuple(tuple(sorted(place[j] for j in self.copies[i] if j in place)) for i in k if self.copies),
-            mechanisms=tuple(self.mechanisms[i] for i in k),
-            fitness=Fitnesses([partial(self.fitness.__getitem__, i) for i in k]),
-            **{name: getattr(self, name)[k] for name in ("values", "poses", "coordinates", "residual", "condition")},
-        )
-
-    @property
-    def distinct(self) -> Syntheses:
-        """The first of every set of copies."""
-        return self.taken([i for i in range(len(self)) if not self.copies or self.copies[i][0] == i])
-
-    @property
-    def good(self) -> Syntheses:
-        """Those without a defect that is known; all without a driver, see ``Fitness``."""
-        return self.taken([i for i, fit in enumerate(self.fitness) if fit.good])
-
-    def ranked(self, by: str | Callable[[Mechanism], float] = "transmission") -> Syntheses:
-        """Sort the mechanisms, the best first.
-
-        Parameters
-        ----------
-        by : str or callable
-            ``"transmission"`` (the worst one, falling), ``"size"``, ``"ratio"``, ``"error"``, or a function of a Mechanism, rising.
-
-        Returns
-        -------
-        Syntheses
-
-        Raises
-        ------
-        DeclarationError
-            No such quantity; a function that returns no number.
-        """
-        names = ("transmission", "size", "ratio", "error")
-        if not callable(by) and by not in names:
-            raise DeclarationError("syntheses", [wrong(by, "by", f"{', '.join(map(repr, names))}, or a function")])
-        values = [by(m) for m in self] if callable(by) else [getattr(fit, by) for fit in self.fitness]
-        if (numbers := real_array(values)) is None or numbers.shape != (len(self),):
-            raise DeclarationError("syntheses", [wrong(values, "by", "a function that returns a number")])
-        sign = -1.0 if by == "transmission" else 1.0
-        return self.taken(
-            sorted(range(len(self)), key=lambda i: (np.isnan(numbers[i]), sign * np.nan_to_num(numbers[i]), i))
-        )
-
-    def _kept(
-        self, require: Sequence[Any], bounds: Mapping[str, Any], limits: Sequence[Any], driver: str | None
-    ) -> Syntheses:
-        """Those without the defects named, with unknowns within bounds, that keep limits; why others were left out is in ``rejected``."""
-        if not (require or bounds or limits):
-            return self
-        keep, out = [], list(self.rejected)
-        for i, m in enumerate(self):
-            lacks = self.fitness[i].lacks(require) if require else ()
-            why = [f"no {name}" if name == "full_turn" else f"{name} defect" for name in lacks]
-            for name, (least, most) in bounds.items():
-                value = self.field(name)[i]
-                why += [] if keeps(value, least, most) else [f"{name} = {value:.6g}"]
-            for name, measure, least, most in limits:
-                values = measure(m, self.coordinates[i], driver)
-                if not keeps(values, least, most):
-                    ends = dict.fromkeys((float(np.min(values)), float(np.max(values))))
-                    why.append(f"{name} = {' to '.join(f'{end:.6g}' for end in ends)}")
-            if why:
-                out.append(RejectedAnswer(m, tuple(self.values[i].tolist()), tuple(why)))
-            else:
-                keep.append(i)
-        return replace(self.taken(keep), rejected=tuple(out))
-
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return a DataFrame, a row per mechanism: unknowns, fitness, residual.
-
-        Returns
-        -------
-        pandas.DataFrame
-
-        Raises
-        ------
-        MissingExtraError
-            Without pandas.
-        """
-        columns = dict(zip(self.unknown, self.values.T, strict=True))
-        columns |= {f.name: [getattr(fit, f.name) for fit in self.fitness] for f in fields(Fitness)}
-        columns |= {"good": [fit.good for fit in self.fitness], "residual": self.residual}
-        return optional("pandas", "pandas").DataFrame(columns)
-
-    def plot(self) -> Any:
-        """Draw all mechanisms side by side at their first position.
-
-        Returns
-        -------
-        Figure
-            Of matplotlib.
-
-        Raises
-        ------
-        MissingExtraError
-            Without matplotlib.
-        """
-        return methods.call("draw_syntheses", self)
-
-    def document(self) -> Document:
-        """A table of the mechanisms, and how sure it is that these are all."""
-        rows = tuple(
-            (
-                str(i),
-                *(f"{v:.6g}" for v in values),
-                "yes" if fit.good else "no",
-                _degrees(fit.transmission),
-                f"{fit.size:.4g}",
-            )
-            for i, (values, fit) in enumerate(zip(self.values, self.fitness, strict=True))
-        )
-        header = ("mechanism", *self.unknown, "good", "transmission [deg]", "size")
-        told = " ".join([f"Completeness: {self.completeness}.", *self.evidence, *(one.text for one in self.degenerate)])
-        if any(fit.branch is None for fit in self.fitness):
-            told += " No single driver determines the positions: nothing is known of defects and transmission."
-        title = f"{self.mechanism.name}: {counted(len(self), 'mechanism')}"
-        title += "" if self.total is None else f", of {counted(self.total, 'solution')} over the complex numbers"
-        left_out = [f"{', '.join(f'{v:.6g}' for v in one.values)}: {'; '.join(one.reasons)}" for one in self.rejected]
-        blocks: list[Block] = [Table(header, rows), Paragraph(told)]
-        return Document(title, blocks + ([Heading("Left out", 2), Bullets(left_out)] if left_out else []))
-
-    @property
-    def data(self) -> SynthesesData:
-        """Everything but arrays of poses as a record."""
-        return SynthesesData(
-            self.mechanism.name,
-            self.unknown,
-            tuple(map(tuple, self.values.tolist())),
-            self.completeness,
-            self.evidence,
-            self.total,
-            self.classes,
-            len(self.complex),
-            self.infinite,
-            self.degenerate,
-            tuple(self.residual.tolist()),
-            tuple(self.fitness),
-            tuple(one.reasons for one in self.rejected),
-        )
-
-    def to_dict(self) -> dict[str, Any]:
-        """The same as plain data."""
-        return plain(self.data)
-
-
-@dataclass(frozen=True, repr=False)
-class SynthesesOver(Shown, Sequence[Syntheses]):
-    """Mechanisms for several values of what is swept, ``s[k][i]``. Returned by ``synthesize`` with ``sweep``.
-
-    Attributes
-    ----------
-    sweep : mapping
-        The values ``(n,)`` given, by name.
-
-    Examples
-    --------
-    >>> import mechgraph as mg
-    >>> links = [mg.Link("frame"), mg.Link("crank"), mg.Link("body")]
-    >>> A = mg.Pair("A", "R", "frame", "crank", point=(0, 0))
-    >>> B = mg.Pair("B", "R", "crank", "body", point=(1, 0))
-    >>> m = mg.Mechanism("crank", links, [A, B], planar=True)
-    >>> poses = mg.poses("body", [[0, 0, 0], [1, 0.5, 0.4], [2, 0.4, 1.1]])
-    >>> s = mg.synthesize(m, poses, ["B.point"], sweep={"A.point.x": [0.0, 0.1]})
-    >>> [len(one) for one in s], s.completeness
-    ([1, 1], 'tested')
-    """
-
-    sweep: Mapping[str, Array]
-    positions: tuple[Syntheses, ...]
-
-    def __len__(self) -> int:
-        return len(self.positions)
-
-    def __getitem__(self, k: int | slice) -> Any:
-        return self.positions[k]
-
-    @property
-    def completeness(self) -> str:
-        """The weakest of all."""
-        return weakest(s.completeness for s in self.positions)
-
-    def document(self) -> Document:
-        """How many mechanisms there are for every value."""
-        rows = tuple(
-            (*(f"{v[k]:.6g}" for v in self.sweep.values()), str(len(s)), str(len(s.complex)), s.completeness)
-            for k, s in enumerate(self.positions)
-        )
-        header = (*self.sweep, "real", "not real", "completeness")
-        return Document(f"{self.positions[0].mechanism.name}: syntheses", (Table(header, rows),))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Everything as plain data."""
-        return {"sweep": plain(dict(self.sweep)), "positions": [s.to_dict() for s in self.positions]}
-
-
-def _degrees(angle: float) -> str:
-    return f"{np.rad2deg(angle):.4g}" if np.isfinite(angle) else "-"
 
 
 class Synthesis:
@@ -573,7 +189,7 @@ class Synthesis:
             tuple(tuple(copies[k]) for k in range(len(values))),
         )
         # of a sweep nothing is said of fitness, which takes longer than the solutions, until it is asked for
-        return out if self.sweep.names else out.taken(sorted(range(len(out)), key=lambda k: _rank(out.fitness[k], k)))
+        return out if self.sweep.names else out._sorted
 
     def _tracks(self, start: TaskStart, found: TaskEnds) -> str:
         N = start.x.shape[1]
@@ -653,12 +269,6 @@ CLOSED_TO = 1e-10
 """Error of closure and task up to which a real solution does what is asked; it is closed to rounding, unless it cannot be."""
 
 
-def _rank(fit: Fitness, k: int) -> tuple[Any, ...]:
-    """Good ones first, then by worst transmission, then by size."""
-    transmission = fit.transmission if np.isfinite(fit.transmission) else -1.0
-    return (not fit.good, -round(transmission, 9), round(fit.size, 9), k)
-
-
 def _neighbors(m: Mechanism) -> list[tuple[int, int]]:
     """Pairs that share a link."""
     ends = [{pair.a, pair.b} for pair in m.pairs]
@@ -730,7 +340,7 @@ class FittedSynthesis:
 
 @door
 def synthesize(
-    m: Mechanism,
+    m: Mechanism | Iterable[Chain],
     tasks: Any = None,
     unknown: Sequence[str] | None = None,
     *,
@@ -754,13 +364,16 @@ def synthesize(
 
     Parameters
     ----------
-    m : Mechanism
-        Its links and pairs; declared values of unknown numbers do not matter, but that fits begin with them.
+    m : Mechanism or iterable of Chain
+        Its links and pairs; declared values of unknown numbers do not matter, but that fits begin with them. Of chains, e.g.
+        ``mg.atlas(6, 1)``, every choice of frame, input and output link becomes a mechanism: pairs that tasks name stand at the frame,
+        links that they name are not joined to it. Answers are ranked together.
     tasks : task or list
         ``poses``, ``path``, ``function``, ``positions``; row 0 is the declared configuration. Default: all that ``m.synthesis``
         holds, but for what is given here.
     unknown : list of str
-        Numbers as ``study`` names them (``"B.point.x"``), or elements: ``"B.point"``, ``"B.axis"``, ``"coupler.tip"``, ``"B"``.
+        Numbers as ``study`` names them (``"B.point.x"``), or elements: ``"B.point"``, ``"B.axis"``, ``"coupler.tip"``, ``"B"``. Default,
+        of chains: as many numbers of pins as there are conditions, moving pins first, the others at random; of fits all pins.
     fit : {"least_squares", "minimax"}, optional
         Make the sum of the squares of the errors of all positions least, or the largest of them. Default: all are met exactly.
     bounds : mapping, optional
@@ -779,7 +392,7 @@ def synthesize(
     starts : int
         From how many dimensions a fit begins: the declared ones, then random ones about these or in ``bounds``.
     seed : int
-        Seed of all random numbers; exact results do not depend on it.
+        Seed of all random numbers; exact results of a mechanism do not depend on it.
     cache : bool
         Keep start solutions in the user's folder.
     progress : callable, optional
@@ -805,6 +418,12 @@ def synthesize(
     >>> len(s), s.total
     (1, 1)
     """
+    if not isinstance(m, Mechanism):
+        given = {
+            "fit": fit, "bounds": bounds, "conditions": conditions, "require": require, "minimize": minimize,
+            "maximize": maximize, "sweep": sweep, "over": over, "starts": starts,
+        }  # fmt: skip
+        return _of_chains(m, tasks, unknown, given, int(seed), cache, progress)
     where, faults = f"synthesis of {m.name!r}", list[str]()
     if tasks is None and unknown is None and m.synthesis is not None:
         asked = {
@@ -845,6 +464,41 @@ def synthesize(
     if sweep:
         return SynthesesOver(dict(zip(found.sweep.names, found.swept, strict=True)), tuple(answers))
     return answers[0]
+
+
+def _of_chains(
+    chains: Iterable[Chain],
+    tasks: Any,
+    unknown: Sequence[str] | None,
+    given: Mapping[str, Any],
+    seed: int,
+    cache: bool,
+    progress: Progress,
+) -> Syntheses:
+    """Answers of all mechanisms that chains make, ranked together; those that refuse the task are told."""
+    if tasks is None or given["sweep"]:
+        raise DeclarationError(WHERE, ["expected tasks, and no sweep: give chains random numbers of another seed"])
+    exact = all(given[name] is None for name in ("fit", "minimize", "maximize"))
+    every, told = structures(chains, tasks, exact, seed)
+    found, refused = list[Syntheses](), list[str]()
+    if progress is not None:
+        for text in [*told, *(f"{one.mechanism.name}: {counted(len(one.unknown), 'unknown')}" for one in every)]:
+            progress(text)
+    for one in every:
+        say = None if progress is None else partial(_said_of, one.mechanism.name, progress)
+        try:
+            found.append(
+                synthesize(one.mechanism, tasks, unknown or one.unknown, **given, seed=seed, cache=cache, progress=say)
+            )
+        except DeclarationError as error:
+            refused += [f"{one.mechanism.name}: {fault}" for fault in error.faults]
+    if not found:
+        raise DeclarationError(WHERE, [*told, *refused])
+    return Syntheses.joined(found, [f"{text}." for text in [*told, *refused]])
+
+
+def _said_of(name: str, progress: Callable[[str], None], text: str) -> None:
+    progress(f"{name}: {text}")
 
 
 _USUAL = {one.name: one.default for one in fields(SynthesisSetup)}

@@ -1,0 +1,471 @@
+"""Mechanisms that do what is asked, as they are returned."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+
+from mechgraph import methods
+from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table
+from mechgraph.errors import DeclarationError, counted
+from mechgraph.files import optional, plain
+from mechgraph.maths.se3 import Array
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.modes.assemblies import weakest
+from mechgraph.quantities import items_of, place_among, real_array, wrong
+from mechgraph.synthesis.fitness import Fitness, keeps
+from mechgraph.synthesis.symmetries import Symmetry
+
+if TYPE_CHECKING:
+    import pandas
+
+
+@dataclass(frozen=True)
+class ComplexSyntheses:
+    """Solutions that are not real: ``values (k, u)`` of the unknowns."""
+
+    values: Array
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+
+@dataclass(frozen=True)
+class Degenerate:
+    """Solutions of the equations that are no mechanisms of their own, and that ``total`` does not count."""
+
+    kind: Annotated[str, "double, coincident or reversed"]
+    count: int
+    text: str
+
+
+class Fitnesses(Sequence[Fitness]):
+    """Fitness of mechanisms, each found when first asked for."""
+
+    def __init__(self, makers: Sequence[Callable[[], Fitness]]) -> None:
+        self._makers = tuple(makers)
+
+    def __len__(self) -> int:
+        return len(self._makers)
+
+    def __getitem__(self, i: int | slice) -> Any:
+        return tuple(make() for make in self._makers[i]) if isinstance(i, slice) else self._makers[i]()
+
+    @classmethod
+    def of(cls, found: tuple[Fitness, ...]) -> Fitnesses:
+        """Those that are known."""
+        return cls([partial(found.__getitem__, i) for i in range(len(found))])
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Fitnesses.of, (tuple(self),)  # found before they go elsewhere
+
+
+@dataclass(frozen=True)
+class RejectedAnswer:
+    """A mechanism that does what is asked and fell for a condition."""
+
+    mechanism: Mechanism
+    values: tuple[float, ...]
+    reasons: Annotated[tuple[str, ...], "defects, and conditions that it does not keep"]
+
+
+@dataclass(frozen=True)
+class SynthesesData:
+    """All mechanisms that do what is asked, and how sure it is that these are all."""
+
+    mechanism: str
+    unknown: tuple[str, ...]
+    values: Annotated[tuple[tuple[float, ...], ...], "of every mechanism"]
+    completeness: Annotated[str, "proved, tested or searched"]
+    evidence: tuple[str, ...]
+    total: Annotated[int | None, "over the complex numbers, for general data; none of fits"]
+    classes: Annotated[int | None, "the same, those as one that symmetries make of each other"]
+    complex: Annotated[int, "how many are not real"]
+    infinite: Annotated[int, "how many went to infinity here"]
+    degenerate: tuple[Degenerate, ...]
+    residual: tuple[float, ...]
+    fitness: tuple[Fitness, ...]
+    rejected: Annotated[tuple[tuple[str, ...], ...], "of every mechanism that was left out, why"]
+    mechanism_of: Annotated[tuple[str, ...], "of chains: of every mechanism the one that it comes from"] = ()
+
+
+@dataclass(frozen=True, repr=False)
+class Syntheses(Shown, Sequence[Mechanism]):
+    """All real mechanisms of a topology that do what is asked, each a Mechanism with ``start`` at row 0. Returned by ``synthesize``.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+        As declared.
+    unknown : tuple of str
+        The numbers that were sought.
+    values : (n, u) array
+        Their values.
+    poses : (n, rows, N, 4, 4) array
+        Poses of all links at every row.
+    coordinates : (n, rows, F) array
+        All freedoms [rad, length].
+    residual : (n,) array
+        Worst error of closure or task at any row (radians, lengths over the size of the task).
+    complex : object
+        ``values (k, u)`` of the solutions that are not real.
+    total : int or None
+        Finite nondegenerate solutions over the complex numbers for general data of this task.
+    classes : int
+        The same, those as one that symmetries make of each other.
+    symmetries : tuple
+        Exchanges of pairs that make a solution of a solution: ``name``, ``order``, ``text``.
+    copies : tuple
+        For each mechanism the numbers of those that symmetries make of it, itself too.
+    degenerate : tuple
+        Solutions that are no mechanisms of their own: ``kind``, ``count``, ``text``.
+    infinite : int
+        How many went to infinity here.
+    completeness : {"tested", "searched"}
+        A trace test passed, and no track was lost; or not.
+    evidence : tuple of str
+        The reasons, with numbers.
+    condition : (n,) array
+        Condition numbers of the unknowns in the conditions.
+    fitness : sequence
+        Of each, see ``Fitness``; found when first asked for.
+    rejected : tuple
+        Mechanisms that ``require``, ``conditions`` and ``bounds`` left out: ``mechanism``, ``values``, ``reasons``.
+    mechanism_of : tuple of Mechanism
+        For each the mechanism that it comes from: of chains one of many, with numbers of their own; what one does not have is NaN.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> links = [mg.Link("frame"), mg.Link("crank"), mg.Link("body")]
+    >>> A = mg.Pair("A", "R", "frame", "crank", point=(0, 0))
+    >>> B = mg.Pair("B", "R", "crank", "body", point=(1, 0))
+    >>> m = mg.Mechanism("crank", links, [A, B], planar=True)
+    >>> poses = mg.poses("body", [[0, 0, 0], [1, 0.5, 0.4], [2, 0.4, 1.1]])
+    >>> s = mg.synthesize(m, poses, ["B.point"])
+    >>> len(s), s.unknown, bool(s.residual[0] < 1e-12)
+    (1, ('B.point.x', 'B.point.y'), True)
+    """
+
+    mechanism: Mechanism
+    mechanisms: tuple[Mechanism, ...]
+    unknown: tuple[str, ...]
+    values: Array
+    poses: Array
+    coordinates: Array
+    residual: Array
+    complex: ComplexSyntheses
+    total: int | None
+    degenerate: tuple[Degenerate, ...]
+    infinite: int
+    completeness: str
+    evidence: tuple[str, ...]
+    condition: Array
+    fitness: Sequence[Fitness]
+    classes: int | None = None
+    symmetries: tuple[Symmetry, ...] = ()
+    copies: tuple[tuple[int, ...], ...] = ()
+    rejected: tuple[RejectedAnswer, ...] = ()
+    sources: tuple[Mechanism, ...] = ()
+
+    @property
+    def mechanism_of(self) -> tuple[Mechanism, ...]:
+        """The mechanism from which each one comes."""
+        return self.sources or (self.mechanism,) * len(self)
+
+    @staticmethod
+    def joined(found: Sequence[Syntheses], told: Sequence[str]) -> Syntheses:
+        """Answers of several mechanisms in one order, with what is told of the whole."""
+        unknown = tuple(dict.fromkeys(name for s in found for name in s.unknown))
+        first = np.cumsum([0, *map(len, found)]).tolist()
+
+        def padded(arrays: Sequence[Array]) -> Array:
+            shape = np.max([a.shape[1:] for a in arrays], axis=0)
+            ends = [[(0, 0), *((0, int(n)) for n in shape - a.shape[1:])] for a in arrays]
+            return np.concatenate([np.pad(a, end, constant_values=np.nan) for a, end in zip(arrays, ends, strict=True)])
+
+        def by_name(s: Syntheses, values: Array) -> Array:
+            out = np.full((len(values), len(unknown)), np.nan, dtype=values.dtype)
+            out[:, [unknown.index(name) for name in s.unknown[: values.shape[1]]]] = values
+            return out
+
+        def whole(name: str) -> int | None:
+            counts = [getattr(s, name) for s in found]
+            return None if None in counts else sum(counts)
+
+        out = Syntheses(
+            found[0].mechanism,
+            tuple(m for s in found for m in s),
+            unknown,
+            np.concatenate([by_name(s, s.values) for s in found]),
+            padded([s.poses for s in found]),
+            padded([s.coordinates for s in found]),
+            np.concatenate([s.residual for s in found]),
+            ComplexSyntheses(np.concatenate([by_name(s, s.complex.values) for s in found])),
+            whole("total"),
+            tuple(replace(one, text=f"{s.mechanism.name}: {one.text}") for s in found for one in s.degenerate),
+            sum(s.infinite for s in found),
+            weakest(s.completeness for s in found),
+            (*told, *(f"{s.mechanism.name}: {text}" for s in found for text in s.evidence)),
+            np.concatenate([s.condition for s in found]),
+            Fitnesses([partial(s.fitness.__getitem__, k) for s in found for k in range(len(s))]),
+            whole("classes"),
+            tuple(one for s in found for one in s.symmetries),
+            tuple(tuple(n + k for k in mine) for n, s in zip(first, found, strict=False) for mine in s.copies),
+            tuple(one for s in found for one in s.rejected),
+            tuple(s.mechanism for s in found for _ in s),
+        )
+        return out._sorted
+
+    @property
+    def _sorted(self) -> Syntheses:
+        """Good ones first, then by worst transmission, then by size."""
+        return self.taken(sorted(range(len(self)), key=lambda k: _rank(self.fitness[k], k)))
+
+    def __len__(self) -> int:
+        return len(self.mechanisms)
+
+    def __getitem__(self, i: int | slice) -> Any:
+        return self.mechanisms[i]
+
+    def __iter__(self) -> Iterator[Mechanism]:
+        return iter(self.mechanisms)
+
+    def field(self, name: str) -> Array:
+        """Values ``(n,)`` of one unknown number.
+
+        Raises
+        ------
+        DeclarationError
+            where it was none.
+        """
+        if name not in self.unknown:
+            raise DeclarationError("syntheses", [f"field {name!r}: unknown were {', '.join(self.unknown)}"])
+        return np.asarray(self.values[:, self.unknown.index(name)])
+
+    def taken(self, which: Sequence[int]) -> Syntheses:
+        """Some of them, in that order; what is said of the whole stays.
+
+        Raises
+        ------
+        DeclarationError
+            where there is no such one.
+        """
+        faults = list[str]()
+        k = [place_among(i, len(self), "which", "syntheses") for i in items_of(which, "which", faults)]
+        if faults:
+            raise DeclarationError("syntheses", faults)
+        place = {old: new for new, old in enumerate(k)}
+        return replace(
+            self,
+            copies=tuple(tuple(sorted(place[j] for j in self.copies[i] if j in place)) for i in k if self.copies),
+            mechanisms=tuple(self.mechanisms[i] for i in k),
+            sources=tuple(self.sources[i] for i in k if self.sources),
+            fitness=Fitnesses([partial(self.fitness.__getitem__, i) for i in k]),
+            **{name: getattr(self, name)[k] for name in ("values", "poses", "coordinates", "residual", "condition")},
+        )
+
+    @property
+    def distinct(self) -> Syntheses:
+        """The first of every set of copies."""
+        return self.taken([i for i in range(len(self)) if not self.copies or self.copies[i][0] == i])
+
+    @property
+    def good(self) -> Syntheses:
+        """Those without a defect that is known; all without a driver, see ``Fitness``."""
+        return self.taken([i for i, fit in enumerate(self.fitness) if fit.good])
+
+    def ranked(self, by: str | Callable[[Mechanism], float] = "transmission") -> Syntheses:
+        """Sort the mechanisms, the best first.
+
+        Parameters
+        ----------
+        by : str or callable
+            ``"transmission"`` (the worst one, falling), ``"size"``, ``"ratio"``, ``"error"``, or a function of a Mechanism, rising.
+
+        Returns
+        -------
+        Syntheses
+
+        Raises
+        ------
+        DeclarationError
+            No such quantity; a function that returns no number.
+        """
+        names = ("transmission", "size", "ratio", "error")
+        if not callable(by) and by not in names:
+            raise DeclarationError("syntheses", [wrong(by, "by", f"{', '.join(map(repr, names))}, or a function")])
+        values = [by(m) for m in self] if callable(by) else [getattr(fit, by) for fit in self.fitness]
+        if (numbers := real_array(values)) is None or numbers.shape != (len(self),):
+            raise DeclarationError("syntheses", [wrong(values, "by", "a function that returns a number")])
+        sign = -1.0 if by == "transmission" else 1.0
+        return self.taken(
+            sorted(range(len(self)), key=lambda i: (np.isnan(numbers[i]), sign * np.nan_to_num(numbers[i]), i))
+        )
+
+    def _kept(
+        self, require: Sequence[Any], bounds: Mapping[str, Any], limits: Sequence[Any], driver: str | None
+    ) -> Syntheses:
+        """Those without the defects named, with unknowns within bounds, that keep limits; why others were left out is in ``rejected``."""
+        if not (require or bounds or limits):
+            return self
+        keep, out = [], list(self.rejected)
+        for i, m in enumerate(self):
+            lacks = self.fitness[i].lacks(require) if require else ()
+            why = [f"no {name}" if name == "full_turn" else f"{name} defect" for name in lacks]
+            for name, (least, most) in bounds.items():
+                value = self.field(name)[i]
+                why += [] if keeps(value, least, most) else [f"{name} = {value:.6g}"]
+            for name, measure, least, most in limits:
+                values = measure(m, self.coordinates[i], driver)
+                if not keeps(values, least, most):
+                    ends = dict.fromkeys((float(np.min(values)), float(np.max(values))))
+                    why.append(f"{name} = {' to '.join(f'{end:.6g}' for end in ends)}")
+            if why:
+                out.append(RejectedAnswer(m, tuple(self.values[i].tolist()), tuple(why)))
+            else:
+                keep.append(i)
+        return replace(self.taken(keep), rejected=tuple(out))
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a DataFrame, a row per mechanism: unknowns, fitness, residual.
+
+        Returns
+        -------
+        pandas.DataFrame
+
+        Raises
+        ------
+        MissingExtraError
+            Without pandas.
+        """
+        columns = dict(zip(self.unknown, self.values.T, strict=True))
+        columns |= {f.name: [getattr(fit, f.name) for fit in self.fitness] for f in fields(Fitness)}
+        columns |= {"good": [fit.good for fit in self.fitness], "residual": self.residual}
+        return optional("pandas", "pandas").DataFrame(columns)
+
+    def plot(self) -> Any:
+        """Draw all mechanisms side by side at their first position.
+
+        Returns
+        -------
+        Figure
+            Of matplotlib.
+
+        Raises
+        ------
+        MissingExtraError
+            Without matplotlib.
+        """
+        return methods.call("draw_syntheses", self)
+
+    def document(self) -> Document:
+        """A table of the mechanisms, and how sure it is that these are all."""
+        several = bool(self.sources)
+        rows = tuple(
+            (
+                str(i),
+                *([self.sources[i].name] if several else [f"{v:.6g}" for v in values]),
+                "yes" if fit.good else "no",
+                _degrees(fit.transmission),
+                f"{fit.size:.4g}",
+            )
+            for i, (values, fit) in enumerate(zip(self.values, self.fitness, strict=True))
+        )
+        header = ("mechanism", *(["of"] if several else self.unknown), "good", "transmission [deg]", "size")
+        told = " ".join([f"Completeness: {self.completeness}.", *self.evidence, *(one.text for one in self.degenerate)])
+        if any(fit.branch is None for fit in self.fitness):
+            told += " No single driver determines the positions: nothing is known of defects and transmission."
+        title = f"{'chains' if several else self.mechanism.name}: {counted(len(self), 'mechanism')}"
+        title += "" if self.total is None else f", of {counted(self.total, 'solution')} over the complex numbers"
+        left_out = [f"{', '.join(f'{v:.6g}' for v in one.values)}: {'; '.join(one.reasons)}" for one in self.rejected]
+        blocks: list[Block] = [Table(header, rows), Paragraph(told)]
+        return Document(title, blocks + ([Heading("Left out", 2), Bullets(left_out)] if left_out else []))
+
+    @property
+    def data(self) -> SynthesesData:
+        """Everything but arrays of poses as a record."""
+        return SynthesesData(
+            self.mechanism.name,
+            self.unknown,
+            tuple(map(tuple, self.values.tolist())),
+            self.completeness,
+            self.evidence,
+            self.total,
+            self.classes,
+            len(self.complex),
+            self.infinite,
+            self.degenerate,
+            tuple(self.residual.tolist()),
+            tuple(self.fitness),
+            tuple(one.reasons for one in self.rejected),
+            tuple(m.name for m in self.sources),
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The same as plain data."""
+        return plain(self.data)
+
+
+@dataclass(frozen=True, repr=False)
+class SynthesesOver(Shown, Sequence[Syntheses]):
+    """Mechanisms for several values of what is swept, ``s[k][i]``. Returned by ``synthesize`` with ``sweep``.
+
+    Attributes
+    ----------
+    sweep : mapping
+        The values ``(n,)`` given, by name.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> links = [mg.Link("frame"), mg.Link("crank"), mg.Link("body")]
+    >>> A = mg.Pair("A", "R", "frame", "crank", point=(0, 0))
+    >>> B = mg.Pair("B", "R", "crank", "body", point=(1, 0))
+    >>> m = mg.Mechanism("crank", links, [A, B], planar=True)
+    >>> poses = mg.poses("body", [[0, 0, 0], [1, 0.5, 0.4], [2, 0.4, 1.1]])
+    >>> s = mg.synthesize(m, poses, ["B.point"], sweep={"A.point.x": [0.0, 0.1]})
+    >>> [len(one) for one in s], s.completeness
+    ([1, 1], 'tested')
+    """
+
+    sweep: Mapping[str, Array]
+    positions: tuple[Syntheses, ...]
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def __getitem__(self, k: int | slice) -> Any:
+        return self.positions[k]
+
+    @property
+    def completeness(self) -> str:
+        """The weakest of all."""
+        return weakest(s.completeness for s in self.positions)
+
+    def document(self) -> Document:
+        """How many mechanisms there are for every value."""
+        rows = tuple(
+            (*(f"{v[k]:.6g}" for v in self.sweep.values()), str(len(s)), str(len(s.complex)), s.completeness)
+            for k, s in enumerate(self.positions)
+        )
+        header = (*self.sweep, "real", "not real", "completeness")
+        return Document(f"{self.positions[0].mechanism.name}: syntheses", (Table(header, rows),))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything as plain data."""
+        return {"sweep": plain(dict(self.sweep)), "positions": [s.to_dict() for s in self.positions]}
+
+
+def _degrees(angle: float) -> str:
+    return f"{np.rad2deg(angle):.4g}" if np.isfinite(angle) else "-"
+
+
+def _rank(fit: Fitness, k: int) -> tuple[Any, ...]:
+    """Good ones first, then by worst transmission, then by size."""
+    transmission = fit.transmission if np.isfinite(fit.transmission) else -1.0
+    return (not fit.good, -round(transmission, 9), round(fit.size, 9), k)
