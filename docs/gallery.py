@@ -76,6 +76,12 @@ def turn(name: str, speed: float = 10.0, end: float = 360.0) -> Callable[[], dic
     return lambda: {name: mg.Motion(np.deg2rad(np.linspace(0.0, end, 73)), velocity=speed)}
 
 
+def corner() -> dict[str, Any]:
+    """Both wheels of an axle that takes a corner."""
+    t = np.linspace(0.0, 1.0, 73)
+    return {"L": mg.Motion(5.0 * t, 5.0), "R": mg.Motion(8.0 * t, 8.0)}
+
+
 def dig() -> mg.Solution:
     """The excavator of example 12 on its path."""
     names = runpy.run_path(str(ROOT / "examples" / "12_excavator.py"))
@@ -168,20 +174,13 @@ def engine() -> mg.Solution:
     return mg.solve(m, {"A": mg.Motion(np.linspace(0.0, 4 * np.pi, 145), velocity=200.0)})
 
 
-def cam() -> mg.Solution:
-    """A cam that lifts a rod through a roller against a spring, in the plane."""
-    u = np.linspace(0.0, 2 * np.pi, 73)
-    lift, slope, bend = 0.008 * (1 - np.cos(u)), 0.008 * np.sin(u), 0.008 * np.cos(u)
-    profile = mg.Curve.cam(
-        angle=u,
-        lift=lift,
-        slope=slope,
-        bend=bend,
-        base_radius=0.03,
-        roller_radius=0.009,
-        offset=0.006,
-        second=(0, 1, 0),
-    )
+def scca() -> mg.Solution:
+    """A cam with SCCA rise and return that lifts a rod through a roller against a spring, in the plane."""
+    shares = {"sine": 0.25, "constant": 0.5, "cosine": 0.25}
+    flanks = [mg.Segment("scca", rise, over=2.0, **shares) for rise in (0.016, -0.016)]
+    rest = mg.Segment("dwell", over=2 * np.pi - 5.0)
+    law = mg.CamLaw([flanks[0], mg.Segment("dwell", over=1.0), flanks[1], rest])
+    profile = mg.Curve.cam(law=law, base_radius=0.03, roller_radius=0.009, offset=0.006, second=(0, 1, 0))
     top = np.sqrt(0.039**2 - 0.006**2)
     pairs = [
         mg.Pair("A", "R", "frame", "cam", point=(0, 0)), mg.Pair("B", "Ps", "cam", "rod", curve=profile, closed="force"),
@@ -190,7 +189,74 @@ def cam() -> mg.Solution:
     spring = mg.Spring("frame", "rod", (-0.006, top + 0.11), (-0.006, top + 0.05), stiffness=2e3, free_length=0.07)
     links = [mg.Link("frame"), mg.Link("cam"), mg.Link("rod", 0.3, (-0.006, top + 0.02), 1e-4)]
     m = mg.Mechanism("cam with roller", links, pairs, ["A"], [spring], planar=True, units=SI)
-    return mg.solve(m, {"A": mg.Motion(u, velocity=30.0)})
+    return mg.solve(m, {"A": mg.Motion(np.linspace(0.0, 2 * np.pi, 73), velocity=30.0)})
+
+
+def indexer() -> mg.Solution:
+    """A barrel cam that carries a table on and holds it: its roller runs between the walls of a groove."""
+    law = mg.CamLaw([
+        mg.Segment("modified_sine", 0.06, over=2.4), mg.Segment("dwell", over=0.8),
+        mg.Segment("modified_sine", -0.06, over=2.4), mg.Segment("dwell", over=2 * np.pi - 5.6),
+    ])  # fmt: skip
+    barrel, at = mg.Curve.barrel(law=law, radius=0.05, roller_radius=0.008, second=(1, 0, 0)), (0.05, 0, 0)
+    pairs = [
+        mg.Pair("A", "R", "frame", "barrel", point=(0, 0, -0.02), axis=(0, 0, 1)),
+        mg.Pair("K", "Rg", "barrel", "table", curve=barrel, point=at),
+        mg.Pair("B", "P", "frame", "table", point=(0.09, 0, 0), axis=(0, 0, 1)),
+    ]
+    links = [mg.Link("frame"), mg.Link("barrel"), mg.Link("table", 4.0, (0.09, 0, 0))]
+    m = mg.Mechanism("barrel indexer", links, pairs, ["A"], units=SI)
+    return mg.solve(m, {"A": mg.Motion(np.linspace(0.0, 2 * np.pi, 73), velocity=10.0)})
+
+
+def serpentine() -> mg.Solution:
+    """A serpentine belt: five pulleys, two of them on its back, one of these the idler of a tensioner."""
+    at = {
+        "crank": (0.0, 0.0),
+        "alternator": (0.2, 0.1),
+        "idler": (0.125, 0.14),
+        "steering": (0.02, 0.24),
+        "pump": (-0.06, 0.13),
+    }
+    radii = {"crank": 0.07, "alternator": 0.03, "idler": 0.035, "steering": 0.06, "pump": 0.05}
+    pairs = [mg.Pair(k, "R", "arm" if k == "idler" else "frame", k, point=p) for k, p in at.items()]
+    pairs.append(mg.Pair("arm", "R", "frame", "arm", point=(0.15, 0.21)))
+    belt = mg.BeltDrive("belt", over=[*at], backs=["idler", "pump"], toothed=False)
+    loads = [mg.Effort(k, M) for k, M in (("alternator", -4.0), ("steering", -9.0), ("pump", 3.0))]
+    m = mg.Mechanism(
+        "serpentine belt", pairs=pairs, gears=[mg.Pulley(k, k, p, radius=radii[k]) for k, p in at.items()], drives=["crank"],
+        couplings=[belt], loads=[*loads, mg.TorsionSpring("arm", stiffness=40.0, free=-1.0)], planar=True, units=SI,
+    )  # fmt: skip
+    return mg.solve(m, {"crank": mg.Motion(np.linspace(0.0, 4 * np.pi, 73), velocity=100.0)})
+
+
+def v_twin() -> mg.Solution:
+    """A V-twin that its gas forces, known over the angle of the crank, speed up against a load."""
+    reach, rod = 0.04, 0.14
+    angle = np.deg2rad([0, 10, 25, 60, 120, 180, 360, 540, 600, 660, 700, 720])
+    gas = np.array([3.2, 4.0, 2.4, 0.8, 0.3, 0.1, 0.1, 0.1, 0.2, 0.6, 1.8, 3.2]) * 1e3
+    pin = np.array([reach * np.sin(np.pi / 4), reach * np.cos(np.pi / 4)])
+    links = [mg.Link("frame"), mg.Link("crank", 3.0, (0.0, 0.0), 0.03)]
+    pairs, loads = [mg.Pair("A", "R", "frame", "crank", point=(0, 0))], []
+    for name, side in (("left", -1.0), ("right", 1.0)):
+        along = np.array([side, 1.0]) / np.sqrt(2)
+        across = pin - (pin @ along) * along
+        top = (pin @ along + np.sqrt(rod**2 - across @ across)) * along
+        links += [mg.Link(f"{name} rod", 0.4, (pin + top) / 2, 8e-4), mg.Link(f"{name} piston", 0.3, top, 1e-4)]
+        pairs += [
+            mg.Pair(f"{name} pin", "R", "crank", f"{name} rod", point=pin),
+            mg.Pair(f"{name} eye", "R", f"{name} rod", f"{name} piston", point=top),
+            mg.Pair(name, "P", "frame", f"{name} piston", point=top, axis=along),
+        ]
+        # a table over the angle of the crank, which begins at the dead center of the right piston
+        firing = angle - 4 * np.pi + (np.pi / 2 if side < 0 else 0.0)
+        cycles = np.concatenate([firing[:-1] + 4 * np.pi * k for k in range(6)] + [firing[:1] + 24 * np.pi])
+        table = mg.ForceTable(x=cycles, force=-np.append(np.tile(gas[:-1], 6), gas[0]))
+        loads.append(mg.ForceLaw(name, reads="A", law=table))
+    about = "V-twin in time: gas forces on both pistons, read from the angle of the crank"
+    loads.append(mg.Damper(freedom="A", coefficient=0.2))
+    m = mg.Mechanism("V-twin", links, pairs, [], loads, planar=True, units=SI, description=about)
+    return mg.respond(m, np.linspace(0.0, 0.16, 161), rates={"A": 100.0})
 
 
 def page(name: str, blocks: int) -> dict[str, Any]:
@@ -251,10 +317,14 @@ ENTRIES = [
     Entry("Andrews' squeezer", library("andrews"), "../explanation/forward-dynamics.md"),
     Entry("Geneva wheel", library("geneva"), "../how-to/slots-and-curves.md"),
     Entry("Cam with roller arm", example("16", "mechanism", turn("A", 20.0)), "../how-to/cam.md"),
-    Entry("Cam with roller", cam, "../how-to/cam.md"),
-    Entry("Two stages of gears", stages, "../how-to/gears.md"),
-    Entry("Planetary set with a floating sun", floating_sun, "../how-to/gears.md"),
-    Entry("Belt drive with a tensioner", tensioner, "../how-to/belts.md"),
+    Entry("SCCA cam with roller", scca, "../tutorials/cam-from-law-to-dxf.md"),
+    Entry("Barrel indexer", indexer, "../how-to/cam.md"),
+    Entry("Two stages of gears", stages, "../tutorials/helical-reducer.md"),
+    Entry("Differential", example("14", "rear_axle", corner), "../how-to/gears.md"),
+    Entry("Planetary set with a floating sun", floating_sun, "../how-to/floating-sun.md"),
+    Entry("Belt drive with a tensioner", tensioner, "../how-to/idler-and-tensioner.md"),
+    Entry("Serpentine belt", serpentine, "../how-to/belts.md"),
+    Entry("V-twin with gas forces in time", v_twin, "../how-to/planar.md"),
     Entry("Engine in the plane", engine, "../how-to/planar.md"),
     Entry("Toggle press with friction", press, "../tutorials/press.md"),
     Entry("Con-rod bearing of an engine", bearing, "../how-to/oil-film.md"),

@@ -71,6 +71,7 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import declared
 from mechgraph.outcome import FollowedPositions, Options, Outcome, Starts
 from mechgraph.quantities import door, wrong
+from mechgraph.result.contacts import with_other_flanks
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import OK, ranges
 from mechgraph.result.views import CouplingResult, PositionLabels
@@ -431,6 +432,9 @@ def _solved(
     if outcome.found is None and not np.isin(solution.status, SOLVED).all():  # numpy says how far the path led
         line, outcome = _outcome(m, motions, replace(options, engine=line.engine), actuate)
         solution = Solution(outcome.trajectory)
+    own, tol = (m.declared, m.changes.tol) if isinstance(m, SnappedMechanism) else (m, None)
+    if (other := with_other_flanks(own, outcome.trajectory)) is not None:
+        return _solved(meant(other, tol, "solve"), motions, on_reach, options, actuate, quiet)
     for warning in () if quiet else solution.doubts:
         warnings.warn(f"mechanism {m.name!r}: {warning}", MechgraphWarning, stacklevel=5)
     error = _unreached(line, outcome, solution) if on_reach == "raise" else None

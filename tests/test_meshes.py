@@ -366,7 +366,7 @@ def test_energy_of_a_planet_on_a_swinging_arm_and_a_sun_on_springs():
 
 
 def test_a_flank_that_would_pull_is_a_warning():
-    """One flank where centers move, the one that was asked for: forces of the wrong sense are told, with their range."""
+    """One flank where centers move, the one asked for, or that presses first: forces of the wrong sense are told with their range."""
     pairs = [
         mg.Pair("A", "R", "frame", "one", point=(0, 0, 0), axis=Z),
         mg.Pair("P", "P", "frame", "slide", point=(0.0605, 0, 0), axis=X),
@@ -376,7 +376,7 @@ def test_a_flank_that_would_pull_is_a_warning():
     given = {"A": np.zeros(3), "P": [0.0, 1e-4, 2e-4]}
     for flank, torque, pulls in (
         ("auto", 3.0, False),
-        ("auto", -3.0, True),
+        ("auto", -3.0, False),
         ("backward", -3.0, False),
         ("backward", 3.0, True),
     ):
@@ -390,8 +390,18 @@ def test_a_flank_that_would_pull_is_a_warning():
         )
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            found = [str(w) for w in mg.solve(m, given).warnings]
-        assert any("would have to pull" in one for one in found) is pulls
+            s = mg.solve(m, given)
+        assert any("would have to pull" in str(one) for one in s.warnings) is pulls
+        if flank == "auto":  # as the one that is named, positions included
+            named = mg.solve(
+                m.replace(couplings=[mg.Mesh("m", "a", "b", flank="forward" if torque > 0 else "backward")]), given
+            )
+            for what in ("position", "force"):
+                np.testing.assert_allclose(getattr(s["B"], what), getattr(named["B"], what), rtol=1e-12, atol=1e-15)
+    # a load that turns round keeps the first flank
+    swings = [mg.ForceLaw("B", reads="P", law=lambda x, v, t: -3.0 + 4e4 * x)]
+    with pytest.warns(mg.MechgraphWarning, match="pull from A.Rz = 0 deg, P.Tz = 7.5e-05"):
+        mg.solve(m.replace(couplings=[mg.Mesh("m", "a", "b")], loads=swings), given)
 
 
 # --- planets -----------------------------------------------------------------------------------------------------------------

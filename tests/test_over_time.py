@@ -251,3 +251,37 @@ def test_it_can_be_read() -> None:
     assert "1.5708 s, over a whole cycle of 1 revolution;" in text
     assert "effort of A.Rz [N m]" in text
     assert "Work per revolution" in text
+
+
+def test_teeth_and_strands_have_figures_and_columns() -> None:
+    """A weight on the wheel turns it with m g r cos q: ``N = |T| / r_b``, strands ``T0 +- T / (2 r)``."""
+    w, r, d, teeth = 4.0, 0.1, 0.3, (40, 40)
+    links = [mg.Link("frame"), mg.Link("p"), mg.Link("w", M, (d + R, 0, 0))]
+    pairs = [mg.Pair(k, "R", "frame", k, point=(x, 0, 0), axis=Z) for k, x in (("p", 0), ("w", d))]
+    gears = [
+        mg.Gear(k, k, n, (x, 0, 0), Z, module=d / 40) for (k, x), n in zip((("p", 0), ("w", d)), teeth, strict=True)
+    ]
+    stage = mg.Mechanism(
+        "stage", links, pairs, ["p"], [mg.Gravity((0, -G, 0))], gears=gears, couplings=[mg.Mesh("m", "p", "w")],
+    )  # fmt: skip
+    turn = {"p": mg.Motion(uneven(90), velocity=w)}
+    couplings = mg.over_time(s := mg.solve(stage, turn)).couplings
+    rb = d / 2 * np.cos(np.deg2rad(20))
+    assert list(couplings) == ["m normal force"]
+    assert couplings["m normal force"].rms == pytest.approx(M * G * R / rb / np.sqrt(2), rel=1e-6)
+    np.testing.assert_allclose(
+        s.columns()["m normal force"], np.abs(M * G * R * np.cos(s["w"].position[:, 0])) / rb, rtol=1e-9
+    )
+    assert "Gears and belts" in str(s)
+    assert "m force" in s.columns(["contacts"])
+    pulleys = [mg.Pulley(k, k, (x, 0, 0), Z, radius=r) for k, x in (("p", 0), ("w", d))]
+    belt = mg.BeltDrive("B", over=["p", "w"], pretension=500.0, toothed=False)
+    m = stage.replace(gears=pulleys, couplings=[belt], loads=[mg.Gravity((0, -G, 0)), mg.Friction("B", mu=0.5)])
+    s = mg.solve(m, turn)
+    couplings = mg.over_time(s).couplings
+    assert list(couplings) == ["B tension p-w", "B tension w-p", "B slip margin p", "B slip margin w"]
+    pull = M * G * R * np.cos(turn["p"].position) / (2 * r)
+    np.testing.assert_allclose(s.columns()["B tension p-w"], 500.0 - pull, rtol=1e-9)
+    low = np.min(np.exp(0.5 * np.pi) * (500 - np.abs(pull)) / (500 + np.abs(pull)) - 1)
+    assert couplings["B slip margin w"].least == pytest.approx(low, rel=1e-9)
+    assert couplings["B tension w-p"].mean == pytest.approx(500.0, rel=1e-7)

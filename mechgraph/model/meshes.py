@@ -92,8 +92,9 @@ class Mesh(LineCoupling):
     flank: Annotated[
         str,
         TEXT(
-            'which flanks touch: `"auto"` as the load asks where centers stand still, else `"forward"`: those by which a positive turn of '
-            'gear a (with a rack, of the pinion) drives gear b; `"backward"`: the others',
+            'which flanks touch: `"forward"`: those by which a positive turn of gear a (with a rack, of the pinion) drives gear b; '
+            '`"backward"`: the others; `"auto"` as the load asks where centers stand still, else those that press at the first position '
+            "with a load, without forces those forward",
             choices=FLANKS,
         ),
     ] = "auto"

@@ -24,6 +24,7 @@ from mechgraph.errors import DeclarationError
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import SHAPES
 from mechgraph.model.belts import BeltDrive
+from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.meshes import Mesh
 from mechgraph.model.pair import Pair
 from mechgraph.pairs.contact_types import (
@@ -39,7 +40,7 @@ from mechgraph.pairs.factors import Touching
 from mechgraph.quantities import FORCE, LENGTH, PRESSURE, TIME, unit_of, wrong
 from mechgraph.result.trajectory import Trajectory
 from mechgraph.result.values import OK, Mask, bracket, driver_value, number, ranges, with_unit
-from mechgraph.result.views import CouplingResult, PositionLabels
+from mechgraph.result.views import Fact, PositionLabels, couplings_of
 
 
 class ContactGeometry:
@@ -294,9 +295,9 @@ class ContactResult(ContactGeometry, Shown):
         ]
         return Document(f"Contact {pair.name} of {self._values.mechanism.name}", tuple(blocks))
 
-    def columns(self) -> list[tuple[str, Array, tuple[int, int, int]]]:
+    def columns(self) -> list[Fact]:
         """Names, values ``(...)`` and dimensions of all facts."""
-        out: list[tuple[str, Array, tuple[int, int, int]]] = []
+        out: list[Fact] = []
         for link, path in ((self._pair.a, self.path_a), (self._pair.b, self.path_b)):
             out += [(f"path on {link}:{x}", path[..., i], LENGTH) for i, x in enumerate("xyz")]
         if self._values.has_forces:
@@ -533,15 +534,13 @@ def lift_offs(values: Trajectory) -> tuple[LiftOff, ...]:
     """Where contacts that are only pushed, or do not say that they are held, would have to pull."""
     found = contacts_of(values).values() if values.has_forces and bool((values.status() == OK).any()) else ()
     slack = slack_spans(values) if values.has_forces else ()
-    pulled = pulled_flanks(values) if values.has_forces else ()
-    return (*(lift for contact in found for lift in contact.lift_off), *slack, *pulled)
+    return (*(lift for contact in found for lift in contact.lift_off), *slack, *pulled_flanks(values))
 
 
-def pulled_flanks(values: Trajectory) -> Iterator[LiftOff]:
-    """Where flanks of teeth would have to pull: given ones, and those of gears whose centers move, which touch on one flank."""
-    unit = unit_of(values.mechanism.units, FORCE)
+def _flanks(values: Trajectory) -> Iterator[tuple[Mesh, Array, Mask]]:
+    """Meshes with the forces ``(T,)`` that their flanks push with, and where these would have to pull."""
     meshes = [(k, one) for k, one in enumerate(values.whole.couplings) if isinstance(one, Mesh)]
-    if not meshes:
+    if not meshes or not values.has_forces:
         return
     multipliers, loose = values.multipliers()
     for k, one in meshes:
@@ -550,6 +549,13 @@ def pulled_flanks(values: Trajectory) -> Iterator[LiftOff]:
         pulls = push < -1e-9 * float(np.abs(push).max(initial=0.0))
         if one.other is not one.relation and pulls.any():
             pulls &= ~values.turned_over(k)
+        yield one, push, pulls
+
+
+def pulled_flanks(values: Trajectory) -> Iterator[LiftOff]:
+    """Where flanks of teeth would have to pull: given ones, and those of gears whose centers move, which touch on one flank."""
+    unit = unit_of(values.mechanism.units, FORCE)
+    for one, push, pulls in _flanks(values):
         for found in stretches(values, pulls.reshape(values.batch), push.reshape(values.batch)):
             pull = f"{found.amount:.4g}{' ' * bool(unit)}{unit}"
             text = (
@@ -557,6 +563,17 @@ def pulled_flanks(values: Trajectory) -> Iterator[LiftOff]:
                 "flank. Forces there are not physical. Give flank='forward' or 'backward' as the load asks, or more load"
             )
             yield LiftOff(one.name, *found[:4], text, found.amount)
+
+
+def with_other_flanks(m: Mechanism, values: Trajectory) -> Mechanism | None:
+    """The mechanism on the other flanks of gears whose centers move where ``"auto"`` would pull from the first force on; None for none."""
+    pulling = {
+        one.name
+        for one, push, pulls in _flanks(values)
+        if one.flank == "auto" and pulls[np.argmax(np.abs(push) > 1e-9 * np.abs(push).max())]
+    }
+    turned = [c.replace(flank="backward") if c.name in pulling else c for c in m.couplings]
+    return m.replace(couplings=turned) if pulling else None
 
 
 def slack_spans(values: Trajectory) -> Iterator[LiftOff]:
@@ -588,15 +605,13 @@ def overlaps(values: Trajectory) -> tuple[Overlap, ...]:
     return tuple(overlap for contact in contacts_of(values).values() for overlap in contact.overlap)
 
 
-def contact_columns(values: Trajectory) -> Iterator[tuple[str, Array, tuple[int, int, int]]]:
-    """Columns of the table: ``B path on plane:x``, ``B normal force``, ``B sliding speed``, ...; of gears force and sliding speed.
+def contact_columns(values: Trajectory) -> Iterator[Fact]:
+    """Columns of the table: ``B path on plane:x``, ``B normal force``, ``B sliding speed``, ...; of gears force and sliding speed, of
+    belts spans and wraps.
 
     Paths are seen in the frames of the markers of the pair on these links.
     """
     for name, contact in contacts_of(values).items():
         yield from ((f"{name} {fact}", value, dimension) for fact, value, dimension in contact.columns())
-    for k, coupling in enumerate(values.whole.couplings):
-        if coupling.steps and values.has_forces:
-            gears = CouplingResult(values, k)
-            yield f"{coupling.name} force", np.linalg.norm(gears.force, axis=-1), FORCE
-            yield f"{coupling.name} sliding speed", np.linalg.norm(gears.sliding, axis=-1), (1, 0, -1)
+    for name, of in couplings_of(values).items():
+        yield from ((f"{name} {fact}", value, dimension) for fact, value, dimension in of.geometry())

@@ -29,6 +29,7 @@ from mechgraph.quantities import ENERGY, FORCE, MOMENT, POWER, TIME, door, unit_
 from mechgraph.result.film import FilmResult, Loaded
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import OK, bracket, number, with_unit
+from mechgraph.result.views import forces_of_couplings
 
 FEWEST = 8
 """Positions of which the cycle of a film must have at least so many: its load is a spline through them."""
@@ -251,6 +252,7 @@ class OverTimeData:
     efforts: Annotated[Mapping[str, FiguresData], "by the freedoms of the drivers"]
     powers: Annotated[Mapping[str, FiguresData], "by the freedoms of the drivers"]
     shaking: Annotated[Mapping[str, FiguresData], "of force and moment on the frame, about the global origin"]
+    couplings: Annotated[Mapping[str, FiguresData], "of forces, losses and margins of gears and belts"]
     work: Annotated[Mapping[str, float | None], "of drivers and loads over the duration"]
     kinetic_change: float | None
     balance: float | None
@@ -272,6 +274,8 @@ class OverTime(Shown):
         Figures of every driver: ``peak``, ``mean``, ``rms``.
     shaking : mapping
         Figures of force and moment on the frame, ``"Fx"`` to ``"Mz"``, ``"|F|"``, ``"|M|"``.
+    couplings : mapping
+        Figures of what acts in gears and belts, ``"g normal force"``, ``"belt tension p1-p2"``, ``"g loss"``.
     work : mapping
         Integral of the power of every driver and load.
     kinetic_change : array
@@ -295,6 +299,7 @@ class OverTime(Shown):
     efforts: Mapping[str, Figures]
     powers: Mapping[str, Figures]
     shaking: Mapping[str, Figures]
+    couplings: Mapping[str, Figures]
     work: Mapping[str, Array]
     kinetic_change: Array
     balance: Array
@@ -338,7 +343,7 @@ class OverTime(Shown):
         blocks: list[Block] = [Paragraph(f"{time}, {over}; {balance}.")]
         figures = {f"effort of {name}": one for name, one in self.efforts.items()}
         figures |= {f"power of {name}": one for name, one in self.powers.items()}
-        figures |= {f"shaking {name}": self.shaking[name] for name in ("|F|", "|M|")}
+        figures |= {f"shaking {name}": self.shaking[name] for name in ("|F|", "|M|")} | dict(self.couplings)
         rows = [
             (
                 name + bracket(one.unit),
@@ -444,6 +449,10 @@ def over_time(s: Solution, about: ArrayLike = (0.0, 0.0, 0.0)) -> OverTime:
         {
             name: row.figures(f"shaking {name}", part, unit_of(units, MOMENT if "M" in name else FORCE))
             for name, part in parts.items()
+        },
+        {
+            name: row.figures(name, of, unit_of(units, dimension))
+            for name, of, dimension in forces_of_couplings(s._values)
         },
         work,
         change,

@@ -19,7 +19,6 @@ from mechgraph.files import Format, csv_of, format_of, json_text, optional, plai
 from mechgraph.maths.newton import Work
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import CHECKS, PATH
-from mechgraph.model.belts import BeltDrive
 from mechgraph.model.loads import Law
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.pairs.factors import WRENCHES
@@ -53,10 +52,13 @@ from mechgraph.result.values import (
 from mechgraph.result.views import (
     BeltResult,
     CouplingResult,
+    Fact,
     FrictionNote,
     LinkResult,
     PairResult,
     PositionLabels,
+    couplings_of,
+    forces_of_couplings,
     friction_notes,
     losses,
     misfits_left_out,
@@ -88,7 +90,8 @@ def table_of(s: Trajectory, include: Sequence[Include] = ()) -> list[Column]:
     """All columns: coordinates, rates, efforts, reaction components, status and checks.
 
     Names are ``B.Tz``, ``B.Tz velocity``, ``B.Tz effort`` (of the drive), ``B.Tz applied effort`` (of springs, dampers, given efforts),
-    ``B:Fx`` (component of the reaction). ``include`` adds what ``MORE`` has under these names.
+    ``B:Fx`` (component of the reaction); ``g normal force``, ``belt tension p1-p2`` (of gears and belts). ``include`` adds what ``MORE``
+    has under these names.
     """
     m = s.mechanism
     faults: list[str] = []
@@ -121,37 +124,32 @@ def table_of(s: Trajectory, include: Sequence[Include] = ()) -> list[Column]:
                     put(f"{name} {label}", effort[..., j], 2 if part.is_couple else 1, 1, -2)
             for name, value in r.components.items():
                 put(f"{pair.name}:{name}", value, unit=r.units["components"][name])
-    for name in asked:
-        for column, more, dimension in MORE[name](s):
-            put(column, more, *dimension)
+    for column, more, dimension in (*forces_of_couplings(s), *(one for name in asked for one in MORE[name](s))):
+        put(column, more, *dimension)
     for name in ("closure", "equilibrium", "power", "accuracy"):
         put(name, getattr(s.checks(), name))
     put("status", s.status())
     return out
 
 
-Extra = tuple[str, Array, tuple[int, ...]]
-"""Name, values and dimension of a column; no exponents for a number without a unit."""
-
-
-def _vector(name: str, values: Array, dimension: tuple[int, ...], letters: Sequence[str]) -> Iterator[Extra]:
+def _vector(name: str, values: Array, dimension: tuple[int, ...], letters: Sequence[str]) -> Iterator[Fact]:
     for i, letter in enumerate(letters):
         yield f"{name}:{letter}", values[..., i], dimension
 
 
-def _point(name: str, p: MaterialPoint, letters: str) -> Iterator[Extra]:
+def _point(name: str, p: MaterialPoint, letters: str) -> Iterator[Fact]:
     for order, (label, values) in enumerate(zip(("", " velocity", " acceleration"), p, strict=True)):
         yield from _vector(name + label, values, (1, 0, -order), letters)
 
 
-def _points(s: Trajectory) -> Iterator[Extra]:
+def _points(s: Trajectory) -> Iterator[Fact]:
     """Motion of the named points of links: ``bucket.tip:x``, ``bucket.tip velocity:x``, ..."""
     for i, link in enumerate(s.mechanism.links):
         for name, p in link.points.items():
             yield from _point(f"{link.name}.{name}", s.link_point(i, p), s.mechanism.axes)
 
 
-def _links(s: Trajectory) -> Iterator[Extra]:
+def _links(s: Trajectory) -> Iterator[Fact]:
     """Poses of the links: origin of the frame ``crank:x``, rotation matrix ``crank:Rxx``, and angular rates."""
     axes, turns = s.mechanism.axes, slice(2, 3) if s.mechanism.planar else slice(3)
     for i, link in enumerate(s.mechanism.links):
@@ -164,14 +162,14 @@ def _links(s: Trajectory) -> Iterator[Extra]:
         yield from _vector(f"{link.name} angular acceleration", acceleration[..., turns], (0, 0, -2), "xyz"[turns])
 
 
-def _centers(s: Trajectory) -> Iterator[Extra]:
+def _centers(s: Trajectory) -> Iterator[Fact]:
     """Motion of the mass centers: ``crank center:x``, ``crank center velocity:x``, ..."""
     for i, link in enumerate(s.mechanism.links):
         if link.center is not None:
             yield from _point(f"{link.name} center", s.link_point(i, None), s.mechanism.axes)
 
 
-def _loads(s: Trajectory) -> Iterator[Extra]:
+def _loads(s: Trajectory) -> Iterator[Fact]:
     """What loads do: coordinate, rate and force of laws, efforts, else wrenches on links about the global origin; and their power."""
     m = s.mechanism
     for i, load in enumerate(m.loads):
@@ -191,7 +189,7 @@ def _loads(s: Trajectory) -> Iterator[Extra]:
 
 
 Include = Literal["points", "links", "centers", "loads", "contacts"]
-MORE: dict[str, Callable[[Trajectory], Iterator[Extra]]] = {
+MORE: dict[str, Callable[[Trajectory], Iterator[Fact]]] = {
     "points": _points, "links": _links, "centers": _centers, "loads": _loads, "contacts": contact_columns,
 }  # fmt: skip
 """What a table may have beside the pairs, on request."""
@@ -447,10 +445,8 @@ class Solution(Shown):
         >>> float(mg.solve(m, {"A": 1.0}, loads=[mg.Effort("B", -3)]).coupling("teeth").effort)
         0.075
         """
-        m = self.mechanism
-        if any(isinstance(c, BeltDrive) and c.belt == name for c in m.couplings):
-            return BeltResult(self._values, name)
-        return CouplingResult(self._values, m.couplings.index(m.coupling(name)))
+        found, m = couplings_of(self._values), self.mechanism
+        return found[name] if name in found else CouplingResult(self._values, m.couplings.index(m.coupling(name)))
 
     @property
     def contacts(self) -> dict[str, ContactResult]:
@@ -817,7 +813,7 @@ class Solution(Shown):
 
         Raises
         ------
-        MissingExtraError
+        MissingFactError
             Without anywidget.
         """
         return methods.call("view", self)
@@ -925,7 +921,7 @@ class Solution(Shown):
 
         Raises
         ------
-        MissingExtraError
+        MissingFactError
             Without pandas.
 
         Examples
@@ -953,7 +949,7 @@ class Solution(Shown):
 
         Raises
         ------
-        MissingExtraError
+        MissingFactError
             Without xarray.
 
         Examples
@@ -982,7 +978,7 @@ class Solution(Shown):
         ------
         FileError
             Another extension, or the file cannot be written.
-        MissingExtraError
+        MissingFactError
             Without the extra of the format.
 
         Examples

@@ -29,7 +29,14 @@ from mechgraph.result.values import (
     number,
     with_unit,
 )
-from mechgraph.result.views import UNASKED, PositionLabels, friction_notes, losses, misfits_left_out
+from mechgraph.result.views import (
+    UNASKED,
+    PositionLabels,
+    forces_of_couplings,
+    friction_notes,
+    losses,
+    misfits_left_out,
+)
 
 
 class Greatest:
@@ -91,6 +98,17 @@ def multipliers(values: Trajectory) -> RowRange:
     if len(found):
         out.look(found, np.arange(found.shape[1]), loose)
     return out
+
+
+def acting_in_couplings(values: Trajectory) -> tuple[list[str], RowRange]:
+    """Normal forces, tensions, losses and margins of the couplings along lines, names with units: their ranges."""
+    facts = list(forces_of_couplings(values))
+    out = RowRange(len(facts))
+    if facts:
+        found = np.array([np.reshape(of, -1) for _, of, _ in facts])
+        solved = (values.status() == OK).reshape(-1)
+        out.look(found, np.arange(found.shape[1]), np.isnan(found) & solved & (not values.least_norm))
+    return [name + bracket(unit_of(values.mechanism.units, dimension)) for name, _, dimension in facts], out
 
 
 def efforts(values: Trajectory) -> tuple[RowRange, RowRange]:
@@ -492,10 +510,11 @@ class _SummaryText(PositionLabels):
         yield from self._ranges("Efforts of the drivers", "driver", own, driven, heads, largest)
         title = "Applied efforts (springs, dampers, given efforts)"
         yield from self._ranges(title, "freedom", applied, loaded, heads, largest)
-        if self.m.couplings:
-            heads = [c.name + bracket(coupling_unit(self.m, c)) for c in self.m.couplings]
-            every = list(range(len(heads)))
-            yield from self._ranges("Multipliers of the couplings", "coupling", multipliers(self.values), every, heads)
+        plain = [k for k, c in enumerate(self.m.couplings) if not c.steps]
+        heads = [c.name + bracket(coupling_unit(self.m, c)) for c in self.m.couplings]
+        yield from self._ranges("Multipliers of the couplings", "coupling", multipliers(self.values), plain, heads)
+        heads, acting = acting_in_couplings(self.values)
+        yield from self._ranges("Gears and belts", "", acting, list(range(len(heads))), heads)
 
     def _ranges(
         self, title: str, what: str, found: RowRange, columns: list[int], heads: list[str], largest: float = 0.0

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.document import Block, Document, Paragraph, Shown
+from mechgraph.document import Block, Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import vector_fault
 from mechgraph.maths.se3 import Array
@@ -19,7 +19,7 @@ from mechgraph.model.friction import WAYS, Friction, coupling_of
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.pairs.pair_type import PairType
-from mechgraph.quantities import MOMENT, ByName, is_numeric, unit_of
+from mechgraph.quantities import FORCE, LENGTH, MOMENT, POWER, ByName, is_numeric, unit_of
 from mechgraph.result.trajectory import Trajectory
 from mechgraph.result.values import (
     OK,
@@ -167,19 +167,15 @@ def _link_rows(values: Trajectory, k: int) -> Iterator[Row]:
         yield f"angular {what}{bracket(unit_of(m.units, (0, 0, -n)))}", np.linalg.norm(of[..., :3], axis=-1)
 
 
-def coupling_document(values: Trajectory, k: int) -> Document:
-    """The relation that a coupling imposes, and its multiplier."""
-    m = values.mechanism
-    coupling, places = m.couplings[k], PositionLabels(values)
-    unit = bracket(coupling_unit(m, coupling))
-    blocks: list[Block] = [Paragraph(f"{coupling.text}; {_solved(places)}.")]
-    if values.has_forces:
-        rows: list[tuple[str, Array]] = [(f"multiplier{unit}", values.multiplier(k))]
-        if coupling.steps:
-            force = np.linalg.norm(values.contact(k)[0], axis=-1)
-            rows.append((f"force of contact{bracket(unit_of(m.units, (1, 1, -2)))}", force))
-        blocks.append(ranges(rows, places.name))
-    return Document(f"Coupling {coupling.name} of {m.name}", tuple(blocks))
+def _fact_ranges(values: Trajectory, facts: Iterable[Fact], *first: Row) -> Table:
+    """Ranges of rows and facts; angles of wrap in degrees."""
+    units, rows = values.mechanism.units, [*first]
+    for name, of, dimension in facts:
+        turns = name.startswith("wrap")
+        rows.append(
+            (name + (" [deg]" if turns else bracket(unit_of(units, dimension))), np.rad2deg(of) if turns else of)
+        )
+    return ranges(rows, PositionLabels(values).name)
 
 
 def _solved(places: PositionLabels) -> str:
@@ -386,6 +382,10 @@ def pair_units(units: Mapping[str, str], row: PairType) -> dict[str, Any]:
     }
 
 
+Fact = tuple[str, Array, tuple[int, ...]]
+"""Name, values ``(...)`` and dimension of a column; no exponents for a number without a unit."""
+
+
 class CouplingResult(Shown):
     """Values of one coupling ``sum c_i q_i = constant``."""
 
@@ -393,8 +393,36 @@ class CouplingResult(Shown):
         self._values, self._index = values, index
 
     def document(self) -> Document:
-        """Ranges of the values over the positions, and where they are reached."""
-        return coupling_document(self._values, self._index)
+        """The relation that the coupling imposes; ranges of its values over the positions, and where they are reached."""
+        m = self._values.mechanism
+        c = m.couplings[self._index]
+        blocks: list[Block] = [Paragraph(f"{c.text}; {_solved(PositionLabels(self._values))}.")]
+        if self._values.has_forces:
+            multiplier = f"multiplier{bracket(coupling_unit(m, c))}", self.effort
+            blocks.append(_fact_ranges(self._values, (*self.forces(), *self.geometry()), multiplier))
+        return Document(f"Coupling {c.name} of {m.name}", tuple(blocks))
+
+    def forces(self) -> Iterator[Fact]:
+        """What acts between teeth, or in the strands of a belt, as columns of tables; nothing of a relation between freedoms."""
+        values, c = self._values, self._values.whole.couplings[self._index]
+        if not c.steps or not values.has_forces:
+            return
+        belt = isinstance(c, Belt)
+        yield (
+            ("tension", np.linalg.norm(self.force, axis=-1), FORCE)
+            if belt
+            else ("normal force", self.normal_force, FORCE)
+        )
+        if _rubs(values, c.name):
+            yield "loss", self.loss, POWER
+            if belt:
+                yield "slip margin", self.slip_margin, ()
+
+    def geometry(self) -> Iterator[Fact]:
+        """The size of the force, and the sliding speed, in the same way."""
+        if self._values.whole.couplings[self._index].steps and self._values.has_forces:
+            yield "force", np.linalg.norm(self.force, axis=-1), FORCE
+            yield "sliding speed", np.linalg.norm(self.sliding, axis=-1), (1, 0, -1)
 
     @property
     def effort(self) -> Array:
@@ -561,14 +589,22 @@ class BeltResult(Shown):
 
     def document(self) -> Document:
         """Ranges of the values over the positions, and where they are reached."""
-        m, places = self._values.mechanism, PositionLabels(self._values)
-        length, force = (bracket(unit_of(m.units, dimension)) for dimension in ((1, 0, 0), (1, 1, -2)))
-        rows = [(f"span {name}{length}", of) for name, of in self.span.items()]
-        rows += [(f"wrap {name} [deg]", np.rad2deg(of)) for name, of in self.wrap.items()]
+        m = self._values.mechanism
+        text = f"Over {', '.join(self._belt.over)}; {_solved(PositionLabels(self._values))}."
+        table = _fact_ranges(self._values, (*self.geometry(), *self.forces()))
+        return Document(f"Belt {self._name} of {m.name}", (Paragraph(text), table))
+
+    def forces(self) -> Iterator[Fact]:
+        """Tensions, and where it rubs the margins to slip, as columns of tables."""
         if self._values.has_forces:
-            rows += [(f"tension {name}{force}", of) for name, of in self.tension.items()]
-        blocks = (Paragraph(f"Over {', '.join(self._belt.over)}; {_solved(places)}."), ranges(rows, places.name))
-        return Document(f"Belt {self._name} of {m.name}", blocks)
+            yield from ((f"tension {name}", of, FORCE) for name, of in self.tension.items())
+            if _rubs(self._values, self._name):
+                yield from ((f"slip margin {name}", of, ()) for name, of in self.slip_margin.items())
+
+    def geometry(self) -> Iterator[Fact]:
+        """Lengths of the spans, and angles of wrap, in the same way."""
+        yield from ((f"span {name}", of, LENGTH) for name, of in self.span.items())
+        yield from ((f"wrap {name}", of, ()) for name, of in self.wrap.items())
 
     @cached_property
     def _course(self) -> BeltCourse:
@@ -630,6 +666,28 @@ class BeltResult(Shown):
         load, T = friction_of(self._values, self._name), np.array(list(self.tension.values()))
         both = zip(self._belt.over, np.roll(T, 1, axis=0), T, strict=True)
         return {name: margin_to_slip(load, self.wrap[name], one, other) for name, one, other in both}
+
+
+def _rubs(values: Trajectory, name: str) -> bool:
+    """Whether friction is declared of what has that name."""
+    return any(isinstance(load, Friction) and load.of == name for load in values.loads)
+
+
+def forces_of_couplings(values: Trajectory) -> Iterator[Fact]:
+    """What acts in all couplings along lines, by names such as ``g normal force``, ``belt tension p1-p2``."""
+    for name, of in couplings_of(values).items():
+        yield from ((f"{name} {fact}", value, dimension) for fact, value, dimension in of.forces())
+
+
+def couplings_of(values: Trajectory) -> dict[str, CouplingResult | BeltResult]:
+    """What is told of every coupling, of a belt as a whole, by name."""
+    found: dict[str, CouplingResult | BeltResult] = {}
+    for k, c in enumerate(values.whole.couplings):
+        belt = isinstance(c, BeltDrive)
+        name = c.belt if isinstance(c, BeltDrive) else c.name
+        if name not in found:
+            found[name] = BeltResult(values, name) if belt else CouplingResult(values, k)
+    return found
 
 
 class LinkResult(Shown):
