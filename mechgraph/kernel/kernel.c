@@ -19,7 +19,7 @@ typedef double magnitude;
 #endif
 
 /* Tolerances; those of the package in maths/tolerances.py have the same names there. */
-static const magnitude CLOSED = 2e-14;      /* closure residual that Newton aims at, over the distance from the origin */
+static const magnitude CLOSED = 1e-14;      /* closure residual that Newton aims at, over the distance from the origin */
 static const magnitude PASSED = 1e-9;       /* the same of a place that is only passed: 4 FAIR PASSED < ALONE / FAIR */
 static const magnitude ACCEPTED = 1e-12;    /* residual that counts as closed where rounding lets it come no nearer */
 static const magnitude CORRECTION = 0.06;   /* largest correction that a prediction may need */
@@ -28,6 +28,8 @@ static const magnitude FAIR = 3e3;          /* condition number above which noth
 static const magnitude DEPARTURE = 0.5;     /* largest change of the closure matrix over a step, against its inverse at the end */
 static const magnitude ALONE = 0.05;        /* part of the inverse condition, over rates, up to which another branch is not as near */
 static const magnitude LONGEST = 0.7;       /* longest step */
+static const magnitude REACHED = 3;         /* how far a curve through places close together is followed, over their distance */
+static const magnitude STEADY = 1e3;        /* acceleration over rate squared up to which a motion tells the bend of the line it follows */
 static const magnitude NEAREST = 0.7;       /* longest step over that on which the closure matrix changes by as much as it is */
 static const magnitude SHORTEST = 2e-3;     /* step below which the careful follower of the package takes over */
 static const magnitude INDEPENDENT = 1e-9;  /* part of the closure rates that drives may leave open */
@@ -38,7 +40,7 @@ static const magnitude UNTURNED = 1e-13;    /* angle that is rounding */
 static const magnitude MISSING = 1e-9;      /* angle, or length / L, that may be missing to rest */
 static const magnitude OFF_TABLE = 1e-9;     /* part of a table's length up to which a place beyond its end is on it by rounding */
 static const magnitude STRAIGHT_ON = 1e-12; /* change of direction up to which a polygon goes straight on */
-enum { ITERATIONS = 8, MOST_STEPS = 20000, MOST_TURNS = 8, POINTS = 8, TOLD = 8, AT_ONCE = 20 }; /* AT_ONCE: positions a step from which on nearer nodes cost less than corrections */
+enum { ITERATIONS = 8, MOST_STEPS = 20000, MOST_TURNS = 8, POINTS = 8, TOLD = 8, POWERS = 8, SEVERAL = 4, AT_ONCE = 20 }; /* AT_ONCE: positions a step from which on nearer nodes cost less than corrections */
 
 #define FOR(i, n) for (int i = 0; i < (n); i++)
 
@@ -59,6 +61,13 @@ typedef struct {
   int *row;
 } Node;
 
+/* Hermite's polynomial in increments from the state x at a place: coefficients [POWERS] of every freedom, lowest first, in parts of `length`;
+ * it is not asked for beyond `until`. */
+typedef struct {
+  const double *x;
+  double *coefficient, at, length, until;
+} Curve;
+
 typedef struct {
   /* kept between calls: state, drives, and where rotation vectors of the user stand */
   double *x, *drive, *axis, *angle, *begun, *border;
@@ -70,12 +79,16 @@ typedef struct {
   int *row;
   /* rates and forces */
   double *dq, *ddq, *V, *A, *bias, *G, *chord_V, *pair_twist, *E, *applied, *inertial, *total, *reaction, *carried, *given, *tau, *coupled, *multiplier;
-  double *null, *stress, *stress_effort, *row_value, *column_value, *trial, *increment, *there, *change, *bound, *record, *direction, *line_begin, *asked, *kept;
+  double *stress, *size, *row_value, *column_value, *trial, *increment, *there, *change, *bound, *record, *direction, *line_begin, *asked, *kept;
   /* passive motions: unit rates, twists with their rates, velocity parts, links at rest in them; along a step, what is missing to rest */
   double *passive, *twist, *twist_rate, *own_bias, *moving_bias, *moving, *raw, *apart, *trial_rate, *trial_acceleration, *still, *series;
-  magnitude single, told, *speed;
+  magnitude single, told, allowed, corrected, *speed;
   size_t n_kept;
   Node a, b, before;
+  /* the last two places on the line that are closed to rounding, and the curve through them to node b (none: x NULL) */
+  Node last, other;
+  Curve curve, half;
+  int known;
   long steps, evaluations, factorizations;
 } Work;
 
@@ -88,7 +101,7 @@ static void read_tables(const int *I, const double *P, Model *m) {
   m->held = m->height * m->loops + m->couplings;
   m->rows = m->held + m->passives, m->stresses = m->rows - m->unknowns;
   const int p = m->pairs, f = m->factors, c = m->columns, n = m->links, *i = I + MGK_HEAD;
-  m->first = i, i += p + 1, m->kind = i, i += f, m->column = i, i += f, m->state = i, i += f, m->number = i, i += f;
+  m->first = i, i += p + 1, m->kind = i, i += f, m->column = i, i += f + 1, m->state = i, i += f, m->number = i, i += f;
   m->ends = i, i += 2 * p, m->walk = i, i += 4 * (p - m->loops), m->chord = i, i += m->loops;
   m->loop_first = i, i += m->loops + 1, m->loop_pair = i, i += m->steps, m->loop_sign = i, i += m->steps;
   m->owner = i, i += c, m->column_state = i, i += c, m->is_length = i, i += c, m->place = i, i += c;
@@ -104,6 +117,9 @@ static void read_tables(const int *I, const double *P, Model *m) {
   m->border = d, d += c * m->passives;
   m->coefficient = d, d += m->terms, m->constant = d, d += m->couplings, m->load_number = d;
 }
+
+/* The first freedom of a pair. */
+static int first_column(const Model *m, int pair) { return m->column[m->first[pair]]; }
 
 static double *taken(double **memory, size_t *size, size_t count) {
   double *out = *memory;
@@ -124,18 +140,20 @@ static size_t lay_out(const Model *m, double *memory, Work *w) {
   TAKE(lu, r * u), TAKE(inverse, u * u);
   w->row = (int *)taken(&memory, &size, r);
   TAKE(dq, c), TAKE(ddq, c), TAKE(V, 6 * n), TAKE(A, 6 * n), TAKE(bias, 6 * p), TAKE(G, 6 * c), TAKE(chord_V, 6 * m->loops), TAKE(pair_twist, 6 * p), TAKE(E, 6 * c);
-  TAKE(applied, 6 * n), TAKE(inertial, 6 * n), TAKE(total, 6 * p), TAKE(reaction, 6 * p), TAKE(carried, 6 * n), TAKE(given, c);
-  TAKE(tau, c), TAKE(coupled, c), TAKE(multiplier, m->couplings), TAKE(null, s * r), TAKE(stress, 6 * p * s), TAKE(stress_effort, c * s);
-  TAKE(row_value, r), TAKE(column_value, c), TAKE(trial, m->states), TAKE(increment, c), TAKE(there, 2 * c), TAKE(change, u * u), TAKE(bound, 4 * u);
+  TAKE(applied, 6 * n), TAKE(inertial, 6 * n), TAKE(total, 6 * p), TAKE(carried, 6 * n), TAKE(given, c);
+  TAKE(reaction, 6 * p), TAKE(tau, c), TAKE(multiplier, m->couplings), TAKE(coupled, c), TAKE(stress, (6 * p + c + m->couplings) * s), TAKE(size, s);
+  TAKE(row_value, r), TAKE(column_value, c), TAKE(trial, m->states), TAKE(increment, c), TAKE(there, 6 * c), TAKE(change, u * u), TAKE(bound, 4 * u);
   TAKE(passive, q * c), TAKE(twist, 6 * q), TAKE(twist_rate, 6 * q), TAKE(own_bias, 6 * p * q), TAKE(moving_bias, q ? 6 * p : 0), TAKE(moving, 6 * q);
   w->speed = (magnitude *)taken(&memory, &size, n);
   TAKE(raw, 6 * q * q + q), TAKE(apart, 2 * q * q), TAKE(trial_rate, q ? c : 0), TAKE(trial_acceleration, q ? c : 0), TAKE(still, m->drives), TAKE(series, POINTS * q);
-  Node *nodes[3] = {&w->a, &w->b, &w->before};
-  FOR(i, 3) {
+  w->curve.coefficient = taken(&memory, &size, POWERS * c), w->half.coefficient = taken(&memory, &size, POWERS * c);
+  Node *nodes[5] = {&w->last, &w->other, &w->a, &w->b, &w->before};
+  FOR(i, 5) {
     nodes[i]->x = taken(&memory, &size, m->states), nodes[i]->rate = taken(&memory, &size, c), nodes[i]->bend = taken(&memory, &size, c);
+    nodes[i]->at = taken(&memory, &size, 1);
+    if (i < 2) continue;
     nodes[i]->matrix = taken(&memory, &size, r * u), nodes[i]->matrix_rate = taken(&memory, &size, r * u);
     nodes[i]->inverse = taken(&memory, &size, u * u), nodes[i]->change = taken(&memory, &size, u * u), nodes[i]->row = (int *)taken(&memory, &size, u);
-    nodes[i]->at = taken(&memory, &size, 1);
     nodes[i]->passive = taken(&memory, &size, q * c), nodes[i]->twist = taken(&memory, &size, 6 * q), nodes[i]->pose = taken(&memory, &size, 12 * q);
   }
   TAKE(direction, m->drives), TAKE(line_begin, m->drives), TAKE(asked, 3 * m->drives);
@@ -168,12 +186,15 @@ size_t mgk_state_size(const int *I) {
 /* --- vectors, poses, twists -------------------------------------------------------------------------------------------------------- */
 
 /* The larger one; what is no number stays, so that it passes no limit. */
-static magnitude raised(magnitude most, magnitude value) { return value <= most || most != most ? most : value; }
+static magnitude raised(magnitude most, magnitude value) { return ((value > most) | (value != value)) ? value : most; }
 
 static magnitude size_of(const double *v, int n) {
-  magnitude out = 0.0;
-  FOR(i, n) out = raised(out, fabs(v[i]));
-  return out;
+  magnitude most = 0.0, sum = 0.0;
+  FOR(i, n) {
+    const magnitude size = fabs(v[i]);
+    most = size > most ? size : most, sum += size;
+  }
+  return most + (sum - sum); /* what is no number stays */
 }
 
 static void cross(const double *a, const double *b, double *out) {
@@ -181,11 +202,16 @@ static void cross(const double *a, const double *b, double *out) {
   out[0] = x, out[1] = y, out[2] = z;
 }
 
-static double dot(const double *a, const double *b, int n) { /* by two sums, which do not wait for each other */
-  double even = 0.0, odd = 0.0;
-  FOR(i, n / 2) even += a[2 * i] * b[2 * i], odd += a[2 * i + 1] * b[2 * i + 1];
-  return n % 2 ? even + odd + a[n - 1] * b[n - 1] : even + odd;
+static inline double dot(const double *a, const double *b, int n) { /* by four sums, which do not wait for each other */
+  double sum[4] = {0};
+  int i = 0;
+  for (; i + 4 <= n; i += 4) FOR(k, 4) sum[k] += a[i + k] * b[i + k];
+  for (int k = 0; i < n; i++, k++) sum[k] += a[i] * b[i];
+  return (sum[0] + sum[1]) + (sum[2] + sum[3]);
 }
+
+/* y += part x */
+static inline void add_part(int n, double part, const double *restrict x, double *restrict y) { FOR(i, n) y[i] += part * x[i]; }
 
 static void turned(const double *X, const double *v, double *out) {
   FOR(i, 3) out[i] = X[4 * i] * v[0] + X[4 * i + 1] * v[1] + X[4 * i + 2] * v[2];
@@ -270,15 +296,13 @@ static void passed(const Model *m, int f, const double *x, double sense, double 
   }
 }
 
-static int width(int kind) { return kind == MGK_POSE ? 0 : kind == MGK_ROTATION ? 3 : 1; }
-
 /* The twists of a factor, X being the frame before it. */
 static void twists_of(const Model *m, int f, const double *X, double *S) {
   const int kind = m->kind[f];
   const double at[3] = {X[3], X[7], X[11]};
-  FOR(j, width(kind)) {
-    double *s = S + 6 * (m->column[f] + j);
-    const int axis = kind == MGK_ROTATION ? j : kind % 3;
+  for (int c = m->column[f]; c < m->column[f + 1]; c++) {
+    double *s = S + 6 * c;
+    const int axis = kind == MGK_ROTATION ? c - m->column[f] : kind % 3;
     const double line[3] = {X[axis], X[4 + axis], X[8 + axis]};
     if (kind >= MGK_SLIDE && kind < MGK_ROTATION) {
       FOR(i, 3) s[i] = 0.0, s[3 + i] = line[i];
@@ -374,18 +398,52 @@ static void tangent(const Model *m, const double *dq, const double *rate, double
   }
 }
 
-/* The state at place `at` of Hermite's polynomial of degree five through two nodes, in increments from the first. */
-static void between(const Model *m, Work *w, const Node *a, const Node *b, double at, double *x) {
-  const double h = *b->at - *a->at, s = (at - *a->at) / h;
-  double *y = w->increment, *there = w->there, *bend = w->there + m->columns;
+/* Increments from a node to another one, and there h times their rates and half of h^2 times their accelerations. */
+static void seen_from(const Model *m, const Node *a, const Node *b, double h, double *y, double *rate, double *bend) {
   difference(m, b->x, a->x, y);
   memcpy(bend, b->bend, m->columns * sizeof(double));
-  tangent(m, y, b->rate, there, bend);
-  FOR(i, m->columns) {
-    const double p = h * a->rate[i], q = h * there[i], u = 0.5 * h * h * a->bend[i], v = 0.5 * h * h * bend[i], d = y[i];
-    y[i] = s * (p + s * (u + s * (10 * d - 6 * p - 4 * q - 3 * u + v + s * (8 * p - 15 * d + 7 * q + 3 * u - 2 * v + s * (6 * d - 3 * p - 3 * q - u + v)))));
+  tangent(m, y, b->rate, rate, bend);
+  FOR(i, m->columns) rate[i] *= h, bend[i] *= 0.5 * h * h;
+}
+
+/* The curve through two nodes, of degree five; through a third one too, unless it is NULL, of degree eight. */
+static void through(const Model *m, Work *w, const Node *a, const Node *b, const Node *third, Curve *out) {
+  const int n = m->columns;
+  const double h = *b->at - *a->at, r = third ? (*third->at - *a->at) / h : 0.0, e = r - 1.0;
+  double *y = w->there, *rate = y + n, *bend = rate + n, *y3 = bend + n, *rate3 = y3 + n, *bend3 = rate3 + n;
+  out->x = a->x, out->at = *a->at, out->length = h, out->until = third ? *a->at - REACHED * r * h : INFINITY;
+  seen_from(m, a, b, h, y, rate, bend);
+  if (third) seen_from(m, a, third, h, y3, rate3, bend3);
+  FOR(i, n) {
+    double *c = out->coefficient + POWERS * i;
+    const double p = h * a->rate[i], q = rate[i], u = 0.5 * h * h * a->bend[i], v = bend[i], d = y[i];
+    c[0] = p, c[1] = u, c[2] = 10 * d - 6 * p - 4 * q - 3 * u + v, c[3] = 8 * p - 15 * d + 7 * q + 3 * u - 2 * v, c[4] = 6 * d - 3 * p - 3 * q - u + v;
+    c[5] = c[6] = c[7] = 0.0;
+    if (!third) continue;
+    /* what the third node is off it, over r^3 (r - 1)^3: value, rate and half the acceleration of the quadratic that remains, by Leibniz's rule */
+    const double g = 1.0 / (r * r * r * e * e * e), slope = 3.0 / r + 3.0 / e, turn = 3.0 / (r * r) + 9.0 / (r * e) + 3.0 / (e * e);
+    const double A = g * (y3[i] - r * (c[0] + r * (c[1] + r * (c[2] + r * (c[3] + r * c[4])))));
+    const double B = g * (rate3[i] - (c[0] + r * (2 * c[1] + r * (3 * c[2] + r * (4 * c[3] + r * 5 * c[4]))))) - slope * A;
+    const double C = g * (bend3[i] - (c[1] + r * (3 * c[2] + r * (6 * c[3] + r * 10 * c[4])))) - slope * B - turn * A;
+    const double k0 = A - r * (B - r * C), k1 = B - 2 * r * C; /* its coefficients, times s^3 (s^3 - 3 s^2 + 3 s - 1) */
+    c[2] -= k0, c[3] += 3 * k0 - k1, c[4] += 3 * (k1 - k0) - C, c[5] = k0 + 3 * (C - k1), c[6] = k1 - 3 * C, c[7] = C;
   }
-  advance(m, a->x, y, x);
+}
+
+/* The state of a curve at a place. */
+static void on_curve(const Model *m, Work *w, const Curve *curve, double at, double *x) {
+  const double s = (at - curve->at) / curve->length;
+  FOR(i, m->columns) {
+    const double *c = curve->coefficient + POWERS * i;
+    w->increment[i] = s * (c[0] + s * (c[1] + s * (c[2] + s * (c[3] + s * (c[4] + s * (c[5] + s * (c[6] + s * c[7])))))));
+  }
+  advance(m, curve->x, w->increment, x);
+}
+
+/* The state at a place of the curve of degree five through two nodes. */
+static void between(const Model *m, Work *w, const Node *a, const Node *b, double at, double *x) {
+  through(m, w, a, b, NULL, &w->half);
+  on_curve(m, w, &w->half, at, x);
 }
 #endif
 
@@ -444,18 +502,16 @@ static void fill(const Model *m, const double *S, const double *middle, const do
   const int u = m->unknowns;
   memset(out, 0, (size_t)m->rows * u * sizeof(double));
   FOR(l, m->loops) for (int i = m->loop_first[l]; i < m->loop_first[l + 1]; i++) {
-    const int k = m->loop_pair[i];
     const double sign = m->loop_sign[i];
-    for (int f = m->first[k]; f < m->first[k + 1]; f++) FOR(j, width(m->kind[f])) {
-      const int c = m->column[f] + j;
-      double s[6], more[3];
+    for (int c = first_column(m, m->loop_pair[i]); c < first_column(m, m->loop_pair[i] + 1); c++) {
+      double s[6], more[3], *to = out + m->height * l * u + m->place[c];
       if (m->place[c] < 0) continue;
       twist_about(S + 6 * c, middle + 3 * l, s);
       if (motion) {
         cross(twist + 6 * c, motion + 3 * l, more);
         FOR(r, 3) s[3 + r] += more[r];
       }
-      FOR(r, m->height) out[(m->height * l + r) * u + m->place[c]] += sign * s[m->part + r];
+      FOR(r, m->height) to[r * u] = sign * s[m->part + r];
     }
   }
   if (motion) return;
@@ -496,20 +552,23 @@ static int eliminate(const Model *m, Work *w) {
   return 1;
 }
 
-/* Unknowns from the right sides of all rows, by the independent ones. */
-static void solve(const Model *m, const Work *w, const double *right, double *out) {
+/* Unknowns from the right sides of all rows, by the independent ones; what they leave of the others. */
+static magnitude solve(const Model *m, const Work *w, const double *right, double *out) {
   const int n = m->unknowns;
   const double *A = w->lu;
+  magnitude left = 0.0;
   FOR(i, n) {
     double s = right[w->row[i]];
     FOR(c, i) s -= A[i * n + c] * out[c];
     out[i] = s;
   }
+  for (int r = n; r < m->rows; r++) left = raised(left, fabs(right[w->row[r]] - dot(A + r * n, out, n)));
   for (int i = n - 1; i >= 0; i--) {
     double s = out[i];
     for (int c = i + 1; c < n; c++) s -= A[i * n + c] * out[c];
     out[i] = s * A[i * n + i];
   }
+  return left;
 }
 
 /* y L = right over the independent rows, in place, given U already: the second half of a transposed solution. */
@@ -533,13 +592,12 @@ static void solve_transposed(const Model *m, const Work *w, double *right, doubl
 static void row_sums(const Model *m, Work *w, const double *dq, const double *pairs, double *out) {
   if (dq) {
     memset(w->pair_twist, 0, (size_t)6 * m->pairs * sizeof(double));
-    FOR(c, m->columns) FOR(i, 6) w->pair_twist[6 * m->owner[c] + i] += w->S[6 * c + i] * dq[c];
+    FOR(c, m->columns) if (dq[c] != 0.0) add_part(6, dq[c], w->S + 6 * c, w->pair_twist + 6 * m->owner[c]);
     pairs = w->pair_twist;
   }
   FOR(l, m->loops) {
     double sum[6] = {0}, about[6];
-    for (int i = m->loop_first[l]; i < m->loop_first[l + 1]; i++)
-      FOR(r, 6) sum[r] += m->loop_sign[i] * pairs[6 * m->loop_pair[i] + r];
+    for (int i = m->loop_first[l]; i < m->loop_first[l + 1]; i++) add_part(6, m->loop_sign[i], pairs + 6 * m->loop_pair[i], sum);
     twist_about(sum, w->middle + 3 * l, about);
     memcpy(out + m->height * l, about + m->part, m->height * sizeof(double));
   }
@@ -558,18 +616,15 @@ static magnitude completed(const Model *m, Work *w, const double *driven, const 
   FOR(i, m->drives) dq[m->drive[i]] = driven[i];
   row_sums(m, w, dq, NULL, right);
   FOR(r, m->rows) right[r] = -right[r] - (known ? known[r] : 0.0);
-  solve(m, w, right, found);
+  const magnitude left = solve(m, w, right, found);
   FOR(j, m->unknowns) dq[m->unknown[j]] = found[j];
-  if (!m->stresses) return 0.0;
-  row_sums(m, w, dq, NULL, right);
-  magnitude left = 0.0;
-  FOR(r, m->rows) left = raised(left, fabs(right[r] + (known ? known[r] : 0.0)));
   size += size_of(dq, m->columns) + (known ? size_of(known, m->rows) : 0.0);
   return size > 0.0 ? left / size : 0.0;
 }
 
 #ifndef MGK_COMPLEX
-/* Closed by Newton from x up to `enough`, in place: evaluated and factored there afterwards, the matrix kept where there is a place for it. */
+/* Closed by Newton from x up to `enough`, in place: evaluated and factored there afterwards, the matrix kept where there is a place for it.
+ * w->corrected: by how much. */
 static int closed(const Model *m, Work *w, double *x, double *matrix, double enough) {
   double before = INFINITY, sum = 0.0, step = INFINITY;
   FOR(i, ITERATIONS) {
@@ -582,6 +637,7 @@ static int closed(const Model *m, Work *w, double *x, double *matrix, double eno
       if (matrix) memcpy(matrix, w->lu, (size_t)m->rows * m->unknowns * sizeof(double));
       if (!eliminate(m, w)) return MGK_SINGULAR;
     }
+    w->corrected = sum;
     if (done) return MGK_OK;
     double *right = w->row_value, *found = w->column_value;
     FOR(r, m->rows) right[r] = -w->residual[r];
@@ -610,11 +666,11 @@ static void move(const Model *m, Work *w, const double *dq, double *G) {
     for (int n = m->first[k + 1] - m->first[k], i = 0; i < n; i++) {
       const int f = forward ? m->first[k] + i : m->first[k + 1] - 1 - i;
       double s[6] = {0}, part[6];
-      FOR(j, width(m->kind[f])) FOR(r, 6) s[r] += w->S[6 * (m->column[f] + j) + r] * dq[m->column[f] + j];
+      for (int c = m->column[f]; c < m->column[f + 1]; c++) add_part(6, dq[c], w->S + 6 * c, s);
       if (!forward) FOR(r, 6) V[r] -= s[r];
       moved_twist(V, s, part);
       FOR(r, 6) bias[r] += part[r];
-      if (G) FOR(j, width(m->kind[f])) moved_twist(V, w->S + 6 * (m->column[f] + j), G + 6 * (m->column[f] + j));
+      if (G) for (int c = m->column[f]; c < m->column[f + 1]; c++) moved_twist(V, w->S + 6 * c, G + 6 * c);
       if (forward) FOR(r, 6) V[r] += s[r];
     }
     memcpy(chord ? w->chord_V + 6 * (t - m->pairs + m->loops) : w->V + 6 * step[3], V, sizeof V);
@@ -629,7 +685,7 @@ static void accelerate(const Model *m, Work *w, const double *ddq) {
     const double sense = step[1] ? 1.0 : -1.0;
     double sum[6];
     memcpy(sum, w->bias + 6 * k, sizeof sum);
-    for (int f = m->first[k]; f < m->first[k + 1]; f++) FOR(j, width(m->kind[f])) FOR(i, 6) sum[i] += w->S[6 * (m->column[f] + j) + i] * ddq[m->column[f] + j];
+    for (int c = first_column(m, k); c < first_column(m, k + 1); c++) add_part(6, ddq[c], w->S + 6 * c, sum);
     FOR(i, 6) w->A[6 * step[3] + i] = w->A[6 * step[2] + i] + sense * sum[i];
   }
 }
@@ -826,10 +882,8 @@ static int rates(const Model *m, Work *w, const double *v, const double *a) {
 
 /* Effort wrenches of a pair combined to be dual to its freedoms, E (S^T E)^-1. */
 static int made_dual(const Model *m, Work *w, int k) {
-  const int c = m->column[m->first[k]];
-  int n = 0;
+  const int c = first_column(m, k), n = first_column(m, k + 1) - c;
   double U[72], E[36];
-  for (int f = m->first[k]; f < m->first[k + 1]; f++) n += width(m->kind[f]);
   memcpy(E, w->E + 6 * c, 6 * n * sizeof(double));
   FOR(i, n) FOR(j, n) U[2 * n * i + j] = dot(w->S + 6 * (c + i), E + 6 * j, 6);
   if (!inverted(U, n)) return MGK_SINGULAR;
@@ -935,7 +989,8 @@ static void loads(const Model *m, Work *w, const double *x) {
 
 /* Inertia wrenches -(I A + V x* I V) about the origin; the inertia turns with the link. */
 static void inertia(const Model *m, Work *w) {
-  FOR(b, m->links) {
+  memset(w->inertial + 6 * m->frame_link, 0, 6 * sizeof(double));
+  FOR(b, m->links) if (b != m->frame_link) {
     const double *X = w->pose + 12 * b, *V = w->V + 6 * b, *A = w->A + 6 * b, *J = m->inertia + 6 * b;
     double c[3], v[3], a[3], part[3], turn[3], rate[3], h[3], M[3], out[3], *f = w->inertial + 6 * b;
     point_of(X, m->center + 3 * b, c);
@@ -1000,8 +1055,7 @@ static void add_loops(const Model *m, const Work *w, const double *x, double *pa
     double f[6] = {0};
     memcpy(f + m->part, x + m->height * l, m->height * sizeof(double));
     wrench_moved(f, w->middle + 3 * l, 1.0);
-    for (int i = m->loop_first[l]; i < m->loop_first[l + 1]; i++)
-      FOR(r, 6) pairs[6 * m->loop_pair[i] + r] += m->loop_sign[i] * f[r];
+    for (int i = m->loop_first[l]; i < m->loop_first[l + 1]; i++) add_part(6, m->loop_sign[i], f, pairs + 6 * m->loop_pair[i]);
   }
 }
 
@@ -1019,52 +1073,51 @@ static void at_points(const Model *m, const Work *w, double *pairs, double sign)
   }
 }
 
-/* Self-stresses: one a dropped row, orthonormal in the reactions at the pair points, moments over L; then reactions of least norm. */
-static int self_stresses(const Model *m, Work *w, double *multiplier_stress, double *coupled_stress) {
-  const int n = m->unknowns, p = 6 * m->pairs, c = m->columns, k = m->couplings;
+/* Self-stresses: one a dropped row, orthonormal in the reactions at the pair points, moments over L; then reactions of least norm. Each is
+ * reactions, efforts in freedoms and multipliers of couplings, one behind the other as in w->reaction, w->tau, w->multiplier. */
+static int self_stresses(const Model *m, Work *w, double *record, const int *places) {
+  const int n = m->unknowns, p = 6 * m->pairs, c = m->columns, k = m->couplings, all = p + c + k;
   magnitude largest = 0.0;
-  memset(w->stress, 0, (size_t)m->stresses * p * sizeof(double));
+  memset(w->stress, 0, (size_t)m->stresses * all * sizeof(double));
   FOR(s, m->stresses) {
-    double *null = w->null + s * m->rows, *stress = w->stress + s * p, *effort = w->stress_effort + s * c, *y = w->column_value;
+    double *null = w->row_value, *stress = w->stress + s * all, *effort = stress + p, *y = w->column_value;
     FOR(i, n) y[i] = -w->lu[(n + s) * n + i];
     back_through(m, w, y);
     FOR(r, m->rows) null[w->row[r]] = r < n ? y[r] : r == n + s ? 1.0 : 0.0;
     add_loops(m, w, null, stress);
-    memset(effort, 0, c * sizeof(double));
     FOR(i, m->drives) effort[m->drive[i]] = dot(w->S + 6 * m->drive[i], stress + 6 * m->owner[m->drive[i]], 6);
     FOR(i, m->terms) {
       const int at = m->term_column[i];
       effort[at] = dot(w->S + 6 * at, stress + 6 * m->owner[at], 6);
     }
-    FOR(i, c) if (effort[i] != 0.0) FOR(r, 6) stress[6 * m->owner[i] + r] -= w->E[6 * i + r] * effort[i];
+    FOR(i, c) if (effort[i] != 0.0) add_part(6, -effort[i], w->E + 6 * i, stress + 6 * m->owner[i]);
     at_points(m, w, stress, -1.0);
-    FOR(i, k) multiplier_stress[s * k + i] = -null[m->height * m->loops + i];
-    largest = raised(largest, fabs(sqrt(dot(stress, stress, p))));
+    FOR(i, k) effort[c + i] = -null[m->height * m->loops + i];
+    w->size[s] = sqrt(dot(stress, stress, p));
+    largest = raised(largest, fabs(w->size[s]));
   }
   at_points(m, w, w->reaction, -1.0);
   FOR(s, m->stresses) {
-    double *stress = w->stress + s * p, *effort = w->stress_effort + s * c, *multiplier = multiplier_stress + s * k, size = 0.0;
-    FOR(pass, s ? 2 : 1) {
-      FOR(t, s) {
-        const double part = dot(stress, w->stress + t * p, p);
-        FOR(i, p) stress[i] -= part * w->stress[t * p + i];
-        FOR(i, c) effort[i] -= part * w->stress_effort[t * c + i];
-        FOR(i, k) multiplier[i] -= part * multiplier_stress[t * k + i];
-      }
-      size = sqrt(dot(stress, stress, p));
+    double *stress = w->stress + s * all, size = w->size[s], before;
+    do { /* once more where most was taken away: what is left is rounding of it (J. W. Daniel and others, Math. Comp. 30 (1976) 772-795) */
+      before = size;
+      FOR(t, s) add_part(all, -dot(stress, w->stress + t * all, p), w->stress + t * all, stress);
+      if (s) size = sqrt(dot(stress, stress, p));
       if (!(fabs(size) > DRIVERS_ALONE * largest) || !(largest > DRIVERS_ALONE)) return MGK_STRAIN;
-      FOR(i, p) stress[i] /= size;
-      FOR(i, c) effort[i] /= size;
-      FOR(i, k) multiplier[i] /= size;
-    }
-    const double part = -dot(stress, w->reaction, p);
-    FOR(i, p) w->reaction[i] += part * stress[i];
-    FOR(i, c) w->tau[i] += part * effort[i];
-    FOR(i, k) w->multiplier[i] += part * multiplier[i];
-    couple(m, multiplier, coupled_stress + s * c);
+    } while (fabs(size) < 0.7 * fabs(before));
+    const double unit = 1.0 / size;
+    FOR(i, all) stress[i] *= unit;
+    add_part(all, -dot(stress, w->reaction, p), stress, w->reaction);
   }
-  FOR(s, m->stresses) at_points(m, w, w->stress + s * p, 1.0);
   at_points(m, w, w->reaction, 1.0);
+  FOR(s, m->stresses) {
+    double *stress = w->stress + s * all;
+    at_points(m, w, stress, 1.0);
+    memcpy(record + places[MGK_STRESS] + s * p, stress, p * sizeof(double));
+    memcpy(record + places[MGK_STRESS_EFFORTS] + s * c, stress + p, c * sizeof(double));
+    memcpy(record + places[MGK_MULTIPLIER_STRESS] + s * k, stress + p + c, k * sizeof(double));
+    couple(m, stress + p + c, record + places[MGK_COUPLED_STRESS] + s * c);
+  }
   return MGK_OK;
 }
 
@@ -1077,10 +1130,11 @@ static void checks(const Model *m, Work *w, double *balance, double *power, magn
   FOR(k, m->pairs) memcpy(w->total + 6 * k, w->reaction + 6 * k, 6 * sizeof(double));
   FOR(c, m->columns) {
     const double own = w->column_value[c], acting = own + w->given[c] + w->coupled[c];
-    FOR(r, 6) w->total[6 * m->owner[c] + r] += w->E[6 * c + r] * acting;
-    *power += w->dq[c] * acting;
     worst = raised(worst, fabs(dot(w->S + 6 * c, w->reaction + 6 * m->owner[c], 6)));
     const magnitude most = raised(fabs(own), raised(fabs(w->given[c]), fabs(w->coupled[c])));
+    if (most == 0.0) continue;
+    add_part(6, acting, w->E + 6 * c, w->total + 6 * m->owner[c]);
+    *power += w->dq[c] * acting;
     wrench = raised(wrench, most), term = raised(term, fabs(w->dq[c]) * most);
   }
   FOR(b, m->links) w->speed[b] = size_of(w->V + 6 * b, 6);
@@ -1102,7 +1156,6 @@ static void checks(const Model *m, Work *w, double *balance, double *power, magn
 
 /* All forces at a state with rates; the force parts of a record. */
 static int forces(const Model *m, Work *w, const double *x, double *record, const int *places, magnitude *largest) {
-  double *multiplier_stress = record + places[MGK_MULTIPLIER_STRESS], *coupled_stress = record + places[MGK_COUPLED_STRESS];
   if (efforts(m, w)) return MGK_SINGULAR;
   loads(m, w, x);
   inertia(m, w);
@@ -1128,9 +1181,9 @@ static int forces(const Model *m, Work *w, const double *x, double *record, cons
   memcpy(w->reaction, w->total, (size_t)6 * m->pairs * sizeof(double));
   FOR(c, m->columns) {
     w->tau[c] = dot(w->S + 6 * c, w->total + 6 * m->owner[c], 6);
-    FOR(r, 6) w->reaction[6 * m->owner[c] + r] -= w->E[6 * c + r] * w->tau[c];
+    add_part(6, -w->tau[c], w->E + 6 * c, w->reaction + 6 * m->owner[c]);
   }
-  if (m->stresses && self_stresses(m, w, multiplier_stress, coupled_stress)) return MGK_STRAIN;
+  if (m->stresses && self_stresses(m, w, record, places)) return MGK_STRAIN;
   couple(m, w->multiplier, w->coupled);
   double *own = w->column_value;
   memset(own, 0, m->columns * sizeof(double));
@@ -1148,7 +1201,7 @@ static int forces(const Model *m, Work *w, const double *x, double *record, cons
   FOR(k, m->pairs) FOR(r, 3) record[places[MGK_POINTS] + 3 * k + r] = w->end[12 * k + 4 * r + 3];
 #define PUT(part, values) memcpy(record + places[part], values, (size_t)(places[part + 1] - places[part]) * sizeof(double))
   PUT(MGK_REACTIONS, w->reaction), PUT(MGK_EFFORTS, w->tau), PUT(MGK_GIVEN, w->given), PUT(MGK_COUPLED, w->coupled);
-  PUT(MGK_MULTIPLIERS, w->multiplier), PUT(MGK_STRESS, w->stress), PUT(MGK_STRESS_EFFORTS, w->stress_effort);
+  PUT(MGK_MULTIPLIERS, w->multiplier);
   return isfinite(fabs(record[places[MGK_BALANCE]] + record[places[MGK_POWER]])) ? MGK_OK : MGK_NOT_FINITE;
 }
 
@@ -1339,7 +1392,7 @@ static int certified(const Model *m, Work *w, double *grown) {
   FOR(i, m->rows * n) w->lu[i] -= 0.5 * (a->matrix[i] + b->matrix[i]) + 0.125 * h * (a->matrix_rate[i] - b->matrix_rate[i]);
   const double departure = raised(departed(m, w, b, a, -h), departed(m, w, a, b, h));
   double size = raised(1.0, raised(size_of(a->rate, m->columns), size_of(b->rate, m->columns)));
-  const double correction = 4.0 * size_of(w->column_value, n), allowed = ALONE / (size * raised(1.0, raised(a->condition, b->condition)));
+  const double correction = 4.0 * size_of(w->column_value, n), allowed = w->allowed = ALONE / (size * raised(1.0, raised(a->condition, b->condition)));
   *grown = raised(0.4, 0.8 * fmin(DEPARTURE / raised(departure, 1e-9), pow(allowed / raised(correction, 1e-300), 1.0 / 6)));
   return departure <= DEPARTURE && correction <= allowed;
 }
@@ -1511,27 +1564,59 @@ static double along_line(const Model *m, const Work *w, const Asked *asked, int 
   return at;
 }
 
-/* One position of a certified step, read off its nodes. */
-static int read_off(const Model *m, Work *w, Asked *asked, double at) {
-  const int i = at_place(asked, asked->done), d = m->drives;
-  if (at >= *w->b.at) memcpy(w->x, w->b.x, m->states * sizeof(double));
-  else between(m, w, &w->a, &w->b, at, w->x);
-  set_drives(m, w->x, asked->q + i * d);
-  continued(m, w, fmin(at, *w->b.at));
-  const int status = closed_at_rest(m, w, w->x, at, NULL);
-  if (status) return status;
-  return put(m, w, w->x, asked->v + i * d, asked->a + i * d, asked->with_forces, asked->places, asked->out + i * asked->length, asked->largest);
-}
-
 static void swapped(Node *p, Node *q) {
   const Node t = *p;
   *p = *q, *q = t;
+}
+
+/* A place on the line that is closed to rounding, where all moves as dq and ddq at a rate of the line and its change. */
+static void made_known(const Model *m, Work *w, double at, const double *x, const double *dq, const double *ddq, double rate, double change) {
+  swapped(&w->last, &w->other);
+  *w->last.at = at;
+  memcpy(w->last.x, x, m->states * sizeof(double));
+  FOR(c, m->columns) w->last.rate[c] = dq[c] / rate, w->last.bend[c] = (ddq[c] - change * w->last.rate[c]) / (rate * rate);
+  w->known++, w->curve.x = NULL;
+}
+
+/* The state at a place of a step, off the curve through the last places known and node b. */
+static void predicted(const Model *m, Work *w, double at, double *x) {
+  if (!w->curve.x || at > w->curve.until) {
+    const int near = !w->curve.x && w->known > 1 && at - *w->last.at <= REACHED * (*w->last.at - *w->other.at);
+    through(m, w, &w->last, &w->b, near ? &w->other : NULL, &w->curve);
+  }
+  on_curve(m, w, &w->curve, at, x);
+}
+
+/* One position of a certified step, read off its curve. What had to be corrected becomes a place of the curve, where its motion follows
+ * the line. */
+static int read_off(const Model *m, Work *w, Asked *asked, double at) {
+  const int i = at_place(asked, asked->done), d = m->drives, inside = at < *w->b.at;
+  const double *v = asked->v + i * d, *a = asked->a + i * d;
+  if (inside) predicted(m, w, at, w->x);
+  else memcpy(w->x, w->b.x, m->states * sizeof(double));
+  set_drives(m, w->x, asked->q + i * d);
+  continued(m, w, fmin(at, *w->b.at));
+  int status = closed_at_rest(m, w, w->x, at, NULL);
+  if (inside && (status || !(w->corrected <= w->allowed))) { /* the step's own curve, which the certificate is about */
+    between(m, w, &w->a, &w->b, at, w->x);
+    set_drives(m, w->x, asked->q + i * d);
+    status = closed_at_rest(m, w, w->x, at, NULL);
+  }
+  const int known = inside && w->corrected > 0.0;
+  if (!status) status = put(m, w, w->x, v, a, asked->with_forces, asked->places, asked->out + i * asked->length, asked->largest);
+  if (status || !known) return status;
+  const double rate = dot(v, w->direction, d), change = dot(a, w->direction, d);
+  double off = 0.0;
+  FOR(c, d) off = raised(off, fabs(v[c] - rate * w->direction[c]) + fabs(a[c] - change * w->direction[c]));
+  if (off <= STRAIGHT_ON * (fabs(rate) + fabs(change)) && fabs(change) < STEADY * rate * rate) made_known(m, w, at, w->x, w->dq, w->ddq, rate, change);
+  return MGK_OK;
 }
 
 /* Along a straight line of the drives from node a, which lies at place 0, to `end` at a `length`; `until`: the positions on it. */
 static int follow(const Model *m, Work *w, Asked *asked, const double *begin, const double *end, double length, int until) {
   double h = fmin(LONGEST, length), furthest = 0.0, *drive = w->column_value;
   int known = 0, status;
+  w->known = 0;
   while (*w->a.at < length) {
     if (++w->steps > MOST_STEPS + asked->done) return MGK_TOO_FAR;
     h = fmin(h, NEAREST * w->a.reach);
@@ -1547,7 +1632,8 @@ static int follow(const Model *m, Work *w, Asked *asked, const double *begin, co
     FOR(i, m->drives) drive[i] = step == left ? end[i] : begin[i] + *w->b.at * w->direction[i];
     set_drives(m, w->b.x, drive);
     double grown = 0.5;
-    status = closed(m, w, w->b.x, w->b.matrix, PASSED);
+    const int several = asked->done + SEVERAL < until && along_line(m, w, asked, asked->done + SEVERAL, begin) < *w->b.at;
+    status = closed(m, w, w->b.x, w->b.matrix, several ? CLOSED : PASSED);
     if (!status) status = made_node(m, w, &w->b);
     if (!status && !certified(m, w, &grown)) status = MGK_STEP;
     if (!status && m->passives) status = rest_along(m, w);
@@ -1558,6 +1644,7 @@ static int follow(const Model *m, Work *w, Asked *asked, const double *begin, co
       if (h < SHORTEST) return status;
       continue;
     }
+    made_known(m, w, *w->a.at, w->a.x, w->a.rate, w->a.bend, 1.0, 0.0);
     for (; asked->done < until; asked->done++) {
       const double at = along_line(m, w, asked, asked->done, begin);
       if (at > *w->b.at && step != left) break;

@@ -6,7 +6,7 @@
  *
  * I   MGK_HEAD counts (below), then one after the other:
  *       first[pairs + 1]                        first factor of every pair
- *       kind, column, state, number[factors]    see MGK_TURN ...; first column, first state number, place among the factor numbers
+ *       kind[factors], column[factors + 1], state, number[factors]    see MGK_TURN ...; first column, first state number, place among the factor numbers
  *       ends[2 pairs]                           links a and b
  *       walk[4 (pairs - loops)]                 spanning tree from the frame: pair, whether from a to b, parent, child
  *       chord[loops]                            the other pairs
@@ -27,7 +27,7 @@
 #define MECHGRAPH_KERNEL_H
 #include <stddef.h>
 
-#define MGK_FORMAT 3
+#define MGK_FORMAT 4
 
 /* The counts at the head of I. */
 enum {

@@ -124,8 +124,7 @@ static void carried_along(const Model *m, const Work *w, const double *dq, doubl
     const int *step = m->walk + 4 * t, k = step[0];
     const double sense = step[1] ? 1.0 : -1.0;
     memcpy(V + 6 * step[3], V + 6 * step[2], 6 * sizeof(double));
-    for (int f = m->first[k]; f < m->first[k + 1]; f++) FOR(j, width(m->kind[f]))
-      FOR(i, 6) V[6 * step[3] + i] += sense * w->S[6 * (m->column[f] + j) + i] * dq[m->column[f] + j];
+    for (int c = first_column(m, k); c < first_column(m, k + 1); c++) add_part(6, sense * dq[c], w->S + 6 * c, V + 6 * step[3]);
   }
   FOR(b, m->links) {
     const double *X = w->pose + 12 * b, *T = V + 6 * b, *J = m->inertia + 6 * b;

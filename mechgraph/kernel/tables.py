@@ -39,7 +39,7 @@ from mechgraph.pairs.factors import ConstantScrew, Factor, Freedom, Rotation
 
 Integers = NDArray[np.int32]
 
-FORMAT = 3
+FORMAT = 4
 PARTS = (
     "x", "coordinates", "dq", "ddq", "closure", "condition", "points", "reactions", "efforts", "given", "loads", "stress", "stress_efforts",
     "coupled", "multipliers", "multiplier_stress", "coupled_stress", "shaking", "balance", "power",
@@ -173,7 +173,7 @@ def layout(system: System, drives: Index, passive: Sequence[PassiveMotion]) -> L
     head = [FORMAT, len(s.m.links), len(s.m.pairs), len(steps), s.n_freedoms, s.n_state, g.n_loops, len(pair), K, len(term_columns),
             len(drives), len(unknown), 0, g.frame, int(numbers[-1]), 0, len(passive), len(moved), g.span.start, g.width]  # fmt: skip
     parts = [
-        head, first, [step.kind for _, step in steps], columns[:-1], states[:-1], numbers[:-1], ends.ravel(), tree.ravel(), g.chords,
+        head, first, [step.kind for _, step in steps], columns, states[:-1], numbers[:-1], ends.ravel(), tree.ravel(), g.chords,
         np.searchsorted(loop, np.arange(g.n_loops + 1)), pair, sign, s.pair_of_freedom, s.single_rows, s.is_length, place, *effort_factor,
         [row.computed_efforts for row in map(s.types.__getitem__, s.type_of.tolist())], drives, unknown,
         np.searchsorted(term_rows, np.arange(K + 1)), term_columns,
