@@ -59,7 +59,7 @@ def test_a_piston_moves_a_crank_as_it_is_told(engine: str, method: str) -> None:
     assert (s.prescribed, s.actuated) == (("A.Rz",), ("D.Tz",))
 
 
-@pytest.mark.daily(8)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize(("engine", "method"), WAYS)
 @pytest.mark.parametrize("freedom", ["D", "C.Rx", "F", "B"])
 def test_driven_by_what_was_found_it_is_the_same(engine: str, method: str, freedom: str) -> None:

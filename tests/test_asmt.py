@@ -87,6 +87,7 @@ def test_the_machines_have_every_pair_that_freecad_has():
     assert {p.type.symbol for m in MACHINES.values() for p in m.pairs} == set(KINDS)
 
 
+@pytest.mark.daily(8)
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("name", MACHINES)
 def test_an_assembly_gives_the_numbers_of_the_same_mechanism_declared_in_python(tmp_path, name, seed):

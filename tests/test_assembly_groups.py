@@ -243,6 +243,7 @@ def test_other_classes_have_other_keys() -> None:
     assert keys(loops[2], {"O1": 0.1}) == keys(loops[0], {"O1": 0.1})
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize(
     ("m", "at"), [CASES[i] for i in (0, 1, 2, 3, 4, 11)], ids=[CASES[i][0].name for i in (0, 1, 2, 3, 4, 11)]
 )

@@ -59,6 +59,7 @@ def brute(links: int, joints: int, mobility: int) -> set[nx.Graph]:
     return {g for alike in kept.values() for g in alike}
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize(("links", "mobility"), [(6, 1), (5, 2), (6, 3), (5, 0)])
 def test_brute_force_finds_the_same(links: int, mobility: int) -> None:
     joints = (3 * (links - 1) - mobility) // 2

@@ -198,6 +198,7 @@ def tensioner(loads=(), drives=("p",), radii=(0.1, 0.04, 0.05), **belt):
     )
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("method", ["loop_wrench", "newton_euler", "printed"])
 @pytest.mark.parametrize("load", [6.0, -6.0])
@@ -328,6 +329,7 @@ def on_bearings(turns=True, teeth=False, **belt):
     return mg.Mechanism("shafts", None, (), drives, loads, parts=held, gears=gears, couplings=[drive])
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("method", ["loop_wrench", "newton_euler", "printed"])
 def test_shafts_in_real_bearings_turn_and_share_the_tensions(method):
     """The row needs no hinge: turns are counted by the pair Fr beside the bearings; every bearing takes half of both strands."""

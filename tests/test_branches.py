@@ -105,7 +105,7 @@ def test_a_position_is_on_the_branch_that_leads_there() -> None:
         b.defects([mode, mode.start | {"O3.Rz": 0.2}])
 
 
-@pytest.mark.daily(16)
+@pytest.mark.daily(8)
 @pytest.mark.parametrize("seed", range(1000))
 def test_branch_and_circuit_of_every_position_are_those_of_the_closed_form(seed: int) -> None:
     """Of four-bars, many of them near a change point, at places anywhere and near folds; their crank turns right round without folds."""

@@ -41,6 +41,7 @@ def double_dwell(name="cycloidal", rise=0.02, over=THIRD, **more):
     return mg.CamLaw([mg.Segment(name, rise, over, **more), rest, mg.Segment(name, -rise, over, **more), rest])
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("name", TABLE)
 def test_factors_of_the_standard_laws(name):
     assert mg.cam_laws()[name] == pytest.approx(TABLE[name], rel=1e-12)
@@ -298,6 +299,7 @@ SHAPES = {
 }
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("kind", SHAPES)
 def test_cams_come_back_from_files_copies_and_units(kind, tmp_path):
     curve = SHAPES[kind]

@@ -578,7 +578,6 @@ def test_as_a_program() -> None:
     assert not done.stderr
     assert "\x1b" not in done.stdout
     assert done.stdout == run(*same).stdout
-    assert process("solve", "rscr").returncode == 2
 
 
 def test_without_typer(tmp_path: Path) -> None:
@@ -661,6 +660,7 @@ def test_outputs_that_cannot_show_every_character(tmp_path: Path) -> None:
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.daily(10)
 @pytest.mark.parametrize("command", ["check", "equations", "solve"])
 @pytest.mark.parametrize(
     "name", ["x" * 300, "x" * 100_000, "a\0b", "\udcff", "x/" * 5000, "", " ", "\x1b[2J", "~", "."]

@@ -128,6 +128,7 @@ def test_a_ball_that_rolls_does_not_slide() -> None:
     assert np.isnan(c.pressure_angle("frame")).all()
 
 
+@pytest.mark.daily(6)
 @pytest.mark.parametrize("name", [n for n in mg.library() if any(p.type.touching for p in mg.load(n).pairs)])
 def test_no_contact_does_work_and_force_times_velocity_is_the_power(name: str) -> None:
     """The normal force is at right angles to sliding, and carries the power that both links exchange at the center of the ball."""

@@ -192,6 +192,7 @@ def open_profiles() -> dict[str, tuple[mg.Pair, float]]:
     }
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("name", list(open_profiles()))
 def test_an_open_profile_that_would_have_to_pull_asks_how_it_is_closed(name: str) -> None:
     """Pressed together it says nothing; pulled apart it warns, unless it says that it is held, and then it lifts off or does not."""

@@ -37,6 +37,7 @@ def foot(surface, side=1.0, away=BALL):
     return x + side * away * n, side * n
 
 
+@pytest.mark.daily(5)
 @pytest.mark.filterwarnings("ignore:.*lifts off")
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("name", ["plane", "sphere", "cylinder", "cone", "torus"])

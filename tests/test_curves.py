@@ -207,6 +207,7 @@ def test_random_mechanisms_with_curves(seed):
     holds(system, x, seed)
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("seed", [4, 8, 12])
 def test_random_mechanisms_with_curves_at_work(seed):
     """Both engines and both methods agree, power balances, and a position does not depend on which others are asked for."""

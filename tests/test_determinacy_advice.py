@@ -43,6 +43,7 @@ def changed(m: mg.Mechanism, effect: Effect) -> mg.DeterminacyReport:
     return mg.check(m)
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("name", BUILDERS)
 def test_effects_are_true(name: str) -> None:
     report = mg.check(BUILDERS[name]())
@@ -220,6 +221,7 @@ def test_cylinders_between_balls_are_completed_until_nothing_is_redundant():
 OVERCONSTRAINED = ["four-bar", "slider-crank", "bennett", "spherical-four-bar", "windows-2"]
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("name", OVERCONSTRAINED)
 def test_every_variant_is_self_aligning(name: str) -> None:
     """Applied, the first ones and some of the others have no redundancy, the mobility of before and unique reactions."""

@@ -184,13 +184,13 @@ KNOWN = ("goldberg", "myard", "bricard_cube", "sarrus", "spherical", "three_cran
          "rccc", "door", "prprrh_special", "hexapod", "three_upu", "folded_bars", "two_four_bars")  # fmt: skip
 
 
-@pytest.mark.daily(18)
+@pytest.mark.daily(8)
 @pytest.mark.parametrize("name", LOOPS)
 def test_library_reports_do_not_depend_on_the_engine(name: str) -> None:
     assert_same_report(mg.load(name))
 
 
-@pytest.mark.daily(5)
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("name", [n for n in KNOWN if hasattr(known, n)])
 def test_known_reports_do_not_depend_on_the_engine(name: str) -> None:
     assert_same_report(getattr(known, name)())
@@ -230,6 +230,7 @@ def test_counted_ledger_agrees_with_the_registry(name: str, bookkeeping: str) ->
     assert dict(counted.by_kind) == dict(read.by_kind)
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("n", [15, 16, 17, 60])
 def test_a_report_holds_the_same_at_any_size(n: int) -> None:
     """15, 16 and 17 loops once had other keys, other counts and other words."""
@@ -269,6 +270,7 @@ def skeleton(report: Any) -> list[str]:
     return list(dict.fromkeys(out))
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("kind", ["ladder", "four-bars"])
 def test_words_keys_and_advice_do_not_change_with_size(kind: str) -> None:
     """The same ladder of 15, 16, 17 and 26 loops: the engine changes between 23 and 24."""

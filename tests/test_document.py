@@ -411,6 +411,7 @@ def same(latex: str) -> str:
     return re.sub(r"\s|\\(?=[_#%&$])", "", latex)
 
 
+@pytest.mark.daily(24)
 @pytest.mark.parametrize("name", mg.library())
 @pytest.mark.parametrize("unknowns", ["kinetostatics", "response"])
 def test_every_equation_of_the_library_reads_the_same(name: str, unknowns: str) -> None:
@@ -463,7 +464,7 @@ def too_wide(log: str) -> list[float]:
     return [float(points) for points in re.findall(r"Overfull \\hbox \(([\d.]+)pt too wide", log)]
 
 
-@pytest.mark.daily(12)
+@pytest.mark.daily(6)
 @pytest.mark.parametrize("name", mg.library())
 def test_the_equations_of_the_library_fit_the_page(name: str, tmp_path: Path) -> None:
     f = mg.formulate(mg.load(name), unknowns="response" if name == "rcsr" else "kinetostatics")

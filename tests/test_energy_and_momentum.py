@@ -71,6 +71,7 @@ def test_a_path_that_ends_by_rounding_before_its_goal_is_followed_on():
     assert np.abs(r.energy.balance).max() < 1e-8 * r.energy.kinetic.max()
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("seed", [2, 3, 5, 8, 12, 13])
 def test_what_moves_by_itself_needs_no_drives(seed):
     """Kinetostatics along the result: drives that hold it to its motion exert nothing, and the reactions are the same."""
@@ -86,6 +87,7 @@ def test_what_moves_by_itself_needs_no_drives(seed):
         np.testing.assert_allclose(r[pair.name].force, s[pair.name].force, atol=1e-8 * largest)
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("symbol", ["H", "U", "E", "Sc", "Cp"])
 def test_momentum_is_kept_where_nothing_acts(symbol):
     """Momentum, and moment of momentum about the origin, of three bodies in free flight with eight to eleven freedoms."""
@@ -217,6 +219,7 @@ def test_no_energy_is_lost_where_branches_all_but_cross(off):
     assert not r.warnings
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("off", [1e-8, -1e-9])
 def test_a_block_that_slides_beside_it_passes_there_as_well(off):
     """In independent freedoms: closing took rounding for an open loop where the condition is poor."""

@@ -1,9 +1,9 @@
 """The examples run, and the numbers that they assert hold."""
 
+import contextlib
+import io
 import json
-import os
 import runpy
-import subprocess
 import sys
 from pathlib import Path
 
@@ -15,19 +15,16 @@ import mechgraph as mg
 ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES = sorted((ROOT / "examples").glob("[0-9]*.py"))
 LARGEST_PICTURE = 150_000
+ELSEWHERE = {"05_lee_verdicts", "12_excavator"}
+"""Run by ``reference/test_lee_verdicts.py``, and for its page below."""
 
 
 def run(script: Path, *arguments: str) -> str:
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "MPLBACKEND": "agg"}
-    done = subprocess.run(
-        [sys.executable, "-W", "error", str(script), *arguments],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    """What a script prints; in this process, as a program of its own would spend most of its time on imports."""
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(io.StringIO()) as printed:
+        patch.setattr(sys, "argv", [str(script), *arguments])
+        runpy.run_path(str(script), run_name="__main__")
+    return printed.getvalue()
 
 
 def draws(script: Path) -> bool:
@@ -35,8 +32,14 @@ def draws(script: Path) -> bool:
     return "sys.argv" in text and "draw" in text and "write_report" not in text
 
 
-@pytest.mark.daily(8)
-@pytest.mark.parametrize("script", EXAMPLES, ids=lambda script: script.stem)
+@pytest.mark.daily(9)
+@pytest.mark.parametrize(
+    "script",
+    [
+        pytest.param(script, marks=[pytest.mark.slow] if script.stem in ELSEWHERE else [], id=script.stem)
+        for script in EXAMPLES
+    ],
+)
 def test_example(script: Path, tmp_path: Path) -> None:
     text = script.read_text(encoding="utf-8")
     assert text.startswith('"""')

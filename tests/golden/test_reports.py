@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import machines
@@ -26,28 +27,33 @@ MECHANISMS = {
 Golden = Callable[[str, str], None]
 
 
+@cache
+def report(name: str) -> mg.DeterminacyReport:
+    return mg.check(MECHANISMS[name]())
+
+
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_text(name: str, golden: Golden) -> None:
-    text = str(mg.check(MECHANISMS[name]()))
+    text = str(report(name))
     assert max(len(line) for line in text.splitlines()) <= 80
     golden(f"{name}.txt", text)
 
 
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_full_text(name: str, golden: Golden) -> None:
-    text = mg.check(MECHANISMS[name]()).text(full=True)
+    text = report(name).text(full=True)
     assert max(len(line) for line in text.splitlines()) <= 80
     golden(f"{name}-full.txt", text)
 
 
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_markdown(name: str, golden: Golden) -> None:
-    golden(f"{name}.md", mg.check(MECHANISMS[name]()).to_markdown())
+    golden(f"{name}.md", report(name).to_markdown())
 
 
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_html(name: str, golden: Golden) -> None:
-    golden(f"{name}.html", mg.check(MECHANISMS[name]())._repr_html_())
+    golden(f"{name}.html", report(name)._repr_html_())
 
 
 def rounded(value: Any) -> Any:
@@ -63,7 +69,7 @@ def rounded(value: Any) -> Any:
 
 @pytest.mark.parametrize("name", [n for n in MECHANISMS if n != "windows"])
 def test_json(name: str, golden: Golden) -> None:
-    facts = json.loads(mg.check(MECHANISMS[name]()).to_json())
+    facts = json.loads(report(name).to_json())
     golden(f"{name}.json", json.dumps(rounded(facts), indent=2) + "\n")
 
 

@@ -83,7 +83,7 @@ def test_blocks_agree_with_newton_euler(small_blocks, seed):
     assert_same(mg.solve(m, given), mg.solve(m, given, method="newton_euler"), 1e-9)
 
 
-@pytest.mark.daily(4)
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("seed", range(20, 32))
 def test_size_of_blocks_changes_nothing(monkeypatch, seed):
     m, given = solvable(seed)
@@ -166,6 +166,7 @@ def test_callables_still_see_all_positions(small_blocks):
     assert set(shapes) == {(23, 4, 4)}
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("seed", range(40, 52))
 def test_the_careful_march_alone_gives_the_same_positions(monkeypatch, seed):
     m, given = solvable(seed)
@@ -250,7 +251,7 @@ def near_its_dead_point(before):
     return mg.assemble(m, {"A": crank}).replace(drives=["D"])
 
 
-@pytest.mark.daily(4)
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("before", [1e-3, 1e-5, 1e-7])
 def test_from_beside_a_dead_point_and_to_it(engine, before):

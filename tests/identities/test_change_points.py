@@ -69,6 +69,7 @@ def test_parallelogram_at_and_beside_its_change_point(engine, method, moved):
         assert (np.abs(s["A"].effort[2:, 0] - 10.0) < 1e-10 / far).all()
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("side", [1, -1])
 def test_kite_at_and_beside_its_change_point(engine, side):
@@ -119,7 +120,7 @@ def rocker(dims, crank, side):
     return d * ((b * b - c * c + square + 1j * side * far * near) / (2 * square) - 1)
 
 
-@pytest.mark.daily(7)
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("dims", [(1, 1, 2, 2), (1, 1, 1, 1), (1, 2, 2, 1), (1, 2, 1, 2), (2, 1, 2, 1), (2, 2, 1, 1)])
 @pytest.mark.parametrize("side", [1, -1])
 def test_velocity_is_continuous_over_whole_turns(dims, side):
@@ -133,7 +134,7 @@ def test_velocity_is_continuous_over_whole_turns(dims, side):
     np.testing.assert_allclose(s["D"].velocity[:, 0], (f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * h), atol=1e-9)
 
 
-@pytest.mark.daily(4)
+@pytest.mark.daily(2)
 @pytest.mark.parametrize(
     ("engine", "off"),
     [(engine, off) for off in (9e-4, 5e-4, 1e-4, 1e-5) for engine in ("dense", "sparse")] + [("dense", 1e-6)],
@@ -242,6 +243,7 @@ def exact_rocker(bars, crank, side):
         )
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize(("bars", "side"), [((1, 2.5, 2, 1.5), 1), ((1, 3, 2, 2), 1), ((1.5, 3, 2.5, 2), -1)])
 def test_accelerations_beside_a_change_point_are_those_of_fifty_digits(engine, bars, side):
@@ -278,6 +280,7 @@ def test_an_ordinary_cycle_is_accurate_and_says_so():
     assert np.array_equal(s.to_pandas()["accuracy"], s.checks.accuracy)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize(("size", "gap"), [(0.0, 1e-9), (1e3, 1e-7), (0.0, 1e-12)])
 def test_a_narrow_gap_is_followed_or_told_whatever_stands_beside(engine, size, gap):

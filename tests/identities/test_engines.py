@@ -67,14 +67,14 @@ def test_random_mechanisms(seed):
     assert_engines_agree(m, given, **how)
 
 
-@pytest.mark.daily(22)
+@pytest.mark.daily(11)
 @pytest.mark.parametrize("name", mg.library())
 def test_library(name):
     m = mg.load(name)
     assert_engines_agree(m, {d.freedom: d.motion.position[:5] for d in m.drives if d.motion is not None})
 
 
-@pytest.mark.daily(8)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("method", ["loop_wrench", "newton_euler", "printed"])
 @pytest.mark.parametrize("kind", LATTICES)
 def test_lattices_around_the_crossover(kind, method):
@@ -130,6 +130,7 @@ def test_the_sign_of_what_holds_a_passive_body(seed):
         np.testing.assert_allclose(value, other[name], rtol=1e-9)
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("seed", [40, 204, 218])
 def test_where_a_passive_body_stands_does_not_hang_on_the_engine(seed):
     """A body between a sphere and a plane: the turn that takes its spin out is not linear in the coordinates of the plane."""
@@ -163,7 +164,7 @@ COUPLED = {
 }
 
 
-@pytest.mark.daily(4)
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("name", COUPLED)
 @pytest.mark.parametrize("method", ["loop_wrench", "newton_euler", "printed"])
 def test_couplings(name, method):

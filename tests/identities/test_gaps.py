@@ -117,6 +117,7 @@ def test_loops_nearly_folded_together_keep_their_branches(seed):
         assert error[inside].max() < 1e-9
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("exponent", range(3, 10, 2))
 @pytest.mark.parametrize("longer", [True, False])
 def test_slider_crank_with_rod_about_as_long_as_the_crank(exponent, longer):
@@ -143,7 +144,7 @@ def test_slider_crank_with_rod_about_as_long_as_the_crank(exponent, longer):
         assert (error * np.maximum(root[ok], 1e-9)).max() < 1e-11
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("size", [3e-4, 1e-3])
 def test_a_small_bend_of_a_slot_that_leads_back_is_not_leapt_over(size, turned):
@@ -361,6 +362,7 @@ def screw():
 MADE = {"geared": geared, "screw": screw, "four-bar": None, "rssr": None, "7r": None, "rcsr": None}
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("sense", [1, -1])
 @pytest.mark.parametrize("name", MADE)
 def test_far_positions_are_those_followed_all_the_way(name, sense, monkeypatch):

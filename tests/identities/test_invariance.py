@@ -63,6 +63,7 @@ def pose(turn: np.ndarray, shift: np.ndarray) -> np.ndarray:
     return out
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("name", BUILDERS)
 def test_metres_and_millimetres(name: str) -> None:
     m = BUILDERS[name]()

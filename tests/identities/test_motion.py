@@ -91,6 +91,7 @@ def test_rates_are_the_derivatives_of_positions(seed):
     assert_all_rates(m, t, s)
 
 
+@pytest.mark.daily(7)
 @pytest.mark.parametrize("symbol", TYPES)
 def test_rates_are_the_derivatives_of_positions_for_every_pair_type(symbol):
     """A ring that holds the type at least once, declared in both directions."""
@@ -143,7 +144,7 @@ def test_markers_link_by_link_meet_at_every_position():
             np.testing.assert_allclose(za, zb, atol=1e-10)
 
 
-@pytest.mark.daily(8)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("seed", range(40))
 def test_what_is_not_reached_has_a_turning_point_before_it(seed):
     """Positions that are refused: an arc-length continuation of its own finds that the drivers turn back before."""
@@ -165,6 +166,7 @@ def test_what_is_not_reached_has_a_turning_point_before_it(seed):
     np.testing.assert_array_equal(caught.value.solution.status, s.status)
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("seed", [1017, 1033, 1062, 1102])
 def test_loops_stay_closed_where_a_passive_freedom_is_held(seed):
     m = with_drives(closed_mechanism(seed), seed)
@@ -234,6 +236,7 @@ def test_batch_axes_before_the_last_are_independent_cases():
             np.testing.assert_allclose(whole[p.name].velocity[c], alone[p.name].velocity, atol=1e-8)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("seed", range(6))
 def test_kinematics_of_the_moved_mechanism_is_the_moved_kinematics(seed):
     m, _, given, s = moving(seed)
@@ -290,6 +293,7 @@ def twins(count: int, near: float) -> mg.Mechanism:
     return mg.Mechanism("twins", pairs=pairs, drives=["A"])
 
 
+@pytest.mark.daily(6)
 @pytest.mark.parametrize("near", [1e-2, 1e-3, 1e-4])
 @pytest.mark.parametrize("count", [2, 3, 4])
 @pytest.mark.parametrize("positions", [4, 73])
@@ -317,6 +321,7 @@ def slide(rod, angle):
     return np.cos(angle) + np.sqrt(rod**2 - np.sin(angle) ** 2)
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize(
     ("near", "begin", "positions"),
     [(1e-6, 0.6205487042125981, 5210), (1e-7, 0.3, 5000), (1e-8, 0.3, 3601), (1e-8, 0.6040731559945676, 5484)],
@@ -329,6 +334,7 @@ def test_no_position_is_on_the_other_branch_near_a_change_point(near: float, beg
     np.testing.assert_allclose(s["D"].position[:, 0], expected, atol=1e-9)
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize(
     ("short", "begin"), [(1.364766307e-6, -0.3855575158413451), (1e-4, 0.2), (1e-5, -0.4), (3e-6, 0.6), (1e-8, 0.5)]
 )

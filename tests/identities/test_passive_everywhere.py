@@ -157,6 +157,7 @@ def facts(report: mg.DeterminacyReport, pairs: tuple[mg.Pair, ...]) -> dict[str,
     }
 
 
+@pytest.mark.daily(15)
 @pytest.mark.parametrize("name", mg.library())
 def test_pairs_that_hold_nothing_change_no_fact(name: str) -> None:
     m = mg.load(name)
@@ -178,6 +179,7 @@ FOLDED = {
 }
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("name", FOLDED)
 def test_folded_bars_name_their_branches(name: str, engine: str) -> None:
@@ -386,6 +388,7 @@ def test_shaky_and_singular_positions(build: object, mobility: int, finite: int,
     assert (report.mobility, report.finite_mobility) == (mobility, finite)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("value", [0.1, -0.1, 0.001])
 def test_no_position_of_a_shaky_mechanism_is_said_to_be_reached(value: float, engine: str) -> None:

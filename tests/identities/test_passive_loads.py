@@ -129,6 +129,7 @@ def test_no_load_makes_a_freedom_passive() -> None:
         mg.solve(driven_through)
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("method", ["loop_wrench", "newton_euler", "printed"])
 def test_a_chain_of_balls_that_sags_is_held_about_the_line_of_its_ends(engine: str, method: str) -> None:

@@ -432,6 +432,7 @@ def door() -> mg.Mechanism:
     )
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("bookkeeping", BOOKKEEPINGS)
 @pytest.mark.parametrize(
     ("m", "motion"),

@@ -46,7 +46,7 @@ def assert_methods_agree(m, given, **how):
         assert worst <= SAME * max(1.0, worse), f"{where}: {worst:.1e} at condition {worse:.1e}"
 
 
-@pytest.mark.daily(32)
+@pytest.mark.daily(12)
 @pytest.mark.parametrize("redundant", ["nan", "minimum_norm"])
 @pytest.mark.parametrize("name", MOVING)
 def test_library(name, redundant):
@@ -54,7 +54,7 @@ def test_library(name, redundant):
     assert_methods_agree(m, library_motion(m), redundant=redundant)
 
 
-@pytest.mark.daily(25)
+@pytest.mark.daily(10)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("redundant", ["nan", "minimum_norm"])
 @pytest.mark.parametrize("make", REDUNDANT.values(), ids=REDUNDANT)
@@ -88,6 +88,7 @@ def test_the_solution_says_which_method_ran():
     assert mg.kinematics(m, {"A": 0.3}).method is None
 
 
+@pytest.mark.daily(15)
 @pytest.mark.parametrize("name", MOVING)
 def test_kinetostatics_is_solved_by_its_assembled_equations(name):
     m = mg.load(name)
@@ -114,7 +115,7 @@ def moves_as_held(s: mg.Solution, m: mg.Mechanism, unknown: mg.equations.terms.U
     return not s.passive_effort or unknown.freedom == m.full_name(m.drives[0].freedom)
 
 
-@pytest.mark.daily(44)
+@pytest.mark.daily(15)
 @pytest.mark.parametrize("bookkeeping", ["lee", "minimal"])
 @pytest.mark.parametrize("name", MOVING)
 def test_given_the_efforts_of_a_solution_the_response_is_its_motion(name, bookkeeping):

@@ -52,7 +52,7 @@ def first_drive(m):
     return freedom, begin, 1.0 if m.pairs[k].type.freedoms[j].turns else 0.02
 
 
-@pytest.mark.daily(6)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("name", mg.library())
 def test_library(name):
     m = mg.load(name)
@@ -152,6 +152,7 @@ def two_rods():
     return mg.Mechanism("two rods", links, pairs, ["A"], [mg.Gravity((0, 0, -9.81))])
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize(
     ("m", "engine", "end"),
     [(rssr(), "dense", 6.0), (two_rods(), "dense", 6.0), (mg.load("rssr"), "dense", 6.0), (two_rods(), "sparse", 1.0)],
@@ -185,7 +186,7 @@ def assert_rates_are_derivatives(s):
         np.testing.assert_allclose(s.link(k).acceleration, rate, atol=1e-8 + 10 * tail)
 
 
-@pytest.mark.daily(5)
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("case", CARRIED)
 def test_passive_links_that_move_against_each_other_or_slide(case, engine):
@@ -221,6 +222,7 @@ def test_links_with_several_passive_motions(kind, engine):
         np.testing.assert_allclose(far, near, atol=1e-9)
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("end", [0.7, -1.5])
 def test_spin_is_that_of_parallel_transport(engine, end):
@@ -235,6 +237,7 @@ def test_spin_is_that_of_parallel_transport(engine, end):
         assert np.abs(spin).max() < 1e-13
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize(("seed", "pair", "link"), [(40, "J3", "b3"), (204, "J5", "b3"), (218, "J12", "b10")])
 def test_spin_of_a_body_between_sphere_and_plane(engine, seed, pair, link):
@@ -283,6 +286,7 @@ def assert_parallel(s, bars, q, start):
 ONE = [Bars(1.0, 2.0, 1.0, 2.0)]
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("step", [2, 7, -7, *(pytest.param(step, marks=pytest.mark.slow) for step in (1, 6, 10, 0.74))])
 def test_parallelogram_over_a_turn(step):
     q = np.radians(np.arange(0, 360 + 1e-9, abs(step))) * np.sign(step)

@@ -33,6 +33,7 @@ def test_second_loop_with_both_errors_copied() -> None:
     assert found["theta7"] <= ROUNDING
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize(("sign", "carry"), [(-1.0, rcsr_csr.A2), (1.0, rcsr_csr.A1), (-1.0, rcsr_csr.A1)])
 def test_second_loop_with_one_error_or_none_cannot_be_assembled(sign: float, carry: float) -> None:
     """On the branch of the table, in its first row."""
