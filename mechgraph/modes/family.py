@@ -275,6 +275,10 @@ class Family:
         out[: s.graph.loop_rows] += here.loop_sums(V[:, :P] - V[:, P:])
         return np.asarray(out)
 
+    def random_members(self, rng: np.random.Generator, n: int) -> list[Member]:
+        """Several of them."""
+        return [self.random_member(rng) for _ in range(n)]
+
     def random_closed(self, rng: np.random.Generator) -> tuple[Member, Array] | None:
         """A random member with an assembly ``x (nx,)`` of it; None where random coordinates cannot be closed within the class."""
         member, s = self.random_member(rng), self.system

@@ -31,6 +31,8 @@ ENDLESS_STATE = (25.0, 1e5, 1e3)
 """Imaginary part of an angle, length over L, and quaternion from which on an assembly is on its way to infinity."""
 RATES_KEPT = 4
 """Nodes from whose rates a step is predicted."""
+FIRST_STEP = 0.02
+"""The first step of a track, as part of its way."""
 
 TRACKS_TOGETHER = 600
 """Tracks followed together, at most, of several positions or loops."""
@@ -269,26 +271,44 @@ def straight(s: Array) -> tuple[Array, Array]:
 
 
 def follow(
-    leg: Followed, x: Array, care: Care, way: Way = straight, tracks: Index | None = None, polish: bool = True
+    leg: Followed,
+    x: Array,
+    care: Care,
+    way: Way = straight,
+    tracks: Index | None = None,
+    polish: bool = True,
+    laps: int = 1,
 ) -> Tracked:
-    """Tracks from states ``x (nx, V)`` at ``s = 0`` to ``s = 1``, at the end polished; ``tracks`` are their numbers on the leg."""
+    """Tracks from states ``x (nx, V)`` at ``s = 0`` to ``s = 1``, at the end polished; ``tracks`` are their numbers on the leg.
+
+    Of several ``laps`` each one follows the ways ``V`` numbers further on from where the last one ended. There no track waits for others,
+    and the last ones, which may come near to where assemblies meet, are given up where they take twice the steps of all others.
+    """
     V = x.shape[1]
     every = np.arange(V) if tracks is None else tracks
     out = Tracked(x.copy(), np.zeros(V), np.zeros(V, dtype=bool), np.zeros(V, dtype=bool))
     march = _March(leg, x, every, way)
     # steps after which a track is given up
-    for _ in range(2000):
-        if not len(march.who):
+    most = 2000 * laps
+    for step in range(most):
+        # tracks that are not waited for
+        if laps > 1 and most == 2000 * laps and 20 * len(march.who) <= V:
+            most = 2 * step
+        if not len(march.who) or step >= most:
             break
         ended, infinite = march.step(care)
+        ended &= ~march.again(ended & (march.lap + 1 < laps))
         for mask, flag in ((ended, out.arrived), (infinite, out.infinite)):
             flag[march.who[mask]] = True
         out.x[:, march.who], out.s[march.who] = march.x, march.s[0]
         # smallest step, as part of what is left of the way (of 1e-4 of it at least: steps are short before an end that is nearly singular)
-        march.keep(~(ended | infinite | (march.h < 1e-7 * np.clip(1.0 - march.s[0], 1e-4, 1.0))))
+        stuck = (march.h < 1e-7 * np.clip(1.0 - march.s[0], 1e-4, 1.0)) & (march.known >= 0)
+        march.keep(~(ended | infinite | stuck))
     done = np.flatnonzero(out.arrived)
     if done.size and polish:
-        out.x[:, done], good = polished(leg, out.x[:, done], way(np.ones(1))[0][0], every[done], care.noise)
+        out.x[:, done], good = polished(
+            leg, out.x[:, done], way(np.ones(1))[0][0], every[done] + (laps - 1) * V, care.noise
+        )
         out.arrived[done] = good
     return out
 
@@ -299,8 +319,8 @@ class _March:
     def __init__(self, leg: Followed, x: Array, every: Index, way: Way) -> None:
         V = x.shape[1]
         self.leg, self.way, self.every = leg, way, every
-        self.who, self.x, self.h = np.arange(V), x.copy(), np.full(V, 0.02)  # the first step
-        self.s, self.known = np.zeros((RATES_KEPT, V)), np.zeros(V, dtype=np.intp)
+        self.who, self.x, self.h = np.arange(V), x.copy(), np.full(V, FIRST_STEP)
+        self.s, self.known, self.lap = np.zeros((RATES_KEPT, V)), np.zeros(V, dtype=np.intp), np.zeros(V, dtype=np.intp)
         t, dt = way(self.s[0])
         here = leg.at(self.x, t, every)
         rates, self.idle = here.rates(here.idle())
@@ -312,7 +332,7 @@ class _March:
         leg, eq = self.leg, self.leg.equations
         s = np.minimum(self.s[0] + self.h, 1.0)
         h = s - self.s[0]
-        tracks = self.every[self.who]
+        tracks = self.every[self.who] + self.lap * len(self.every)
         with np.errstate(all="ignore"):
             x = eq.normal(self.x + self._ahead(h))
             t, dt = self.way(s)
@@ -332,6 +352,7 @@ class _March:
         grown = h * np.clip((care.aim / np.maximum(sizes[0], 1e-12)) ** order, 0.4, 2.0)
         # no step is longer than 0.25
         self.h = np.where(good, np.minimum(np.where(np.isfinite(grown), grown, h), 0.25), 0.4 * h)
+        self.h[good & (self.known < 0)] = FIRST_STEP
         at = np.flatnonzero(good)
         for old, new in ((self.s, s), (self.v, v)):
             old[1:, ..., at] = old[:-1, ..., at]
@@ -359,11 +380,17 @@ class _March:
             basis = lifted
         return out
 
+    def again(self, which: Mask) -> Mask:
+        """Begin the next lap of some tracks, with a step of length zero, which finds its rates."""
+        self.lap[which] += 1
+        self.s[:, which], self.h[which], self.known[which] = 0.0, 0.0, -1
+        return which
+
     def keep(self, going: Mask) -> None:
         """Go on with some of the tracks."""
         if not going.all():
             self.idle = self.idle[going]
-            for name in ("who", "x", "h", "s", "known", "v"):
+            for name in ("who", "x", "h", "s", "known", "lap", "v"):
                 setattr(self, name, getattr(self, name)[..., going])
 
 

@@ -49,7 +49,6 @@ import zipfile
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -553,14 +552,15 @@ class TrackGroup:
 
     def _round(self, family: Any, loops: int, rng: np.random.Generator) -> Array:
         """Where all assemblies come to on several loops through two random members each."""
-        corners = [self.base.joined([family.random_member(rng) for _ in range(loops)]) for _ in range(2)]
-        there, which = np.tile(self.x, loops), np.repeat(np.arange(loops), self.x.shape[1])
-        for begin, end in pairwise([self.base, *corners, self.base]):
-            tracked = follow(self.equations.leg(begin, end, which), there, Care())
-            self.lost += int((~tracked.arrived).sum())
-            self.followed += there.shape[1]
-            there, which = tracked.x[:, tracked.arrived], which[tracked.arrived]
-        return there
+        base, corners = self.base.joined([self.base] * loops), family.random_members(rng, 2 * loops)
+        first, second = (self.base.joined(corners[i::2]) for i in range(2))
+        begin, end = self.base.joined([base, first, second]), self.base.joined([first, second, base])
+        N, laps = self.x.shape[1], 3
+        leg = self.equations.leg(begin, end, np.repeat(np.arange(laps * loops), N))
+        tracked = follow(leg, np.tile(self.x, loops), Care(), laps=laps)
+        self.lost += int((~tracked.arrived).sum())
+        self.followed += laps * N * loops
+        return tracked.x[:, tracked.arrived]
 
 
 def tame(equations: Equated, base: Any, x: Array, rng: np.random.Generator) -> tuple[Any, Array]:
@@ -571,7 +571,7 @@ def tame(equations: Equated, base: Any, x: Array, rng: np.random.Generator) -> t
     family, N = equations.family, x.shape[1]
     # members of which the best one is kept
     candidates = 6
-    members = [family.random_member(rng) for _ in range(candidates)]
+    members = family.random_members(rng, candidates)
     which = np.repeat(np.arange(candidates), N)
     tracked = follow(equations.leg(base, base.joined(members), which), np.tile(x, candidates), Care())
     keep, found = np.arange(N), []

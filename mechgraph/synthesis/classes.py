@@ -19,12 +19,13 @@ from functools import cached_property
 import numpy as np
 
 from mechgraph.graph.linkgraph import link_graph
-from mechgraph.kinematics.assembly import close_all
 from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import complement, rank_of, singular_values
+from mechgraph.maths.newton import least_norm_steps
 from mechgraph.maths.se3 import Index, cross, finite_twist, pose_exp, rotation_exp
 from mechgraph.maths.tolerances import MODES
-from mechgraph.modes.family import NO_NUMBERS, Array, Family, common, generated
+from mechgraph.modes.family import Array, Family, common, generated
 from mechgraph.modes.homotopy import ENDLESS_STATE, Equations, Mask, rounding, solved
 from mechgraph.synthesis.system import ArrowRows, RowNumbers, RowProblem
 from mechgraph.variants.numbers import MARKER
@@ -48,6 +49,19 @@ class ClassMember:
         return ClassMember(RowNumbers.joined([m.numbers for m in members]), drive)
 
 
+@dataclass(frozen=True)
+class RowBlock:
+    """Rows ``rows (G,)`` of equal shape.
+
+    Of their equations the combinations ``mixing (G, rank, n)`` are independent, of their coordinates ``ways (G, F, settled)`` are moved:
+    what the equations leave free, passive motions, does not move.
+    """
+
+    rows: Index
+    ways: Array
+    mixing: Array | None
+
+
 class NoClass(Exception):
     """No random mechanism of the class could be closed at random positions."""
 
@@ -55,8 +69,8 @@ class NoClass(Exception):
 class TaskClass:
     """Equations of a class of tasks, as ``modes.homotopy`` follows them: states are the unknowns ``z (u,)`` and those of all rows.
 
-    ``free[i]`` are the freedoms of row ``i`` of which nothing is asked, ``mixing[i]`` the independent combinations of its rows,
-    ``settled[i]`` how many freedoms these determine; ``conditions (R,)`` are left for the unknowns.
+    ``free[i]`` are the freedoms of row ``i`` of which nothing is asked; rows of equal shape are eliminated together, in ``blocks``;
+    ``conditions (R,)`` are left for the unknowns.
 
     Raises
     ------
@@ -118,44 +132,55 @@ class TaskClass:
 
     def _read(self, rng: np.random.Generator) -> None:
         """Ranks of all rows at a random mechanism of the class, and a start there."""
-        # random mechanisms tried until one closes
-        for _ in range(8):
-            found = self.random_closed(rng)
-            if found is not None:
-                break
-        else:
-            raise NoClass
-        self.start, self.x = found
+        found, x = self.random_closed(rng, 1)
+        self.start, self.x = found[0], x[:, 0]
         rows = self.at(self.start, self.x[:, None])
         J, B = rows.by_coordinates[..., 0], rows.by_unknowns[..., 0]
         n, ranks, settled = J.shape[1], [], []
         for i, free in enumerate(self.free):
             settled.append(_rank(J[i][:, free]))
             ranks.append(_rank(np.concatenate([J[i][:, free], B[i]], axis=1)))
-        self.settled = settled
         self.conditions = np.array(ranks) - np.array(settled)
-        mix = np.linalg.qr(rng.normal(size=(n, n)) + 1j * rng.normal(size=(n, n)))[0]
-        self.mixing = [None if rank == n else mix[:rank] for rank in ranks]
+        shapes = [(rank, many, len(free)) for rank, many, free in zip(ranks, settled, self.free, strict=True)]
+        self.blocks = [
+            self._block(shape, [i for i, own in enumerate(shapes) if own == shape], n, rng)
+            for shape in dict.fromkeys(shapes)
+        ]
 
-    def random_closed(self, rng: np.random.Generator) -> tuple[ClassMember, Array] | None:
-        """A random mechanism of the class at random positions: what it does there is a task that it solves."""
-        s, problem, z = self.problem.system, self.problem, _random(rng, self.u)
-        numbers = problem.numbers.moved(self._random_places(rng)).with_values(problem.places, z[:, None])
-        system = problem.system_with(numbers)
-        states = []
-        for _ in range(self.R):
+    def random_closed(self, rng: np.random.Generator, n: int) -> tuple[list[ClassMember], Array]:
+        """Random mechanisms of the class at random positions: what they do there are tasks that they solve; their states ``(nx, n)``.
+
+        Raises
+        ------
+        NoClass
+        """
+        s, problem, R = self.problem.system, self.problem, self.R
+        members, states = list[ClassMember](), list[Array]()
+        # rounds of random mechanisms, after which a class is said to have none
+        for _ in range(8):
+            # some of them do not close
+            more = n - len(members) + 2
+            z = _random(rng, self.u * more).reshape(self.u, more)
+            places = np.concatenate([self._random_places(rng) for _ in range(more)], axis=-1)
+            numbers = problem.numbers.moved(places).with_values(problem.places, z)
+            system, X = problem.system_with(numbers), np.full((R, s.n_state, more), np.nan, dtype=complex)
             # random positions tried until one closes without angles far from real ones
             for _ in range(6):
-                dq = _random(rng, s.n_freedoms)[:, None]
-                x, error = close_all(system, s.advance(problem.at_rest[:, None].astype(complex), dq), NO_NUMBERS)
-                if error[0] < MODES.member_closed and not self.of_row.far(x, MOST_TURNED)[0]:
+                row, which = np.nonzero(np.isnan(X[:, 0]))
+                if not len(row):
                     break
-            else:
-                return None
-            states.append(x[:, 0])
-        X = np.array(states)
-        norms = numbers.norms.ravel()[: self.W]
-        return ClassMember(numbers, X[:, s.single_rows[problem.columns], None]), np.concatenate([z, norms, X.ravel()])
+                dq = _random(rng, s.n_freedoms * len(row)).reshape(s.n_freedoms, -1)
+                begin = s.advance(np.tile(problem.at_rest[:, None].astype(complex), len(row)), dq)
+                x, error = _closed(system.cases(which), begin)
+                good = (error < MODES.member_closed) & ~self.of_row.far(x, MOST_TURNED)
+                X[row[good], :, which[good]] = x[:, good].T
+            for i in np.flatnonzero(~np.isnan(X[:, 0]).any(axis=0))[: n - len(members)]:
+                own = numbers.taken(np.array([i]))
+                members.append(ClassMember(own, X[:, s.single_rows[problem.columns], i, None]))
+                states.append(np.concatenate([z[:, i], own.norms.ravel()[: self.W], X[:, :, i].ravel()]))
+            if len(members) == n:
+                return members, np.array(states).T
+        raise NoClass
 
     def _random_places(self, rng: np.random.Generator) -> Array:
         """Known places moved at random, such that loops keep the groups in which they move ``(3, 4, 2, P, 1)``."""
@@ -170,18 +195,25 @@ class TaskClass:
                 )
         return pose_exp(moves)
 
-    def random_member(self, rng: np.random.Generator) -> ClassMember:
-        """A random mechanism and a random task like those that mechanisms of the class do; what is asked of one row is asked of it alone.
+    def random_members(self, rng: np.random.Generator, n: int) -> list[ClassMember]:
+        """Random mechanisms and random tasks like those that they do; what is asked of one row is asked of it alone.
 
         Raises
         ------
         NoClass
         """
-        for _ in range(8):
-            found = self.random_closed(rng)
-            if found is not None:
-                return found[0]
-        raise NoClass
+        return self.random_closed(rng, n)[0]
+
+    def _block(self, shape: tuple[int, int, int], rows: list[int], n: int, rng: np.random.Generator) -> RowBlock:
+        """Rows of ``(rank, settled, free)`` such equations and coordinates, of ``n`` equations in all."""
+        rank, settled, free = shape
+        mix = np.linalg.qr(rng.normal(size=(len(rows), n, n)) + 1j * rng.normal(size=(len(rows), n, n)))[0][:, :rank]
+        ways = np.linalg.qr(rng.normal(size=(len(rows), free, free)))[0][:, :, :settled]
+        every = np.broadcast_to(np.eye(free), (len(rows), free, free))
+        columns = np.array([self.free[i] for i in rows], dtype=np.intp).reshape(len(rows), free)
+        lifted = np.zeros((len(rows), self.F, settled))
+        np.put_along_axis(lifted, columns[:, :, None], every if settled == free else ways, axis=1)
+        return RowBlock(np.array(rows), lifted, None if rank == n else mix)
 
     # --- states ------------------------------------------------------------------------------------------------------
 
@@ -278,8 +310,25 @@ def _random(rng: np.random.Generator, n: int) -> Array:
     return np.asarray(rng.normal(size=(n, 2)) @ [0.7, 0.5j])
 
 
+def _closed(system: System, x: Array) -> tuple[Array, Array]:
+    """States ``(nx, T)`` after limited Gauss-Newton steps, and their closure errors: most random ones close."""
+    with np.errstate(all="ignore"):
+        # steps after which one that is not closed is given up
+        for _ in range(20):
+            here = Configuration(system, x)
+            step = least_norm_steps(here.J, here.residual, MODES.generic)
+            size = np.abs(step).max(axis=0)
+            x = system.advance(x, step * np.minimum(1.0, 0.5 / np.maximum(size, 1e-300)))
+        return x, Configuration(system, x).closure
+
+
 def _rank(A: Array) -> int:
     return rank_of(singular_values(A), MODES.generic) if A.size else 0
+
+
+def _beneath(values: Array, T: int) -> Array:
+    """``(G, T, n, k)`` of rows, one beneath the other ``(T, G n, k)``."""
+    return values.swapaxes(0, 1).reshape(T, -1, values.shape[3])
 
 
 class TaskLeg:
@@ -360,27 +409,24 @@ class Arrow:
         size = np.abs(self.rows.here.poses).max(axis=(0, 1, 2)).reshape(self.of.R, -1).max(axis=0)
         return rounding(size)
 
-    def _mixed(self, values: Array) -> list[Array]:
-        """``(R, n, k, T)`` as the combinations of every row, ``(T, rank, k)``."""
-        out = []
-        for M, v in zip(self.of.mixing, values, strict=True):
-            mixed = v if M is None else np.tensordot(M, v, 1)
-            out.append(np.where(np.isfinite(mixed), mixed, 0.0).transpose(2, 0, 1))
-        return out
+    def _mixed(self, block: RowBlock, values: Array) -> Array:
+        """``(R, n, k, T)`` as the combinations of every row of a block, ``(G, T, rank, k)``."""
+        own = values[block.rows].transpose(0, 3, 1, 2)
+        mixed = own if block.mixing is None else block.mixing[:, None] @ own
+        return np.where(np.isfinite(mixed), mixed, 0.0)
 
     @cached_property
     def _factored(self) -> tuple[list[tuple[Array, Array, Array]], Array]:
-        """``N_i``, ``J_i^+`` and ``B_i`` of all rows, and the matrix of the unknowns."""
-        out = []
-        J, B = (self._mixed(v) for v in (self.rows.by_coordinates, self.rows.by_unknowns))
-        for i, free in enumerate(self.of.free):
-            rank = self.of.settled[i]
-            U, sigma, Vh = np.linalg.svd(J[i][:, :, free])
-            back = (Vh[:, :rank].conj().swapaxes(1, 2) / np.maximum(sigma[:, None, :rank], 1e-300)) @ U[
-                :, :, :rank
-            ].conj().swapaxes(1, 2)
-            out.append((U[:, :, rank:].conj().swapaxes(1, 2), back, B[i]))
-        return out, np.concatenate([N @ B for N, _, B in out], axis=1)
+        """``N_i``, ``J_i^+`` and ``B_i`` ``(G, T, ., .)`` of the rows of all blocks, and the matrix of the unknowns."""
+        out, T = [], self.rows.T
+        for block in self.of.blocks:
+            J, B = (self._mixed(block, v) for v in (self.rows.by_coordinates, self.rows.by_unknowns))
+            n = block.ways.shape[2]
+            Q, upper = np.linalg.qr(J @ block.ways[:, None], mode="complete")
+            upper = upper[:, :, :n] + np.where(np.eye(n, dtype=bool) & (upper[:, :, :n] == 0), 1e-300, 0.0)
+            back = block.ways[:, None] @ np.linalg.inv(upper) @ Q[..., :n].conj().swapaxes(2, 3)
+            out.append((Q[..., n:].conj().swapaxes(2, 3), back, B))
+        return out, np.concatenate([_beneath(N @ B, T) for N, _, B in out], axis=1)
 
     @property
     def matrix(self) -> Array:
@@ -389,13 +435,12 @@ class Arrow:
 
     def solve(self, right: Array) -> Array:
         """Increments ``(head + R F, T)`` for a right side ``(R, n, T)``; NaN where singular."""
-        of, b = self.of, self._mixed(right[:, :, None])
-        parts, S = self._factored
-        T = self.rows.T
-        dz = solved(S, np.concatenate([N @ own for (N, _, _), own in zip(parts, b, strict=True)], axis=1))
+        of, (parts, S) = self.of, self._factored
+        T, b = self.rows.T, [self._mixed(block, right[:, :, None]) for block in of.blocks]
+        dz = solved(S, np.concatenate([_beneath(N @ own, T) for (N, _, _), own in zip(parts, b, strict=True)], axis=1))
         dq = np.zeros((of.R, of.F, T), dtype=complex)
-        for i, ((_, back, B), own) in enumerate(zip(parts, b, strict=True)):
-            dq[i][of.free[i]] = (back @ (own - B @ dz))[:, :, 0].T
+        for block, (_, back, B), own in zip(of.blocks, parts, b, strict=True):
+            dq[block.rows] = (back @ (own - B @ dz))[..., 0].swapaxes(1, 2)
         return np.concatenate([dz[:, :, 0].T, np.zeros((of.W, T)), dq.reshape(of.R * of.F, T)])
 
     def newton(self, idle: Array) -> Array:

@@ -59,7 +59,7 @@ class TaskStart:
     @property
     def word(self) -> str:
         """How sure it is that none is missing."""
-        return "tested" if self.trace.passed and self.chance <= MISSED_AGAIN else "searched"
+        return "tested" if self.trace.passed and self.chance <= MISSED else "searched"
 
     @property
     def evidence(self) -> tuple[str, ...]:
@@ -90,7 +90,7 @@ class TaskPencil:
     def __init__(self, equations: TaskClass, base: ClassMember, rng: np.random.Generator) -> None:
         self.of, self.base = equations, base
         row, length = int(np.argmax(equations.conditions)), self._length
-        other = equations.random_member(rng).drive[row, :, 0] - base.drive[row, :, 0]
+        other = equations.random_members(rng, 1)[0].drive[row, :, 0] - base.drive[row, :, 0]
         part = rng.normal(size=2) @ [0.7, 0.7j]
         self.rate = np.zeros(base.drive.shape[:2], dtype=complex)
         self.rate[row] = part * np.where(length, other, np.exp(1j * np.where(length, 0.0, other)) - 1.0)
@@ -126,12 +126,14 @@ def start_set(of: TaskClass, rng: np.random.Generator, progress: Progress) -> Ta
     # solutions from which on they are not looked for any further
     group = TrackGroup(of, of.start, of.x[:, None], 20_000)
     group.grow(MISSED, rng, progress)
+    known = group.quiet, group.chance
     group.move(*tame(of, group.base, group.x, rng))
-    group.grow(MISSED_AGAIN, rng, progress)
-    trace = (
-        trace_test(of, group.base, group.x, rng, progress, TaskPencil) if group.chance <= MISSED_AGAIN else NOT_PASSED
-    )
-    return TaskStart(group.base, group.x, group.quiet, group.chance, group.lost, group.followed, trace)
+    trace = trace_test(of, group.base, group.x, rng, progress, TaskPencil) if known[1] <= MISSED else NOT_PASSED
+    if not trace.passed:
+        group.grow(MISSED_AGAIN, rng, progress)
+        known = group.quiet, group.chance
+        trace = trace_test(of, group.base, group.x, rng, progress, TaskPencil) if known[1] <= MISSED_AGAIN else trace
+    return TaskStart(group.base, group.x, *known, group.lost, group.followed, trace)
 
 
 # --- kept in a folder ----------------------------------------------------------------------------------------------------
@@ -232,7 +234,7 @@ def ends(
         care = Care() if run < 2 else Care().finer
         begin, x = start.member, start.x
         if run:
-            begin = of.random_member(rng)
+            (begin,) = of.random_members(rng, 1)
             there = follow(of.leg(start.member, begin), x, care)
             x = there.x[:, there.arrived]
         block = max(1, TRACKS_TOGETHER // max(x.shape[1], 1))
@@ -269,7 +271,7 @@ def start_of(of: TaskClass, rng: np.random.Generator, cache: bool, progress: Pro
     if known is not None:
         return known
     made = start_set(of, rng, progress)
-    if cache and made.chance <= MISSED_AGAIN:
+    if cache and (made.word == "tested" or made.chance <= MISSED_AGAIN):
         _keep(of, made)
     return made
 
