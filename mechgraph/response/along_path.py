@@ -337,6 +337,9 @@ class Way:
         """Closed states ``(nx, T)`` at places ``(T,)``, and their forms."""
         x, u, step = self._predicted(at)
         which = self._nodes.which[self._interpolation.left[step]]
+        closed = None if self.kernel is None or self._beside_crossings(at) else self.kernel.closed(x, u[0])
+        if closed is not None:
+            return closed[0], which
         found = self.follower.newton.close(x, u, np.zeros(len(at), dtype=np.intp), which)
         x = found.x.copy()
         for c in self.crossings:
@@ -470,17 +473,28 @@ class Arc:
         self.begin, self.rate = float(x[s.single_rows[self.column]]), float(dq[self.column])
         self._first_way = 1 if self.rate >= 0.0 else -1
         self.terms = AlongTerms(s, task.loads)
-        kernel = None if task.library is None else KernelPath(task.library, s, self.column, x, self.terms.smooth)
-        self._ways = {sense: Way(self.path, self.terms, x, float(sense), kernel) for sense in (1, -1)}
+        self._x = x
+        self._kernel = None if task.library is None else KernelPath(task.library, s, self.column, x, self.terms.smooth)
+        self._ways: dict[int, Way] = {}
         self.advance: Array | None = None
         """What a turn adds to the state where it comes back then; None while it does not."""
         self._sense = 1.0
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the kernel, see ``Way``."""
+        return vars(self) | {"_kernel": None}
+
+    def _way(self, sense: int) -> Way:
+        """The path in a sense of the coordinate, begun when first asked for."""
+        if sense not in self._ways:
+            self._ways[sense] = Way(self.path, self.terms, self._x, float(sense), self._kernel)
+        return self._ways[sense]
 
     def piece(self, u: float) -> tuple[SeriesPiece, float] | None:
         """The piece in which a place lies, and the whole turns by which the place is further on; None where the table ends before."""
         turns = 0.0 if self.advance is None else self._sense * math.floor(self._sense * (u - self.begin) / self.turn)
         u -= self.turn * turns
-        way = self._ways[(u > self.begin) - (u < self.begin) or self._first_way]
+        way = self._way((u > self.begin) - (u < self.begin) or self._first_way)
         at = way.sense * (u - self.begin)
         if not at < way.length + FURTHEST:
             return None
@@ -502,9 +516,10 @@ class Arc:
         turns = self._turns(u)
         home = u - self.turn * turns
         x, which = np.empty((s.n_state, len(u))), np.empty(len(u), dtype=np.intp)
-        for way in self._ways.values():
-            mine = np.where(home == self.begin, self._first_way, np.sign(home - self.begin)) == way.sense
+        for sense in (1, -1):
+            mine = np.where(home == self.begin, self._first_way, np.sign(home - self.begin)) == sense
             if mine.any():
+                way = self._way(sense)
                 if not way.length:
                     self._extend(way)
                 x[:, mine], which[mine] = way.states(way.sense * (home[mine] - self.begin))

@@ -653,13 +653,20 @@ class KernelPath:
         n = self._library.mgk_nodes(*map(pointer, known), ctypes.c_double(end), ctypes.c_int(len(out)), pointer(out))
         return out[:n, 0], out[:n, 1:].T
 
-    def terms(self, x: Array, u: Array) -> tuple[Array, Array, Array] | None:
-        """Terms ``(4, T)`` as of ``motion_equations.along_one``, steepness and condition ``(T,)``, at states near ``x (nx, T)``, closed
-        where the coordinate is ``u (T,)``; None where one of them is refused.
+    def closed(self, x: Array, u: Array) -> tuple[Array, Array] | None:
+        """States ``(nx, T)`` near ``x``, closed where the coordinate is ``u (T,)``, and what ``terms`` gives of each ``(T, 6)``; None where
+        one of them is refused.
         """
         out, states = np.empty((len(u), 6)), x.T.copy()
         counts = ctypes.c_int(len(u)), ctypes.c_int(self._stored)
         known = map(pointer, (*self._tables, self._memory))
         if self._library.mgk_along(*known, *counts, *map(pointer, (np.ascontiguousarray(u), states, out))):
             return None
-        return out[:, :4].T, out[:, 4], out[:, 5]
+        return states.T, out
+
+    def terms(self, x: Array, u: Array) -> tuple[Array, Array, Array] | None:
+        """Terms ``(4, T)`` as of ``motion_equations.along_one``, steepness and condition ``(T,)``, at states near ``x (nx, T)``, closed
+        where the coordinate is ``u (T,)``; None where one of them is refused.
+        """
+        found = self.closed(x, u)
+        return None if found is None else (found[1][:, :4].T, found[1][:, 4], found[1][:, 5])

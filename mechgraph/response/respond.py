@@ -131,6 +131,12 @@ class Energy(Shown):
         return Document("Energies", (ranges(rows, lambda i: f"t = {self.t.reshape(-1)[i]:.5g}"),))
 
 
+def _total(parts: Array) -> float:
+    """What stays of energies ``(5,)``: kinetic and potential energy without the work done."""
+    kinetic, potential, work = parts[:3].tolist()
+    return float(kinetic + potential - work)
+
+
 def _energy(parts: Array, start: float, t: Array) -> Energy:
     kinetic, potential, work, impact, friction = parts
     return Energy(kinetic, potential, work, impact, friction, start, t)
@@ -259,6 +265,8 @@ class Course:
             what = f"times between {self.begin:g} and {self.reached:g}, one or one-dimensional"
             raise DeclarationError("response", [wrong(t, "t", what)])
         trajectory, parts = self._read(times)
+        if (start := np.flatnonzero(times.reshape(-1) == self.begin)).size:
+            vars(self).setdefault("_energy_at_start", _total(parts[:, start[0]]))
         return Response(trajectory, _energy(parts.reshape(-1, *times.shape), self._energy_at_start, times), self)
 
     def moments(self, t: Array) -> list[Response]:
@@ -272,8 +280,7 @@ class Course:
 
     @cached_property
     def _energy_at_start(self) -> float:
-        kinetic, potential, work = self._read(np.array(self.begin))[1][:3]
-        return float((kinetic + potential - work)[0])
+        return _total(self._read(np.array(self.begin))[1][:, 0])
 
     @cached_property
     def greatest(self) -> float:
