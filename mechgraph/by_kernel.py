@@ -15,13 +15,14 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from mechgraph.kernel import build
-from mechgraph.kernel.tables import MIDDLE, START, Kernel, Layout, Mask, Records, layout, tables, why_not
+from mechgraph.kernel.tables import HEAD_RUBS, MIDDLE, START, Kernel, Layout, Mask, Records, layout, tables, why_not
 from mechgraph.kinematics.motion_path import in_blocks
 from mechgraph.kinematics.rates import Rates, Velocities, are_alone, expected_error
 from mechgraph.kinematics.state import ROUNDINGS, ClosureSolver, Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.newton import Work
 from mechgraph.maths.se3 import Array, Index
+from mechgraph.model.friction import Friction, places_in
 from mechgraph.model.loads import Load
 from mechgraph.outcome import Call, Outcome, Starts, system_at
 from mechgraph.result.trajectory import BlockMotion
@@ -70,7 +71,9 @@ class KernelOutcome(Outcome):
         condition, reach = records["condition"]
         self.trajectory.estimate(np.arange(count), expected_error(ROUNDINGS * np.finfo(float).eps * reach, condition))
         if forces or line.options.method is None:
-            self.trajectory.take(records, forces)
+            self.trajectory.take(records, forces, self._rubbing() if forces else ())
+            for places in in_blocks(self._left_open()) if forces else ():
+                self._put(*self._at(places))
         else:
             by_position = all(load.by_position for load in self.loads)
             every = np.flatnonzero(~self.contradicting)
@@ -78,6 +81,17 @@ class KernelOutcome(Outcome):
                 self._put(*self._at(places))
         if line.options.progress is not None:
             line.options.progress(count, count)
+
+    def _rubbing(self) -> tuple[str, ...]:
+        """The pair of every place that rubs."""
+        m, dry = self.line.m, (load for load in self.loads if isinstance(load, Friction))
+        return tuple(load.of for load in dry for _ in places_in(load, m.pair(load.of).type))
+
+    def _left_open(self) -> Index:
+        """Positions at which the kernel does not say what friction does, or where there is none in motion."""
+        if "unsure" not in self.records:
+            return np.zeros(0, dtype=np.intp)
+        return np.flatnonzero((self.records["unsure"] > 0) & ~self.contradicting)
 
     def _at(self, places: Index) -> tuple[BlockMotion, Any]:
         """States and rates of a block, and the closure equations there, factored by numpy."""
@@ -205,7 +219,7 @@ def _filled(line: Started, library: Any, system: System, x: Array, loads: tuple[
     forces = filled is not None
     filled = filled or tables(found, system, x, None)
     assert filled is not None
-    return Kernel(library, found, *filled), forces
+    return Kernel(library, found.rubbing(int(filled[0][HEAD_RUBS])), *filled), forces
 
 
 def _layout(line: Started) -> Layout | str:

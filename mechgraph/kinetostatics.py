@@ -429,7 +429,8 @@ def _solved(
 ) -> Solution:
     line, outcome = _outcome(m, motions, options, actuate)
     solution = Solution(outcome.trajectory)
-    if outcome.found is None and not np.isin(solution.status, SOLVED).all():  # numpy says how far the path led
+    reached = (*SOLVED, *(status.value for status in RUBBING))
+    if outcome.found is None and not np.isin(solution.status, reached).all():  # numpy says how far the path led
         line, outcome = _outcome(m, motions, replace(options, engine=line.engine), actuate)
         solution = Solution(outcome.trajectory)
     own, tol = (m.declared, m.changes.tol) if isinstance(m, SnappedMechanism) else (m, None)

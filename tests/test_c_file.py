@@ -72,10 +72,12 @@ def solved(library: ctypes.CDLL, name: str, m: mg.Mechanism, q: list[float]) -> 
 
 
 @pytest.mark.usefixtures("compiled")
-@pytest.mark.parametrize("name", ["rcsr-csr", "bricard-cube", "rssr", "planar marghitu-2-1"])
+@pytest.mark.parametrize("name", ["rcsr-csr", "bricard-cube", "rssr", "planar marghitu-2-1", "rough rcsr"])
 def test_c_gives_what_solve_gives(name, tmp_path):
-    m = mg.load(name.removeprefix("planar "))
+    m = mg.load(name.split()[-1])
     m = m.to_planar() if name.startswith("planar") else m
+    if name.startswith("rough"):
+        m = m.replace(loads=[*m.loads, *(mg.Friction(p.name, mu=0.05, radius=0.02) for p in m.pairs)])
     t = tabled(m)
     write_c(t, tmp_path / "press.c")
     q = (t.home + 0.1).tolist()

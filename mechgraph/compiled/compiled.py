@@ -31,6 +31,8 @@ PARTINGS = 12
 def compile(m: Mechanism) -> Compiled:
     """Keep a mechanism ready in the compiled kernel, for one position after another: control loops, optimizers, real time.
 
+    Dry friction in pairs acts against the motion; where nothing moves efforts are those without it.
+
     Parameters
     ----------
     m : Mechanism

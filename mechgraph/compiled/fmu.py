@@ -24,6 +24,7 @@ from mechgraph.compiled.tabled import STATUSES, Tabled, header_text, identifier,
 from mechgraph.errors import DeclarationError, visible
 from mechgraph.files import Format, format_of, whole_file, write_whole
 from mechgraph.kernel import build, compiler
+from mechgraph.kernel.tables import HEAD_RUBS
 from mechgraph.quantities import option_faults, unit_of
 
 SLAVE = Path(__file__).with_name("fmu.c")
@@ -195,13 +196,17 @@ def write_tables(
     Raises
     ------
     DeclarationError
-        where ``name`` is no identifier of C, ``inputs`` no such word, or efforts are given and there are passive freedoms: nothing would
-        hold these; FileError; MissingExtraError for a unit where there is no C compiler.
+        where ``name`` is no identifier of C, ``inputs`` no such word, or efforts are given and there are passive freedoms, which nothing
+        would hold, or dry friction; FileError; MissingExtraError for a unit where there is no C compiler.
     """
     faults = option_faults({"inputs": (inputs, get_args(InputsName))})
     if inputs == "efforts" and tables.layout.shapes["holds"][0]:
         faults.append(
             "inputs = 'efforts': there are passive freedoms, which no motion under efforts holds; use inputs='motion', or mg.respond"
+        )
+    if inputs == "efforts" and tables.I[HEAD_RUBS]:
+        faults.append(
+            "inputs = 'efforts': dry friction holds freedoms and lets them go; use inputs='motion', or mg.respond"
         )
     if faults:
         raise DeclarationError(f"write {tables.m.name!r}", faults)

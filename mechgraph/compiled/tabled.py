@@ -21,6 +21,7 @@ from mechgraph.kernel.tables import (
     EFFORT,
     HEAD_LOAD_NUMBERS,
     HEAD_LOADS,
+    HEAD_RUBS,
     Integers,
     Layout,
     layout,
@@ -58,6 +59,7 @@ STATUSES = (
     ("TOO_FAR", "not followed", "the position is further than steps are made"),
     ("FORMAT_ERROR", "other tables", "tables of another version"),
     ("NOT_PASSIVE", "no longer passive", "a passive freedom moves other links here"),
+    ("FRICTION", "friction not solved", "friction jams here, has no finite force, or none that is surely the only one"),
 )
 """What the kernel returns, by its number: identifier, word, meaning."""
 TABLE_CHANGE = 0.02
@@ -228,7 +230,7 @@ def tabled(m: Mechanism, asked: str = "compile") -> Tabled:
     places = layout(system, line.columns, line.passive)
     found = tables(places, system, x[:, None], own.loads)
     if found is None:
-        fault = "; ".join(filter(None, map(why_not_load, own.loads)))
+        fault = "; ".join(filter(None, (why_not_load(load, own) for load in own.loads)))
         raise DeclarationError(subject, [f"the compiled kernel does not carry it: {fault}"])
     I, P = found
     return Tabled(own, system, x, places, I, P[0], drives, home)
@@ -343,7 +345,7 @@ void {name}_start(void *state);
 
 /* One position, led on from the last good one along a straight line of the drives q with certified steps, at rates v and a (drives each).
  * effort[drives], reaction[pairs][6] of link a on link b, position[freedoms]; any of them may be NULL. What is not unique is NaN. Unless
- * {NAME}_OK is returned nothing is written and the state stays at the last good position. */
+ * {NAME}_OK is returned nothing is written and the state stays at the last good position.{_at_rest(tables)} */
 int {name}_solve(void *state, const double *q, const double *v, const double *a, double *effort, double *reaction, double *position);
 {_steps(name) if tables.efforts else ""}
 #ifdef __cplusplus
@@ -351,6 +353,13 @@ int {name}_solve(void *state, const double *q, const double *v, const double *a,
 #endif
 #endif
 """
+
+
+def _at_rest(tables: Tabled) -> str:
+    """What the header says of friction."""
+    return "\n * Where nothing moves dry friction has no direction: efforts are those without it." * bool(
+        tables.I[HEAD_RUBS]
+    )
 
 
 def _steps(name: str) -> str:
@@ -472,6 +481,7 @@ def _numbers(tables: Tabled) -> Iterator[str]:
 COUNTS = (
     "format", "links", "pairs", "factors", "columns", "states", "loops", "steps", "couplings", "terms", "drives", "unknowns", "loads",
     "frame", "factor numbers", "load numbers", "passive motions", "links in them", "first component of loops", "rows of a loop",
+    "places that rub",
 )  # fmt: skip
 """What stands at the head of the table."""
 

@@ -14,7 +14,7 @@ Mathematical Programming 58, 1993; F. Pfeiffer and Ch. Glocker, Multibody Dynami
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -26,7 +26,7 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.touching import ContactLines
 from mechgraph.maths.se3 import Array, Index, cross, skew
 from mechgraph.maths.tolerances import MOTIONS, STRESSES
-from mechgraph.model.friction import Friction, rubs_as_ball, rubs_as_contact, rubs_as_plane
+from mechgraph.model.friction import Friction, Rubs, places_in
 from mechgraph.model.gear_facts import mean_sliding
 
 OUTCOMES = ("ok", "jams", "no finite force", "friction not determined")
@@ -111,7 +111,7 @@ def places_of(
     for load in loads:
         if load.of in m.pair_index:
             rubbing = _Rubbing(here, load, m.pair_index[load.of], dq, normal, at_rest)
-            found += next(make for rubs, make in _MAKERS if rubs(rubbing.row))(rubbing)
+            found += [_MAKERS[rubs.way](rubbing, rubs) for rubs in places_in(load, rubbing.row)]
         else:
             lines, flank = teeth or (ContactLines(here), np.ones((len(m.couplings), here.T)))
             found.append(_between_teeth(here, load, dq, at_rest, lines, flank))
@@ -135,11 +135,19 @@ class _Rubbing:
         self.S, self.rate, self.twist = here.S[:, _freedoms(here, k)], dq[_freedoms(here, k)], _twist(here, dq, k)
         self.r = _or_zero(load.radius) / self.L
         self.origin = here.pair_points[:, k] if load.on == "b" else self.frame(0)[:, 3]
+        self.pitch = self.pair.pitch_per_radian / s.par.L
 
     def frame(self, number: int) -> Array:
         """A frame of the pair ``(3, 4, T)``."""
         group, i = self.here.system.place_of(self.k)
         return np.asarray(self.here.frames[group][number][:, :, i])
+
+    def about(self, rubs: Rubs) -> tuple[Array, Array, Array]:
+        """The axis ``(3, T)`` of a place, the rates ``(T,)`` at which the pair turns about it and slides along it."""
+        turn, slide = rubs.turn, rubs.slide
+        u = self.S[:3, turn] if turn is not None else self.S[3:, slide]
+        w, v = (np.zeros(self.T) if j is None else self.rate[j] for j in (turn, slide))
+        return u, w, self.pitch * w if self.row.takes_pitch else v
 
     def mu(self, speed: Array) -> Array:
         """The coefficient ``(T,)`` at sliding speeds."""
@@ -162,14 +170,14 @@ class _Rubbing:
         return _rows(np.zeros((3, 3, self.T)), eye)
 
 
-def _touching(x: _Rubbing) -> Iterator[Place]:
+def _touching(x: _Rubbing, rubs: Rubs) -> Place:
     """A point, or the center of pressure of a line, on the side of link b's curve to which the force points."""
     c, r = x.frame(next(iter(x.row.reactions or ())).frame)[:, 3], _or_zero(x.pair.radius_b) / x.L
     n, size = _unit(x.w[3:])
     c = c + cross(n, x.w[:3] - cross(c, x.w[3:])) / np.where(size > 0, size, np.inf)
     u, speed = _unit(x.twist[3:] + cross(x.twist[:3], c - r * n), x.rolls_below)
     mu = x.mu(speed)
-    yield x.place(
+    return x.place(
         x.forces(),
         -mu * _force_at(c, u),
         speed,
@@ -178,16 +186,16 @@ def _touching(x: _Rubbing) -> Iterator[Place]:
     )
 
 
-def _opening(x: _Rubbing) -> Iterator[Place]:
+def _opening(x: _Rubbing, rubs: Rubs) -> Place:
     """A point that may open, which presses along the freedom in which it does."""
     assert x.row.gap is not None
     at, n = x.frame(x.row.gap)[:, 3], x.S[3:, x.row.gap]
     u, speed = _unit(x.twist[3:] + cross(x.twist[:3], at), x.rolls_below)
     pushes = x.place(_rows(np.zeros((1, 3, x.T)), n[None]), -x.mu(speed) * _force_at(at, u), speed)
-    yield replace(pushes, signed=True)
+    return replace(pushes, signed=True)
 
 
-def _plane(x: _Rubbing) -> Iterator[Place]:
+def _plane(x: _Rubbing, rubs: Rubs) -> Place:
     """A plane, at the center of pressure, where the force has no moment in it: ``p + z x M / F_z``."""
     z, w = x.frame(0)[:, 2], x.w
     turn, press = ((part * z).sum(axis=0) for part in (x.twist[:3], w[3:]))
@@ -197,76 +205,64 @@ def _plane(x: _Rubbing) -> Iterator[Place]:
     speed = np.sqrt((v * v).sum(axis=0) + (x.r * turn) ** 2)
     share = np.where(speed > x.rolls_below, speed, np.inf)
     D = -x.mu(speed) * (_force_at(at, v / share) + x.r * _couple(x.r * turn / share * z))
-    yield x.place(_rows(np.zeros((1, 3, x.T)), z[None]), D, speed, follows=True)
+    return x.place(_rows(np.zeros((1, 3, x.T)), z[None]), D, speed, follows=True)
 
 
-def _ball(x: _Rubbing) -> Iterator[Place]:
+def _ball(x: _Rubbing, rubs: Rubs) -> Place:
     u, spin = _unit(x.twist[:3])
     mu = x.mu(x.r * spin)
     part = mu / np.hypot(1.0, mu) if x.load.model == "circle" else mu
-    yield x.place(x.forces(), -part * x.r * _couple(u), x.r * spin)
+    return x.place(x.forces(), -part * x.r * _couple(u), x.r * spin)
 
 
-def _about_axes(x: _Rubbing) -> Iterator[Place]:
-    """Turns about axes and slides along them."""
-    axes: dict[int, dict[bool, int]] = {}
-    for j, f in enumerate(x.row.freedoms):
-        axes.setdefault(int(np.argmax(np.abs(f.twist[:3] if f.turns else f.twist[3:]))), {})[f.turns] = j
-    zero, pitch = np.zeros(x.T), x.pair.pitch_per_radian / x.L
-    for found in axes.values():
-        turn, slide = found.get(True), found.get(False)
-        u = x.S[3:, slide] if turn is None else x.S[:3, turn]
-        axial = _rows(np.zeros((1, 3, x.T)), u[None])
-        w, v = (zero if j is None else x.rate[j] for j in (turn, slide))
-        if x.row.takes_pitch:
-            yield _thread(x, u, axial, w, pitch)
-            v = pitch * w
-        if not x.row.takes_pitch or x.load.length is not None:
-            yield from _along(x, u, w, v)
-        if x.load.thrust_radius is not None:
-            t = x.load.thrust_radius / x.L
-            yield x.place(axial, -x.mu(t * np.abs(w)) * t * _couple(np.sign(w) * u), t * np.abs(w))
+def _axial(u: Array) -> Array:
+    """What reads the force along an axis ``(1, 6, T)``."""
+    return _rows(np.zeros((1, 3, u.shape[1])), u[None])
 
 
-def _thread(x: _Rubbing, u: Array, axial: Array, w: Array, pitch: Any) -> Place:
+def _thread(x: _Rubbing, rubs: Rubs) -> Place:
     """Friction couple of a thread that turns at ``w``: more where the motion goes against the axial force Q on b's load."""
-    speed, lead = np.hypot(x.r, pitch) * np.abs(w), np.arctan2(np.abs(pitch), x.r)
+    u, w, _ = x.about(rubs)
+    speed, lead = np.hypot(x.r, x.pitch) * np.abs(w), np.arctan2(np.abs(x.pitch), x.r)
     phi = np.arctan(x.mu(speed) / np.cos(np.arctan(np.tan(x.load.flank) * np.cos(lead))))
     up, down = x.r * (np.tan(lead + phi) - np.tan(lead)), x.r * (np.tan(lead) - np.tan(lead - phi))
-    mean, more = 0.5 * (up + down), 0.5 * (up - down) * np.sign(pitch)
-    return x.place(axial, -mean * _couple(np.sign(w) * u), speed, -more * _couple(np.abs(np.sign(w)) * u)[:, None])
+    mean, more = 0.5 * (up + down), 0.5 * (up - down) * np.sign(x.pitch)
+    return x.place(_axial(u), -mean * _couple(np.sign(w) * u), speed, -more * _couple(np.abs(np.sign(w)) * u)[:, None])
 
 
-def _along(x: _Rubbing, u: Array, w: Array, v: Array) -> Iterator[Place]:
-    """Places along an axis ``u`` through the origin that carry radial forces, under a turn ``w`` at the radius and a slide ``v``."""
-    p, speed = x.origin, np.hypot(x.r * w, v)
+def _collar(x: _Rubbing, rubs: Rubs) -> Place:
+    (u, w, _), t = x.about(rubs), _or_zero(x.load.thrust_radius) / x.L
+    return x.place(_axial(u), -x.mu(t * np.abs(w)) * t * _couple(np.sign(w) * u), t * np.abs(w))
+
+
+def _along(x: _Rubbing, rubs: Rubs) -> Place:
+    """A place along an axis ``u`` that carries radial forces, under a turn ``w`` at the radius and a slide ``v``."""
+    (u, w, v), p = x.about(rubs), x.origin
+    speed = np.hypot(x.r * w, v)
     share = np.where(speed > 0, speed, np.inf)
     round_, along, mu = x.r * w / share, v / share, x.mu(speed)
     size = mu / np.sqrt(1.0 + (mu * round_) ** 2) if x.load.model == "circle" else mu
     D = -size * (x.r * round_ * _couple(u) + along * _force_at(p, u))
-    across = np.eye(3)[:, :, None] - u[:, None] * u[None]
-    U, at, none = skew(u), skew(p), np.zeros((3, 3, x.T))
-    width = _or_zero(x.load.width) / x.L
-    K = np.concatenate([0.5 * width * size * along * U, none])
-    if x.load.length is None:
-        yield x.place(_rows(none, across), D, speed, K)
-    else:
-        b, bending = x.load.length / x.L, np.einsum("ijt,jkt->ikt", U, at)
-        for side in (1.0, -1.0):
-            yield x.place(_rows(-side / b * U, 0.5 * across + side / b * bending), D, speed, K)
-    if x.load.width is not None:
-        about = _rows(u[None], -np.einsum("it,ijt->jt", u, at)[None])
-        yield x.place(2 / np.abs(width) * about, -mu * np.sign(v) * _force_at(p, u), speed)
+    A, U, none = np.eye(3)[:, :, None] - u[:, None] * u[None], skew(u), np.zeros((3, 3, x.T))
+    K = np.concatenate([0.5 * _or_zero(x.load.width) / x.L * size * along * U, none])
+    if not rubs.side:
+        return x.place(_rows(none, A), D, speed, K)
+    part = rubs.side / (_or_zero(x.load.length) / x.L)
+    return x.place(_rows(-part * U, 0.5 * A + part * np.einsum("ijt,jkt->ikt", U, skew(p))), D, speed, K)
 
 
-_MAKERS = (
-    (lambda row: row.opens, _opening),
-    (rubs_as_contact, _touching),
-    (rubs_as_plane, _plane),
-    (rubs_as_ball, _ball),
-    (lambda row: True, _about_axes),
-)
-"""What makes the places of a pair: the first whose test holds."""
+def _couple_of_guide(x: _Rubbing, rubs: Rubs) -> Place:
+    """The moment about the axis of a guide, by two forces at its width."""
+    (u, w, v), p = x.about(rubs), x.origin
+    speed, about = np.hypot(x.r * w, v), _rows(u[None], cross(p, u)[None])
+    return x.place(2 / np.abs(_or_zero(x.load.width) / x.L) * about, -x.mu(speed) * np.sign(v) * _force_at(p, u), speed)
+
+
+_MAKERS = {
+    "opening": _opening, "contact": _touching, "plane": _plane, "ball": _ball, "thread": _thread, "axis": _along,
+    "couple": _couple_of_guide, "collar": _collar,
+}  # fmt: skip
+"""What makes a place of a pair, by the way in which it rubs."""
 
 
 def _between_teeth(

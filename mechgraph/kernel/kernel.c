@@ -38,16 +38,19 @@ static const magnitude UNIQUE = 1e-7;       /* part of a self-stress in a compon
 static const magnitude STILL = 1e-8;        /* part of a passive motion above which it moves other links */
 static const magnitude UNTURNED = 1e-13;    /* angle that is rounding */
 static const magnitude MISSING = 1e-9;      /* angle, or length / L, that may be missing to rest */
+static const magnitude TURNING = 1e-11;     /* part of the fastest rate up to which a freedom is at rest, and friction has no direction */
+static const magnitude NEWTON_DONE = 1e-14;  /* part of the normal forces by which they may be off */
+static const magnitude SETTLED = 1e-12;     /* part of the reactions up to which places of contact have settled */
 static const magnitude OFF_TABLE = 1e-9;     /* part of a table's length up to which a place beyond its end is on it by rounding */
 static const magnitude STRAIGHT_ON = 1e-12; /* change of direction up to which a polygon goes straight on */
-enum { ITERATIONS = 8, MOST_STEPS = 20000, MOST_TURNS = 8, POINTS = 8, TOLD = 8, POWERS = 8, SEVERAL = 4, AT_ONCE = 20 }; /* AT_ONCE: positions a step from which on nearer nodes cost less than corrections */
+enum { ITERATIONS = 8, MOST_STEPS = 20000, MOST_TURNS = 8, POINTS = 8, TOLD = 8, POWERS = 8, SEVERAL = 4, MOST_NEWTON = 60, MOST_ROUNDS = 50, AT_ONCE = 20 }; /* AT_ONCE: positions a step from which on nearer nodes cost less than corrections */
 
 #define FOR(i, n) for (int i = 0; i < (n); i++)
 
 /* --- tables and memory ------------------------------------------------------------------------------------------------------------- */
 
 typedef struct {
-  int links, pairs, factors, columns, states, loops, steps, couplings, terms, drives, unknowns, loads, frame_link, rows, stresses, passives, held, part, height;
+  int links, pairs, factors, columns, states, loops, steps, couplings, terms, drives, unknowns, loads, frame_link, rows, stresses, passives, held, part, height, rubs;
   const int *first, *kind, *column, *state, *number, *ends, *walk, *chord, *loop_first, *loop_pair, *loop_sign, *owner, *column_state,
       *is_length, *place, *effort_factor, *effort_at_b, *dual, *drive, *unknown, *term_first, *term_column, *passive_first, *passive_link, *turns, *load;
   const double *unit, *origin, *start, *start_coordinates, *frame, *marker_a, *marker_b, *factor_number, *effort, *mass, *center,
@@ -82,6 +85,10 @@ typedef struct {
   double *stress, *size, *row_value, *column_value, *trial, *increment, *there, *change, *bound, *record, *direction, *line_begin, *asked, *kept;
   /* passive motions: unit rates, twists with their rates, velocity parts, links at rest in them; along a step, what is missing to rest */
   double *passive, *twist, *twist_rate, *own_bias, *moving_bias, *moving, *raw, *apart, *trial_rate, *trial_acceleration, *still, *series;
+  /* friction: rates that tell its directions, reactions without it and as they press, those of unit efforts; of every place what it reads,
+   * the wrenches that it exerts for a unit of its normal force and vector, these as efforts in its pair, first row; efforts and what pairs take up */
+  double *slip, *smooth, *pressing, *unit, *nothing, *reads, *exerts, *own, *linear, *slope, *sized, *normal, *vector, *sliding, *rubbed, *taken, *bare;
+  int *row_of;
   magnitude single, told, allowed, corrected, *speed;
   size_t n_kept;
   Node a, b, before;
@@ -97,7 +104,7 @@ static void read_tables(const int *I, const double *P, Model *m) {
   m->links = I[MGK_LINKS], m->pairs = I[MGK_PAIRS], m->factors = I[MGK_FACTORS], m->columns = I[MGK_COLUMNS];
   m->states = I[MGK_STATES], m->loops = I[MGK_LOOPS], m->steps = I[MGK_STEPS], m->couplings = I[MGK_COUPLINGS];
   m->terms = I[MGK_TERMS], m->drives = I[MGK_DRIVES], m->unknowns = I[MGK_UNKNOWNS], m->loads = I[MGK_LOADS];
-  m->frame_link = I[MGK_FRAME], m->passives = I[MGK_PASSIVES], m->part = I[MGK_FIRST_PART], m->height = I[MGK_LOOP_ROWS];
+  m->frame_link = I[MGK_FRAME], m->passives = I[MGK_PASSIVES], m->part = I[MGK_FIRST_PART], m->height = I[MGK_LOOP_ROWS], m->rubs = I[MGK_RUBS];
   m->held = m->height * m->loops + m->couplings;
   m->rows = m->held + m->passives, m->stresses = m->rows - m->unknowns;
   const int p = m->pairs, f = m->factors, c = m->columns, n = m->links, *i = I + MGK_HEAD;
@@ -160,17 +167,21 @@ static size_t lay_out(const Model *m, double *memory, Work *w) {
   int head[MGK_HEAD] = {0};
   head[MGK_LINKS] = m->links, head[MGK_PAIRS] = m->pairs, head[MGK_COLUMNS] = m->columns, head[MGK_STATES] = m->states;
   head[MGK_LOOPS] = m->loops, head[MGK_COUPLINGS] = m->couplings, head[MGK_UNKNOWNS] = m->unknowns, head[MGK_PASSIVES] = m->passives;
-  head[MGK_LOOP_ROWS] = m->height;
+  head[MGK_LOOP_ROWS] = m->height, head[MGK_RUBS] = m->rubs;
   mgk_record(head, places);
   TAKE(record, places[MGK_PARTS]);
+  const size_t R = m->rubs, moved = R ? c : 0, pairs = R ? 6 * p : 0;
+  TAKE(slip, moved), TAKE(smooth, pairs), TAKE(pressing, pairs), TAKE(unit, pairs * c), TAKE(nothing, R ? 6 * n : 0), TAKE(reads, 18 * R), TAKE(exerts, 24 * R), TAKE(own, 24 * R);
+  TAKE(linear, 3 * R * (4 * R + 1)), TAKE(slope, R * (R + 1)), TAKE(sized, R * R), TAKE(normal, R), TAKE(vector, 3 * R + 2 * R), TAKE(sliding, R), TAKE(rubbed, moved), TAKE(taken, pairs), TAKE(bare, 6 * n);
+  w->row_of = (int *)taken(&memory, &size, 2 * R + 1);
 #undef TAKE
   return size * sizeof(double);
 }
 
 int mgk_record(const int *I, int *places) {
-  const int c = I[MGK_COLUMNS], n = I[MGK_LINKS], p = I[MGK_PAIRS], k = I[MGK_COUPLINGS], q = I[MGK_PASSIVES];
+  const int c = I[MGK_COLUMNS], n = I[MGK_LINKS], p = I[MGK_PAIRS], k = I[MGK_COUPLINGS], q = I[MGK_PASSIVES], R = I[MGK_RUBS];
   const int s = I[MGK_LOOP_ROWS] * I[MGK_LOOPS] + k + q - I[MGK_UNKNOWNS];
-  const int lengths[MGK_PARTS] = {I[MGK_STATES], c, c, c, 1, 2, 3 * p, 6 * p, c, c, 6 * n, 6 * p * s, c * s, c, k, k * s, c * s, 6, 1, 1, q ? 6 * n : 0, q, q};
+  const int lengths[MGK_PARTS] = {I[MGK_STATES], c, c, c, 1, 2, 3 * p, 6 * p, c, c, 6 * n, 6 * p * s, c * s, c, k, k * s, c * s, 6, 1, 1, q ? 6 * n : 0, q, q, R ? c : 0, R ? 6 * p : 0, R, R, R > 0};
   places[0] = 0;
   FOR(i, MGK_PARTS) places[i + 1] = places[i] + lengths[i];
   return MGK_OK;
@@ -690,19 +701,28 @@ static void accelerate(const Model *m, Work *w, const double *ddq) {
   }
 }
 
-/* The inverse of n columns beside them, in place: Gauss and Jordan. Whether there is one. */
-static int inverted(double *U, int n) {
-  FOR(i, n) FOR(j, n) U[2 * n * i + n + j] = i == j;
+/* The first n of `wide` columns reduced to those of the identity, in place: Gauss and Jordan; what stands behind them is solved for.
+ * Whether they are independent. */
+static int reduced(double *U, int n, int wide) {
   FOR(i, n) {
     int best = i;
-    for (int r = i + 1; r < n; r++) if (fabs(U[2 * n * r + i]) > fabs(U[2 * n * best + i])) best = r;
-    if (!(fabs(U[2 * n * best + i]) > 1e-12)) return 0;
-    FOR(j, 2 * n) { const double t = U[2 * n * i + j]; U[2 * n * i + j] = U[2 * n * best + j], U[2 * n * best + j] = t; }
-    const double d = 1.0 / U[2 * n * i + i];
-    FOR(j, 2 * n) U[2 * n * i + j] *= d;
-    FOR(r, n) if (r != i) { const double g = U[2 * n * r + i]; FOR(j, 2 * n) U[2 * n * r + j] -= g * U[2 * n * i + j]; }
+    for (int r = i + 1; r < n; r++) if (fabs(U[wide * r + i]) > fabs(U[wide * best + i])) best = r;
+    if (!(fabs(U[wide * best + i]) > 1e-12)) return 0;
+    FOR(j, wide) { const double t = U[wide * i + j]; U[wide * i + j] = U[wide * best + j], U[wide * best + j] = t; }
+    const double d = 1.0 / U[wide * i + i];
+    for (int j = i; j < wide; j++) U[wide * i + j] *= d;
+    FOR(r, n) if (r != i) {
+      const double g = U[wide * r + i];
+      if (g != 0.0) for (int j = i; j < wide; j++) U[wide * r + j] -= g * U[wide * i + j];
+    }
   }
   return 1;
+}
+
+/* The inverse of n columns beside them. Whether there is one. */
+static int inverted(double *U, int n) {
+  FOR(i, n) FOR(j, n) U[2 * n * i + n + j] = i == j;
+  return reduced(U, n, 2 * n);
 }
 
 /* --- passive motions: what they are and which rates are at rest in them, see kinematics/rates.py ------------------------------ */
@@ -981,7 +1001,7 @@ static void loads(const Model *m, Work *w, const double *x) {
       w->given[i] += -number[0] * (x[m->column_state[i]] - number[1]) - number[2] * w->dq[i];
     } else if (load[0] == MGK_TABLE) {
       w->given[i] += tabulated(number, x[m->column_state[j]], w->dq[j]);
-    } else {
+    } else if (load[0] < MGK_CONTACT) {
       between_points(w, i, j, number, load[0] == MGK_TABLE_BETWEEN);
     }
   }
@@ -1011,15 +1031,15 @@ static void inertia(const Model *m, Work *w) {
   }
 }
 
-/* What keeps passive links at rest against loads and inertia, added to the loads: a couple about the axis of a turn, a force along a slide,
+/* What keeps passive links at rest against wrenches `on` links and `given` efforts: a couple about the axis of a turn, a force along a slide,
  * which loads no pair of the links and comes from outside (force/passive_hold.py). `terms`: sizes of what adds up to the efforts. */
-static void hold(const Model *m, Work *w, double *wrenches, double *efforts, double *terms) {
+static void hold(const Model *m, Work *w, const double *on, const double *given, double *wrenches, double *efforts, double *terms) {
   memset(wrenches, 0, (size_t)6 * m->links * sizeof(double));
   FOR(i, m->passives) {
     const double *U = w->twist + 6 * i, *rate = w->passive + i * m->columns;
-    double power = dot(w->given, rate, m->columns), square = 0.0, axis[3];
-    magnitude sum = raised(w->single, size_of(w->given, m->columns));
-    FOR(c, m->columns) sum += fabs(w->given[c] * rate[c]);
+    double power = dot(given, rate, m->columns), square = 0.0, axis[3];
+    magnitude sum = raised(w->single, size_of(given, m->columns));
+    FOR(c, m->columns) sum += fabs(given[c] * rate[c]);
     for (int pass = 0; pass < 2; pass++) for (int l = m->passive_first[i]; l < m->passive_first[i + 1]; l++) {
       const int link = m->passive_link[l];
       double point[3], foot[3], own[6], *out = wrenches + 6 * link;
@@ -1029,7 +1049,7 @@ static void hold(const Model *m, Work *w, double *wrenches, double *efforts, dou
       if (pass == 0) {
         square += dot(own, own, 6);
         FOR(r, 6) {
-          const double part = (w->applied[6 * link + r] + w->inertial[6 * link + r]) * U[r];
+          const double part = on[6 * link + r] * U[r];
           power += part, sum += fabs(part);
         }
       } else {
@@ -1046,7 +1066,6 @@ static void hold(const Model *m, Work *w, double *wrenches, double *efforts, dou
     while (first < 2 && !(fabs(axis[first]) > 0.1 * size_of(axis, 3))) first++;
     efforts[i] = REAL_PART(axis[first]) < 0.0 ? power : -power, terms[i] = sum;
   }
-  FOR(r, 6 * m->links) w->applied[r] += wrenches[r];
 }
 
 /* Pair wrenches of multipliers of the loops: w = C^T x, added. */
@@ -1073,9 +1092,9 @@ static void at_points(const Model *m, const Work *w, double *pairs, double sign)
   }
 }
 
-/* Self-stresses: one a dropped row, orthonormal in the reactions at the pair points, moments over L; then reactions of least norm. Each is
+/* Self-stresses: one a dropped row, orthonormal in the reactions at the pair points, moments over L; they stay about these points. Each is
  * reactions, efforts in freedoms and multipliers of couplings, one behind the other as in w->reaction, w->tau, w->multiplier. */
-static int self_stresses(const Model *m, Work *w, double *record, const int *places) {
+static int self_stresses(const Model *m, Work *w) {
   const int n = m->unknowns, p = 6 * m->pairs, c = m->columns, k = m->couplings, all = p + c + k;
   magnitude largest = 0.0;
   memset(w->stress, 0, (size_t)m->stresses * all * sizeof(double));
@@ -1096,7 +1115,6 @@ static int self_stresses(const Model *m, Work *w, double *record, const int *pla
     w->size[s] = sqrt(dot(stress, stress, p));
     largest = raised(largest, fabs(w->size[s]));
   }
-  at_points(m, w, w->reaction, -1.0);
   FOR(s, m->stresses) {
     double *stress = w->stress + s * all, size = w->size[s], before;
     do { /* once more where most was taken away: what is left is rounding of it (J. W. Daniel and others, Math. Comp. 30 (1976) 772-795) */
@@ -1107,18 +1125,48 @@ static int self_stresses(const Model *m, Work *w, double *record, const int *pla
     } while (fabs(size) < 0.7 * fabs(before));
     const double unit = 1.0 / size;
     FOR(i, all) stress[i] *= unit;
-    add_part(all, -dot(stress, w->reaction, p), stress, w->reaction);
-  }
-  at_points(m, w, w->reaction, 1.0);
-  FOR(s, m->stresses) {
-    double *stress = w->stress + s * all;
-    at_points(m, w, stress, 1.0);
-    memcpy(record + places[MGK_STRESS] + s * p, stress, p * sizeof(double));
-    memcpy(record + places[MGK_STRESS_EFFORTS] + s * c, stress + p, c * sizeof(double));
-    memcpy(record + places[MGK_MULTIPLIER_STRESS] + s * k, stress + p + c, k * sizeof(double));
-    couple(m, stress + p + c, record + places[MGK_COUPLED_STRESS] + s * c);
   }
   return MGK_OK;
+}
+
+/* Total wrenches of all pairs, reactions of least norm and efforts, under wrenches `on` links and `given` efforts, and what holds passive
+ * links. */
+static void borne(const Model *m, Work *w, const double *on, const double *given, double *record, const int *places) {
+  const int p = 6 * m->pairs, c = m->columns, k = m->couplings;
+  memcpy(w->carried, on, (size_t)6 * m->links * sizeof(double));
+  if (m->passives) {
+    hold(m, w, on, given, record + places[MGK_HOLD], record + places[MGK_HOLDS], record + places[MGK_HOLD_TERMS]);
+    FOR(i, 6 * m->links) w->carried[i] += record[places[MGK_HOLD] + i];
+  }
+  memset(w->total, 0, p * sizeof(double));
+  for (int t = m->pairs - m->loops - 1; t >= 0; t--) {
+    const int *step = m->walk + 4 * t;
+    FOR(r, 6) {
+      const double through = w->carried[6 * step[3] + r];
+      w->total[6 * step[0] + r] = step[1] ? -through : through;
+      w->carried[6 * step[2] + r] += through;
+    }
+  }
+  double *right = w->column_value;
+  FOR(j, m->unknowns) {
+    const int i = m->unknown[j];
+    right[j] = given[i] - dot(w->S + 6 * i, w->total + 6 * m->owner[i], 6);
+  }
+  solve_transposed(m, w, right, w->row_value);
+  add_loops(m, w, w->row_value, w->total);
+  FOR(i, k) w->multiplier[i] = -w->row_value[m->height * m->loops + i];
+  memcpy(w->reaction, w->total, p * sizeof(double));
+  FOR(i, c) {
+    w->tau[i] = dot(w->S + 6 * i, w->total + 6 * m->owner[i], 6);
+    add_part(6, -w->tau[i], w->E + 6 * i, w->reaction + 6 * m->owner[i]);
+  }
+  if (!m->stresses) return;
+  at_points(m, w, w->reaction, -1.0);
+  FOR(s, m->stresses) {
+    const double *stress = w->stress + s * (p + c + k);
+    add_part(p + c + k, -dot(stress, w->reaction, p), stress, w->reaction);
+  }
+  at_points(m, w, w->reaction, 1.0);
 }
 
 /* What is left of the equilibrium of links and of the power, and the largest terms, as the package measures them. */
@@ -1127,7 +1175,7 @@ static void checks(const Model *m, Work *w, double *balance, double *power, magn
   magnitude wrench = 0.0, term = 0.0, worst = 0.0;
   *power = 0.0;
   FOR(i, 6 * m->links) left[i] = w->applied[i] + w->inertial[i];
-  FOR(k, m->pairs) memcpy(w->total + 6 * k, w->reaction + 6 * k, 6 * sizeof(double));
+  FOR(i, 6 * m->pairs) w->total[i] = w->reaction[i] + (m->rubs ? w->taken[i] : 0.0);
   FOR(c, m->columns) {
     const double own = w->column_value[c], acting = own + w->given[c] + w->coupled[c];
     worst = raised(worst, fabs(dot(w->S + 6 * c, w->reaction + 6 * m->owner[c], 6)));
@@ -1154,36 +1202,308 @@ static void checks(const Model *m, Work *w, double *balance, double *power, magn
   largest[0] = raised(largest[0], wrench), largest[1] = raised(largest[1], term);
 }
 
+#ifndef MGK_COMPLEX
+static double sum_of_sizes(const double *a, const double *b, int n) {
+  double out = 0.0;
+  FOR(i, n) out += fabs(a[i]) * b[i];
+  return out;
+}
+
+/* A bound of the spectral radius of a matrix of the sizes of M (Collatz and Wielandt), independent of the units of rows and columns. */
+static double radius(const double *M, int n, double *v) {
+  double best = INFINITY, *next = v + n;
+  FOR(i, n) v[i] = 1.0;
+  FOR(pass, 4) {
+    double ratio = 0.0, most = 0.0;
+    FOR(i, n) next[i] = sum_of_sizes(M + i * n, v, n), ratio = raised(ratio, next[i] / v[i]), most = raised(most, next[i]);
+    best = fmin(best, ratio);
+    FOR(i, n) v[i] = raised(raised(1e-300, 1e-3 * most), next[i]);
+  }
+  return n ? best : 0.0;
+}
+#endif
+
+/* --- friction ---------------------------------------------------------------------------------------------------------------------- */
+
+/* The friction of all places, see force/friction.py: directions from the motion, one unknown normal force a place, V = a + B n + C V of
+ * their normal vectors V, n = |V|, by semismooth Newton where it contracts; else nothing is said here. */
+
+static double sense(double x) { return REAL_PART(x) > 0.0 ? 1.0 : REAL_PART(x) < 0.0 ? -1.0 : 0.0; }
+
+/* A vector made a unit one, nothing where it is not longer than `least`; its length. */
+static double made_unit(double *v, magnitude least) {
+  const double size = sqrt(dot(v, v, 3));
+  FOR(i, 3) v[i] = fabs(size) > least ? v[i] / size : 0.0;
+  return fabs(size) > 0.0 ? size : 0.0;
+}
+
+static double coefficient(const double *number, double speed) {
+  const double v = number[MGK_SPEED], part = speed / (fabs(v) > 0.0 ? v : 1.0);
+  return number[MGK_MU] + (fabs(v) > 0.0 ? (number[MGK_STATIC] - number[MGK_MU]) * exp(-part * part) : 0.0);
+}
+
+/* The wrench about the origin of a force at a point, times a size. */
+static void force_at(const double *p, const double *f, double size, double *out) {
+  FOR(i, 3) out[3 + i] = size * f[i];
+  cross(p, out + 3, out);
+}
+
+/* A place in the motion `slip`, pressed as `pressing`: rows of what it reads, wrenches on link b for its normal force and for its normal
+ * vector; how many rows it has. */
+static int rubs_at(const Model *m, Work *w, int t, const int *load) {
+  const double *n = m->load_number + load[3];
+  const int k = load[1], kind = load[0], turn = (int)REAL_PART(n[MGK_TURN_OF]), slide = (int)REAL_PART(n[MGK_SLIDE_OF]);
+  const double *press = w->pressing + 6 * k, *A = w->frame + 12 * m->first[k], *X = REAL_PART(n[MGK_AT_B]) > 0.5 ? w->end + 12 * k : A, r = n[MGK_RADIUS];
+  double *reads = w->reads + 18 * t, *D = w->exerts + 24 * t, *K = D + 6, *speed = w->sliding + t, twist[6] = {0}, u[3], v[3], p[3] = {X[3], X[7], X[11]};
+  memset(reads, 0, 18 * sizeof(double)), memset(D, 0, 24 * sizeof(double));
+  for (int c = first_column(m, k); c < first_column(m, k + 1); c++) add_part(6, w->slip[c], w->S + 6 * c, twist);
+  const magnitude rolls = TURNING * size_of(twist, 6);
+  if (kind == MGK_CONTACT || kind == MGK_BALL) FOR(i, 3) reads[6 * i + 3 + i] = 1.0;
+  if (kind == MGK_BALL) {
+    memcpy(u, twist, sizeof u);
+    *speed = r * made_unit(u, 0.0);
+    const double mu = coefficient(n, *speed), part = REAL_PART(n[MGK_CIRCLE]) > 0.5 ? mu / sqrt(1.0 + mu * mu) : mu;
+    FOR(i, 3) D[i] = -part * r * u[i];
+    return 3;
+  }
+  if (kind == MGK_CONTACT) {
+    const double *C = slide < 0 ? w->end + 12 * k : w->frame + 12 * slide;
+    double c[3] = {C[3], C[7], C[11]}, normal[3] = {press[3], press[4], press[5]}, M[3], at[3];
+    cross(c, press + 3, M);
+    FOR(i, 3) M[i] = press[i] - M[i];
+    const double size = made_unit(normal, 0.0);
+    cross(normal, M, v);
+    FOR(i, 3) c[i] += fabs(size) > 0.0 ? v[i] / size : 0.0, at[i] = c[i] - r * normal[i];
+    cross(twist, at, u);
+    FOR(i, 3) u[i] += twist[3 + i];
+    *speed = made_unit(u, rolls);
+    const double mu = coefficient(n, *speed);
+    force_at(c, u, -mu, D);
+    FOR(j, 3) { /* -mu r u x e_j */
+      const double e[3] = {j == 0, j == 1, j == 2};
+      cross(u, e, K + 6 * j);
+      FOR(i, 3) K[6 * j + i] *= -mu * r;
+    }
+    return 3;
+  }
+  if (kind == MGK_PLANE) {
+    const double z[3] = {A[2], A[6], A[10]}, about = dot(twist, z, 3), force = dot(press + 3, z, 3);
+    double M[3];
+    cross(p, press + 3, M);
+    FOR(i, 3) M[i] = press[i] - M[i], reads[3 + i] = z[i];
+    cross(z, M, v);
+    FOR(i, 3) p[i] += fabs(force) > 0.0 ? v[i] / force : 0.0;
+    cross(twist, p, v);
+    FOR(i, 3) v[i] += twist[3 + i];
+    const double across = dot(v, z, 3);
+    FOR(i, 3) v[i] -= across * z[i];
+    *speed = sqrt(dot(v, v, 3) + r * r * about * about);
+    const double share = fabs(*speed) > rolls ? -coefficient(n, *speed) / *speed : 0.0;
+    force_at(p, v, share, D);
+    FOR(i, 3) D[i] += r * r * about * share * z[i];
+    return 1;
+  }
+  const double rate = turn < 0 ? 0.0 : w->slip[turn], along = kind == MGK_THREAD || slide < 0 ? n[MGK_PITCH] * rate : w->slip[slide];
+  memcpy(u, w->S + 6 * (turn < 0 ? slide : turn) + (turn < 0 ? 3 : 0), sizeof u);
+  if (kind == MGK_THREAD || kind == MGK_COLLAR) {
+    const double pitch = n[MGK_PITCH], lead = sense(pitch) * pitch / r;
+    memcpy(reads + 3, u, sizeof u);
+    *speed = (kind == MGK_COLLAR ? r : sqrt(r * r + pitch * pitch)) * sense(rate) * rate;
+    double mu = coefficient(n, *speed), mean = mu * r, more = 0.0;
+    if (kind == MGK_THREAD) { /* tangents of sums of lead and friction angle */
+      mu *= sqrt(1.0 + n[MGK_FLANK] * n[MGK_FLANK] / (1.0 + lead * lead));
+      const double up = (lead + mu) / (1.0 - lead * mu) - lead, down = lead - (lead - mu) / (1.0 + lead * mu);
+      mean = 0.5 * r * (up + down), more = 0.5 * r * (up - down) * sense(pitch);
+    }
+    FOR(i, 3) D[i] = -mean * sense(rate) * u[i], K[i] = -more * fabs(sense(rate)) * u[i];
+    return 1;
+  }
+  *speed = sqrt(r * r * rate * rate + along * along);
+  const double mu = coefficient(n, *speed), per = fabs(*speed) > 0.0 ? 1.0 / *speed : 0.0, turns = r * rate * per;
+  if (kind == MGK_COUPLE) { /* two forces at the width bear the moment about the axis */
+    const double part = 2.0 / (n[MGK_WIDTH] * sense(n[MGK_WIDTH]));
+    cross(p, u, v);
+    FOR(i, 3) reads[i] = part * u[i], reads[3 + i] = part * v[i];
+    force_at(p, u, -mu * sense(along), D);
+    return 1;
+  }
+  const double size = REAL_PART(n[MGK_CIRCLE]) > 0.5 ? mu / sqrt(1.0 + mu * mu * turns * turns) : mu, side = n[MGK_SIDE], far = dot(u, p, 3);
+  force_at(p, u, -size * along * per, D);
+  FOR(i, 3) D[i] -= size * r * turns * u[i];
+  FOR(j, 3) {
+    const double e[3] = {j == 0, j == 1, j == 2};
+    cross(u, e, v);
+    FOR(i, 3) {
+      const double across = e[i] - u[i] * u[j];
+      K[6 * j + i] = 0.5 * n[MGK_WIDTH] * size * along * per * v[i];
+      reads[6 * i + j] = -side * v[i];
+      reads[6 * i + 3 + j] = side == 0.0 ? across : 0.5 * across + side * (p[i] * u[j] - far * e[i]);
+    }
+  }
+  return 3;
+}
+
+/* Answers of all reactions to a unit effort in every freedom that rubs. */
+static void unit_answers(const Model *m, Work *w, double *record, const int *places) {
+  const int c = m->columns, p = 6 * m->pairs;
+  int last = -1;
+  memset(w->nothing, 0, (size_t)6 * m->links * sizeof(double));
+  FOR(l, m->loads) if (m->load[4 * l] >= MGK_CONTACT && m->load[4 * l + 1] != last) {
+    last = m->load[4 * l + 1];
+    for (int i = first_column(m, last); i < first_column(m, last + 1); i++) {
+      memset(w->rubbed, 0, c * sizeof(double));
+      w->rubbed[i] = 1.0;
+      borne(m, w, w->nothing, w->rubbed, record, places);
+      memcpy(w->unit + (size_t)p * i, w->reaction, p * sizeof(double));
+    }
+  }
+}
+
+/* The equations of the normal vectors of all places, V = a + B n and what of them C V, solved for V = base + per n: rows of w->linear. */
+static int normal_vectors(const Model *m, Work *w, const int *rubs) {
+  const int R = m->rubs, rows = w->row_of[R], wide = rows + 1 + R, p = 6 * m->pairs;
+  FOR(t, R) { /* efforts in the pair, and what the pair takes up */
+    const int k = m->load[4 * rubs[t] + 1], first = first_column(m, k), n = first_column(m, k + 1) - first;
+    FOR(j, 4) {
+      double *own = w->own + 24 * t + 6 * j, *wrench = w->exerts + 24 * t + 6 * j;
+      FOR(f, n) own[f] = dot(w->S + 6 * (first + f), wrench, 6);
+      FOR(f, n) add_part(6, -own[f], w->E + 6 * (first + f), wrench);
+    }
+  }
+  FOR(t, R) for (int r = w->row_of[t]; r < w->row_of[t + 1]; r++) {
+    const int k = m->load[4 * rubs[t] + 1];
+    const double *reads = w->reads + 18 * t + 6 * (r - w->row_of[t]);
+    double *row = w->linear + (size_t)wide * r, *base = row + rows;
+    *base = dot(reads, w->smooth + 6 * k, 6);
+    FOR(i, rows) row[i] = i == r;
+    FOR(o, R) FOR(j, 1 + w->row_of[o + 1] - w->row_of[o]) {
+      const int other = m->load[4 * rubs[o] + 1], first = first_column(m, other), n = first_column(m, other + 1) - first;
+      const double *own = w->own + 24 * o + 6 * j;
+      double sum = other == k ? -dot(reads, w->exerts + 24 * o + 6 * j, 6) : 0.0;
+      FOR(f, n) if (own[f] != 0.0) sum += own[f] * dot(reads, w->unit + (size_t)p * (first + f) + 6 * k, 6);
+      if (j) row[w->row_of[o] + j - 1] -= sum;
+      else base[1 + o] = sum, *base += sum * m->load_number[m->load[4 * rubs[o] + 3] + MGK_PRELOAD];
+    }
+  }
+  return reduced(w->linear, rows, wide);
+}
+
+/* Normal forces n = |base + per n| by semismooth Newton, and their vectors; whether they are found and, being a contraction, the only ones. */
+static int normal_forces(const Model *m, Work *w) {
+  const int R = m->rubs, rows = w->row_of[R], wide = rows + 1 + R;
+  double *n = w->normal, *V = w->vector;
+  magnitude scale = 0.0;
+  FOR(t, R) FOR(o, R + 1) {
+    double square = 0.0;
+    for (int r = w->row_of[t]; r < w->row_of[t + 1]; r++) square += w->linear[(size_t)wide * r + rows + o] * w->linear[(size_t)wide * r + rows + o];
+    if (o) w->sized[R * t + o - 1] = sqrt(square);
+    else n[t] = sqrt(square), scale = raised(scale, fabs(n[t]));
+  }
+#ifndef MGK_COMPLEX
+  if (!(radius(w->sized, R, w->vector + rows) < 1.0)) return 0;
+#endif
+  for (int pass = 0, done = 0; pass < MOST_NEWTON; pass++) {
+    magnitude most = 0.0, size = scale;
+    FOR(r, rows) {
+      const double *row = w->linear + (size_t)wide * r + rows;
+      V[r] = row[0] + dot(row + 1, n, R);
+    }
+    if (done) return 1;
+    FOR(t, R) {
+      const int first = w->row_of[t], rank = w->row_of[t + 1] - first;
+      const double length = rank == 1 ? sense(V[first]) * V[first] : sqrt(dot(V + first, V + first, rank));
+      double *row = w->slope + (R + 1) * t;
+      FOR(o, R) {
+        row[o] = o == t;
+        if (fabs(length) > 0.0) FOR(j, rank) row[o] -= V[first + j] / length * w->linear[(size_t)wide * (first + j) + rows + 1 + o];
+      }
+      row[R] = n[t] - length;
+      most = raised(most, fabs(row[R])), size = raised(size, fabs(length));
+    }
+    done = most <= NEWTON_DONE * size; /* once more: what is a derivative follows a step behind */
+    if (!reduced(w->slope, R, R + 1)) return 0;
+    FOR(t, R) n[t] -= w->slope[(R + 1) * t + R];
+  }
+  return 0;
+}
+
+/* Whether a self-stress may change normal forces that are not zero along it. */
+static int loosened(const Model *m, const Work *w, const int *rubs) {
+  const magnitude largest = size_of(w->smooth, 6 * m->pairs);
+  FOR(t, m->rubs) FOR(s, m->stresses) {
+    const int k = m->load[4 * rubs[t] + 1];
+    const double *X = w->end + 12 * k, point[3] = {X[3], X[7], X[11]};
+    double stress[6], along = 0.0, square = 0.0;
+    memcpy(stress, w->stress + s * (6 * m->pairs + m->columns + m->couplings) + 6 * k, sizeof stress);
+    wrench_moved(stress, point, 1.0);
+    for (int r = w->row_of[t]; r < w->row_of[t + 1]; r++) {
+      const double part = dot(w->reads + 18 * t + 6 * (r - w->row_of[t]), stress, 6);
+      along += part * w->vector[r], square += part * part;
+    }
+    const magnitude size = fabs(sqrt(square));
+    if (size > UNIQUE && !(fabs(along) <= UNIQUE * size * largest)) return 1;
+  }
+  return 0;
+}
+
+/* Friction beside the reactions without it, which stand in w->reaction: efforts w->rubbed and what pairs take up w->taken; 0 where that is
+ * sure, 1 where it is not, 2 where nothing moves. */
+static int friction(const Model *m, Work *w, double *record, const int *places) {
+  const int R = m->rubs, c = m->columns, p = 6 * m->pairs;
+  int follows = 0, moves = 0, found = 0, *rubs = w->row_of + R + 1;
+  FOR(l, m->loads) if (m->load[4 * l] >= MGK_CONTACT) rubs[found++] = l, follows |= m->load[4 * l] <= MGK_PLANE;
+  const magnitude fastest = size_of(w->dq, c);
+  FOR(i, c) {
+    const magnitude rate = fabs(w->dq[i]);
+    const int rests = rate <= TURNING * fastest || rate <= STILL * sqrt(fabs(w->ddq[i]));
+    w->slip[i] = rests ? 0.0 : w->dq[i], moves |= !rests;
+  }
+  if (!moves) return 2;
+  memcpy(w->smooth, w->reaction, p * sizeof(double)), memcpy(w->pressing, w->reaction, p * sizeof(double));
+  unit_answers(m, w, record, places);
+  FOR(round, follows ? MOST_ROUNDS : 1) {
+    magnitude moved = 0.0;
+    w->row_of[0] = 0;
+    FOR(t, R) w->row_of[t + 1] = w->row_of[t] + rubs_at(m, w, t, m->load + 4 * rubs[t]);
+    if (!normal_vectors(m, w, rubs) || !normal_forces(m, w)) break;
+    memset(w->rubbed, 0, c * sizeof(double)), memset(w->taken, 0, p * sizeof(double));
+    FOR(t, R) {
+      const int k = m->load[4 * rubs[t] + 1], first = first_column(m, k), n = first_column(m, k + 1) - first;
+      w->normal[t] += m->load_number[m->load[4 * rubs[t] + 3] + MGK_PRELOAD];
+      FOR(j, 1 + w->row_of[t + 1] - w->row_of[t]) {
+        const double size = j ? w->vector[w->row_of[t] + j - 1] : w->normal[t];
+        add_part(n, size, w->own + 24 * t + 6 * j, w->rubbed + first);
+        add_part(6, size, w->exerts + 24 * t + 6 * j, w->taken + 6 * k);
+      }
+    }
+    FOR(i, p) {
+      double now = w->smooth[i] - w->taken[i];
+      FOR(a, c) if (w->rubbed[a] != 0.0) now += w->rubbed[a] * w->unit[(size_t)p * a + i];
+      moved = raised(moved, fabs(now - w->pressing[i])), w->pressing[i] = now;
+    }
+    if (!follows || moved <= SETTLED * size_of(w->pressing, p)) return loosened(m, w, rubs);
+  }
+  return 1;
+}
+
+/* --- all forces -------------------------------------------------------------------------------------------------------------------- */
+
 /* All forces at a state with rates; the force parts of a record. */
 static int forces(const Model *m, Work *w, const double *x, double *record, const int *places, magnitude *largest) {
   if (efforts(m, w)) return MGK_SINGULAR;
   loads(m, w, x);
   inertia(m, w);
-  if (m->passives) hold(m, w, record + places[MGK_HOLD], record + places[MGK_HOLDS], record + places[MGK_HOLD_TERMS]);
-  FOR(i, 6 * m->links) w->carried[i] = w->applied[i] + w->inertial[i];
-  memset(w->total, 0, (size_t)6 * m->pairs * sizeof(double));
-  for (int t = m->pairs - m->loops - 1; t >= 0; t--) {
-    const int *step = m->walk + 4 * t;
-    FOR(r, 6) {
-      const double on = w->carried[6 * step[3] + r];
-      w->total[6 * step[0] + r] = step[1] ? -on : on;
-      w->carried[6 * step[2] + r] += on;
-    }
+  if (m->stresses && self_stresses(m, w)) return MGK_STRAIN;
+  FOR(i, 6 * m->links) w->bare[i] = w->applied[i] + w->inertial[i];
+  borne(m, w, w->bare, w->given, record, places);
+  if (m->rubs) {
+    const int unsure = friction(m, w, record, places);
+    record[places[MGK_UNSURE]] = unsure;
+    if (unsure) memset(w->rubbed, 0, m->columns * sizeof(double)), memset(w->taken, 0, (size_t)6 * m->pairs * sizeof(double));
+    add_part(m->columns, 1.0, w->rubbed, w->given);
+    borne(m, w, w->bare, w->given, record, places);
+    add_part(6 * m->pairs, -1.0, w->taken, w->reaction);
   }
-  double *right = w->column_value;
-  FOR(j, m->unknowns) {
-    const int c = m->unknown[j];
-    right[j] = w->given[c] - dot(w->S + 6 * c, w->total + 6 * m->owner[c], 6);
-  }
-  solve_transposed(m, w, right, w->row_value);
-  add_loops(m, w, w->row_value, w->total);
-  FOR(k, m->couplings) w->multiplier[k] = -w->row_value[m->height * m->loops + k];
-  memcpy(w->reaction, w->total, (size_t)6 * m->pairs * sizeof(double));
-  FOR(c, m->columns) {
-    w->tau[c] = dot(w->S + 6 * c, w->total + 6 * m->owner[c], 6);
-    add_part(6, -w->tau[c], w->E + 6 * c, w->reaction + 6 * m->owner[c]);
-  }
-  if (m->stresses && self_stresses(m, w, record, places)) return MGK_STRAIN;
   couple(m, w->multiplier, w->coupled);
   double *own = w->column_value;
   memset(own, 0, m->columns * sizeof(double));
@@ -1191,6 +1511,7 @@ static int forces(const Model *m, Work *w, const double *x, double *record, cons
     const int c = m->drive[i];
     own[c] = w->tau[c] - w->given[c] - w->coupled[c];
   }
+  if (m->passives) FOR(i, 6 * m->links) w->applied[i] += record[places[MGK_HOLD] + i];
   checks(m, w, record + places[MGK_BALANCE], record + places[MGK_POWER], largest);
   double *shaking = record + places[MGK_SHAKING], *body = record + places[MGK_BODY_LOADS];
   memset(shaking, 0, 6 * sizeof(double)); /* what links exert on each other cancels */
@@ -1202,6 +1523,18 @@ static int forces(const Model *m, Work *w, const double *x, double *record, cons
 #define PUT(part, values) memcpy(record + places[part], values, (size_t)(places[part + 1] - places[part]) * sizeof(double))
   PUT(MGK_REACTIONS, w->reaction), PUT(MGK_EFFORTS, w->tau), PUT(MGK_GIVEN, w->given), PUT(MGK_COUPLED, w->coupled);
   PUT(MGK_MULTIPLIERS, w->multiplier);
+  if (m->rubs) {
+    PUT(MGK_RUBBED, w->rubbed), PUT(MGK_TAKEN, w->taken), PUT(MGK_SPEEDS, w->sliding), PUT(MGK_NORMALS, w->normal);
+  }
+  FOR(s, m->stresses) {
+    const int p = 6 * m->pairs, c = m->columns, k = m->couplings;
+    double *stress = w->stress + s * (p + c + k);
+    at_points(m, w, stress, 1.0);
+    memcpy(record + places[MGK_STRESS] + s * p, stress, p * sizeof(double));
+    memcpy(record + places[MGK_STRESS_EFFORTS] + s * c, stress + p, c * sizeof(double));
+    memcpy(record + places[MGK_MULTIPLIER_STRESS] + s * k, stress + p + c, k * sizeof(double));
+    couple(m, stress + p + c, record + places[MGK_COUPLED_STRESS] + s * c);
+  }
   return isfinite(fabs(record[places[MGK_BALANCE]] + record[places[MGK_POWER]])) ? MGK_OK : MGK_NOT_FINITE;
 }
 
@@ -1303,25 +1636,6 @@ static double made_inverse(const Model *m, Work *w, const double *matrix) {
     largest = raised(largest, of_matrix), inverse = raised(inverse, of_inverse);
   }
   return largest * inverse;
-}
-
-static double sum_of_sizes(const double *a, const double *b, int n) {
-  double out = 0.0;
-  FOR(i, n) out += fabs(a[i]) * b[i];
-  return out;
-}
-
-/* A bound of the spectral radius of a matrix of the sizes of M (Collatz and Wielandt), independent of the units of rows and columns. */
-static double radius(const double *M, int n, double *v) {
-  double best = INFINITY, *next = v + n;
-  FOR(i, n) v[i] = 1.0;
-  FOR(pass, 4) {
-    double ratio = 0.0, most = 0.0;
-    FOR(i, n) next[i] = sum_of_sizes(M + i * n, v, n), ratio = raised(ratio, next[i] / v[i]), most = raised(most, next[i]);
-    best = fmin(best, ratio);
-    FOR(i, n) v[i] = raised(raised(1e-300, 1e-3 * most), next[i]);
-  }
-  return n ? best : 0.0;
 }
 
 /* What a node is beside its closed state, at which it has just been factored: rates along the path, those of the matrix, the condition. */
@@ -1783,7 +2097,8 @@ int mgk_solve(const int *I, const double *P, void *state, const double *q, const
   }
   Asked asked = {1, 1, 0, NULL, places, asked_of, asked_of + d, asked_of + 2 * d, record, largest, 0, NULL, 0, 0};
   memcpy(w.kept, w.x, w.n_kept * sizeof(double));
-  const int status = along(&m, &w, &asked);
+  int status = along(&m, &w, &asked);
+  if (!status && m.rubs && REAL_PART(record[places[MGK_UNSURE]]) == 1.0) status = MGK_FRICTION;
   if (status) {
     memcpy(w.x, w.kept, w.n_kept * sizeof(double));
     return status;

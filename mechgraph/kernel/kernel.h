@@ -27,13 +27,13 @@
 #define MECHGRAPH_KERNEL_H
 #include <stddef.h>
 
-#define MGK_FORMAT 4
+#define MGK_FORMAT 5
 
 /* The counts at the head of I. */
 enum {
   MGK_IS_FORMAT, MGK_LINKS, MGK_PAIRS, MGK_FACTORS, MGK_COLUMNS, MGK_STATES, MGK_LOOPS, MGK_STEPS, MGK_COUPLINGS, MGK_TERMS,
   MGK_DRIVES, MGK_UNKNOWNS, MGK_LOADS, MGK_FRAME, MGK_FACTOR_NUMBERS, MGK_LOAD_NUMBERS,
-  MGK_PASSIVES, MGK_PASSIVE_LINKS, MGK_FIRST_PART, MGK_LOOP_ROWS, MGK_HEAD
+  MGK_PASSIVES, MGK_PASSIVE_LINKS, MGK_FIRST_PART, MGK_LOOP_ROWS, MGK_RUBS, MGK_HEAD
 };
 
 /* Every loop closes MGK_LOOP_ROWS components of a twist, from MGK_FIRST_PART on: all six from 0 on, in the plane Rz Tx Ty from 2 on. */
@@ -46,7 +46,14 @@ enum { MGK_TURN = 0, MGK_SLIDE = 3, MGK_ROTATION = 6, MGK_POSE = 7 };
  * law in column i, or between points of links i and j: [p[3], q[3],] stiffness, rest, damping.
  * table likewise: [p[3], q[3],] coordinate at its 0, over the rate (1) or the coordinate (0), whether the force at its ends holds beyond them,
  * pieces n, breaks[n + 1], of every piece four coefficients behind its first break, the highest first. */
-enum { MGK_WEIGHT, MGK_WRENCH, MGK_EFFORT, MGK_LAW, MGK_BETWEEN, MGK_TABLE, MGK_TABLE_BETWEEN };
+enum { MGK_WEIGHT, MGK_WRENCH, MGK_EFFORT, MGK_LAW, MGK_BETWEEN, MGK_TABLE, MGK_TABLE_BETWEEN, MGK_CONTACT, MGK_PLANE, MGK_BALL, MGK_THREAD, MGK_AXIS, MGK_COUPLE, MGK_COLLAR };
+
+/* From MGK_CONTACT on a place of pair i that rubs, MGK_RUBS of them, numbers below: coefficients in motion and at rest, between which it
+ * falls at sliding speeds (0: it does not), preload, whether marker B is its middle (else A), columns of its turn and slide (-1: none; of
+ * a contact: the factor before which the frame of its normal force stands), radius, part of the force that a friction circle leaves (1) or
+ * not (0), pitch, one over the distance of two places on an axis with the side on which it lies (0: in the middle), width of a guide,
+ * tangent of the flank of a thread. */
+enum { MGK_MU, MGK_STATIC, MGK_SPEED, MGK_PRELOAD, MGK_AT_B, MGK_TURN_OF, MGK_SLIDE_OF, MGK_RADIUS, MGK_CIRCLE, MGK_PITCH, MGK_SIDE, MGK_WIDTH, MGK_FLANK };
 
 /* What comes back: 0, or why a position is not given. */
 enum {
@@ -59,14 +66,15 @@ enum {
   MGK_STRAIN = 6,       /* drives or couplings strain each other without any reaction */
   MGK_TOO_FAR = 7,      /* more steps than are made */
   MGK_FORMAT_ERROR = 8, /* tables of another version */
-  MGK_NOT_PASSIVE = 9   /* a passive motion moves other links here, or is not told from another one */
+  MGK_NOT_PASSIVE = 9,  /* a passive motion moves other links here, or is not told from another one */
+  MGK_FRICTION = 10     /* friction jams here, has no finite force, or no solution that is surely the only one */
 };
 
-/* Parts of a record, in order, for one position (condition: that number, and how far links reach, by which rounding counts); s = rows of loops + couplings + passives - unknowns self-stresses. */
+/* Parts of a record, in order, for one position (condition: that number, and how far links reach, by which rounding counts; unsure: 1 where friction has no sure solution, 2 where nothing moves); s = rows of loops + couplings + passives - unknowns self-stresses. */
 enum {
   MGK_X, MGK_COORDINATES, MGK_DQ, MGK_DDQ, MGK_CLOSURE, MGK_CONDITION, MGK_POINTS, MGK_REACTIONS, MGK_EFFORTS, MGK_GIVEN, MGK_BODY_LOADS, MGK_STRESS,
   MGK_STRESS_EFFORTS, MGK_COUPLED, MGK_MULTIPLIERS, MGK_MULTIPLIER_STRESS, MGK_COUPLED_STRESS, MGK_SHAKING, MGK_BALANCE, MGK_POWER,
-  MGK_HOLD, MGK_HOLDS, MGK_HOLD_TERMS, MGK_PARTS
+  MGK_HOLD, MGK_HOLDS, MGK_HOLD_TERMS, MGK_RUBBED, MGK_TAKEN, MGK_NORMALS, MGK_SPEEDS, MGK_UNSURE, MGK_PARTS
 };
 
 /* Where the parts of a record begin, and behind the last one its length: places[MGK_PARTS + 1]. */

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Any
 
@@ -22,6 +22,7 @@ from mechgraph.kinematics.system import CouplingRows, System
 from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Array, Index, compose, identity, inverse, rotate
 from mechgraph.memo import carried
+from mechgraph.model.friction import Friction, places_in
 from mechgraph.model.gears import moving_lines
 from mechgraph.model.loads import (
     Damper,
@@ -35,17 +36,21 @@ from mechgraph.model.loads import (
     TorsionSpring,
     Wrench,
 )
+from mechgraph.model.mechanism import Mechanism
 from mechgraph.pairs.factors import ConstantScrew, Factor, Freedom, Rotation
 
 Integers = NDArray[np.int32]
 
-FORMAT = 4
+FORMAT = 5
 PARTS = (
     "x", "coordinates", "dq", "ddq", "closure", "condition", "points", "reactions", "efforts", "given", "loads", "stress", "stress_efforts",
     "coupled", "multipliers", "multiplier_stress", "coupled_stress", "shaking", "balance", "power",
     "hold", "holds", "hold_terms",
+    "friction", "taken", "normals", "speeds", "unsure",
 )  # fmt: skip
 """Parts of a record, in order."""
+MAY_LACK = ("hold", *PARTS[-5:])
+"""Parts that a record without passive motions, or without friction, does not have."""
 START = 4
 """Place of the start in the table of numbers."""
 ROWS_OF_KERNEL = 90
@@ -92,7 +97,15 @@ class Layout:
 
     def record(self, forces: bool) -> int:
         """Numbers of a record, with forces or of the motion alone."""
-        return self.places[PARTS[-1]].stop if forces else self.places["points"].start
+        return max(part.stop for part in self.places.values()) if forces else self.places["points"].start
+
+    def rubbing(self, count: int) -> Layout:
+        """The same with so many places that rub."""
+        if not count:
+            return self
+        shapes = self.shapes | dict.fromkeys(("normals", "speeds"), (count,))
+        shapes |= {"friction": shapes["efforts"], "taken": shapes["reactions"], "unsure": ()}
+        return replace(self, places=_places_of(shapes), shapes=shapes)
 
 
 def why_not(system: System) -> str | None:
@@ -171,7 +184,7 @@ def layout(system: System, drives: Index, passive: Sequence[PassiveMotion]) -> L
     ends = np.stack([s.a, s.b], axis=1)
     moved = [link for motion in passive for link in motion.links]
     head = [FORMAT, len(s.m.links), len(s.m.pairs), len(steps), s.n_freedoms, s.n_state, g.n_loops, len(pair), K, len(term_columns),
-            len(drives), len(unknown), 0, g.frame, int(numbers[-1]), 0, len(passive), len(moved), g.span.start, g.width]  # fmt: skip
+            len(drives), len(unknown), 0, g.frame, int(numbers[-1]), 0, len(passive), len(moved), g.span.start, g.width, 0]  # fmt: skip
     parts = [
         head, first, [step.kind for _, step in steps], columns, states[:-1], numbers[:-1], ends.ravel(), tree.ravel(), g.chords,
         np.searchsorted(loop, np.arange(g.n_loops + 1)), pair, sign, s.pair_of_freedom, s.single_rows, s.is_length, place, *effort_factor,
@@ -250,11 +263,15 @@ def _record(s: System, unknowns: int, passives: int) -> tuple[dict[str, slice], 
     shapes |= {"stress": (stresses, p, 6), "stress_efforts": (stresses, c), "coupled_stress": (stresses, c)}
     shapes |= {"multiplier_stress": (stresses, k), "closure": (), "condition": (2,), "balance": (), "power": ()}
     shapes |= {"hold": (n if passives else 0, 6), "holds": (passives,), "hold_terms": (passives,)}
+    shapes |= dict.fromkeys(("friction", "taken", "normals", "speeds", "unsure"), (0,))
+    return _places_of(shapes), shapes
+
+
+def _places_of(shapes: dict[str, tuple[int, ...]]) -> dict[str, slice]:
+    """The places of the parts, without what there is none of."""
     ends = np.cumsum([0, *(int(np.prod(shapes[name])) for name in PARTS)]).tolist()
     places = {name: slice(i, j) for name, i, j in zip(PARTS, ends[:-1], ends[1:], strict=True)}
-    if not passives:
-        del places["hold"]
-    return places, shapes
+    return {name: part for name, part in places.items() if shapes[name][:1] != (0,) or name not in MAY_LACK}
 
 
 def tables(known: Layout, system: System, x: Array, loads: Sequence[Load] | None) -> tuple[Integers, Array] | None:
@@ -276,7 +293,7 @@ def tables(known: Layout, system: System, x: Array, loads: Sequence[Load] | None
     R = base[:, :3]
     turned = np.einsum("jinb,jknb,klnb->ilnb", R, par.inertia, R)
     inertia = turned[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-    acts: Acting | None = Acting([], []) if loads is None else acting(s, own, loads)
+    acts: Acting | None = Acting([], []) if loads is None else acting(s, own, known.I[HEAD:], loads)
     if acts is None:
         return None
     rows = _coupling_rows(s)
@@ -288,6 +305,7 @@ def tables(known: Layout, system: System, x: Array, loads: Sequence[Load] | None
     ]  # fmt: skip
     I = np.concatenate([known.I, np.array(acts.entries, dtype=np.int32).ravel()])
     I[HEAD_LOADS], I[HEAD_LOAD_NUMBERS] = len(acts.entries), len(acts.numbers)
+    I[HEAD_RUBS] = sum(kind >= CONTACT for kind, *_ in acts.entries)
     parts = [np.atleast_2d(part) for part in parts]
     out = np.empty((count, sum(map(len, parts))))
     at = 0
@@ -297,8 +315,8 @@ def tables(known: Layout, system: System, x: Array, loads: Sequence[Load] | None
     return I, out
 
 
-HEAD_LOADS, HEAD_LOAD_NUMBERS = 12, 15
-"""Places of the numbers of loads in the head."""
+HEAD_LOADS, HEAD_LOAD_NUMBERS, HEAD_RUBS, HEAD = 12, 15, 20, 21
+"""Places of the numbers of loads, and of places that rub, in the head, and its length."""
 
 
 def _by_item(values: Array) -> Array:
@@ -401,8 +419,10 @@ def _orders(begin: Array, q: Array, batch: tuple[int, ...]) -> tuple[Integers, I
     return order, ends
 
 
-WEIGHT, WRENCH, EFFORT, LAW, BETWEEN, TABLE, TABLE_BETWEEN = range(7)
+WEIGHT, WRENCH, EFFORT, LAW, BETWEEN, TABLE, TABLE_BETWEEN, CONTACT = range(8)
 """Kinds of loads, as in ``kernel.h``."""
+RUBBING = ("contact", "plane", "ball", "thread", "axis", "couple", "collar")
+"""Ways in which pairs rub, in the order of their kinds from ``CONTACT`` on."""
 
 
 @dataclass
@@ -421,10 +441,13 @@ class Acting:
 
 @dataclass(frozen=True)
 class _Places:
-    """Where loads act: a system, and the poses ``own (3, 4, N, B)`` of the link frames in those of the tables."""
+    """Where loads act: a system, the poses ``own (3, 4, N, B)`` of the link frames in those of the tables, the ``first`` factor of every
+    pair.
+    """
 
     system: System
     own: Array
+    first: Integers
 
     @property
     def L(self) -> float:
@@ -446,6 +469,12 @@ class _Places:
         """A vector ``(3, B)`` in the frame of a link, in that of the tables."""
         return rotate(self.own[:, :3, self.link(link)], v)
 
+    def before(self, pair: int, frame: int) -> int:
+        """The factor before which a frame of a pair stands, -1: behind all."""
+        row = self.system.groups[int(self.system.type_of[pair])].row
+        rank = next((r for r, columns in enumerate(row.factors) if frame in columns), None)
+        return -1 if rank is None else int(self.first[pair]) + sum(len(_steps(f, 0)) for f in row.steps[:rank])
+
     def column(self, freedom: str) -> tuple[int, bool]:
         """Number of a freedom, and whether it is a slide."""
         pair, j = self.system.m.freedom(freedom)
@@ -453,26 +482,18 @@ class _Places:
         return column, bool(self.system.is_length[column])
 
 
-def acting(system: System, own: Array, loads: Sequence[Load]) -> Acting | None:
-    """All loads in the tables; None where one of them varies over the positions or is a function.
-
-    ``own (3, 4, N, B)``: poses of the link frames in those of the tables.
-    """
-    out, places = Acting([], []), _Places(system, own)
+def acting(system: System, own: Array, first: Integers, loads: Sequence[Load]) -> Acting | None:
+    """All loads in the tables; None where one of them varies over the positions or is a function. Of the rest see ``_Places``."""
+    out, places = Acting([], []), _Places(system, own, first)
     for load in loads:
-        if not in_tables(load):
+        if why_not_load(load, system.m) is not None:
             return None
         KINDS[type(load)](places, load, out)
     return out
 
 
-def in_tables(load: Load) -> bool:
-    """Whether a load is numbers of the tables."""
-    return why_not_load(load) is None
-
-
-def why_not_load(load: Load) -> str | None:
-    """What of a load the kernel cannot carry; None where it is numbers of the tables."""
+def why_not_load(load: Load, m: Mechanism) -> str | None:
+    """What of a load on a mechanism the kernel cannot carry; None where it is numbers of the tables."""
     values = [getattr(load, name) for name in load.formats]
     given = [name for name in load.over_positions if not isinstance(getattr(load, name), PerCase)]
     where = f"load {load.where.removesuffix(': ')}"
@@ -484,6 +505,8 @@ def why_not_load(load: Load) -> str | None:
         return f"{where} acts between points and reads the freedom {load.reads_freedom!r}"
     if isinstance(load, Law) and load.in_freedom is None and load.along is not None:
         return f"{where} acts along a fixed direction"
+    if isinstance(load, Friction) and (load.of not in m.pair_index or m.pair(load.of).type.opens):
+        return f"{where} is not of a pair that stays closed"
     return None
 
 
@@ -550,6 +573,28 @@ def _tabled(places: _Places, load: Any, out: Acting) -> None:
     out.add(TABLE_BETWEEN, places.link(load.a), places.link(load.b), p, q, *numbers)
 
 
+def _friction(places: _Places, load: Any, out: Acting) -> None:
+    """Every place of a pair that rubs, and what is viscous."""
+    s = places.system
+    k, L = s.m.place_of_pair(load.of), places.L
+    pair, row, first = s.m.pairs[k], s.groups[int(s.type_of[k])].row, int(s.first_column[k])
+    load = load.with_numbers(lambda value: value.values if isinstance(value, PerCase) else value)
+    for rubs in places_in(load, row):
+        turn, slide = (-1 if j is None else first + j for j in (rubs.turn, rubs.slide))
+        if rubs.way == "contact":
+            slide = places.before(k, next(iter(row.reactions or ())).frame)
+        radius = {"contact": pair.radius_b, "collar": load.thrust_radius}.get(rubs.way, load.radius)
+        mu, stribeck, radius, width = (0.0 if v is None else v for v in (load.mu, load.stribeck, radius, load.width))
+        numbers = (
+            mu, load.coefficient_at_rest, stribeck / L, load.preload / L, load.on == "b", turn, slide, radius / L, load.model == "circle",
+            s.par.pitch[k], rubs.side and rubs.side / (load.length / L), width / L, np.tan(load.flank),
+        )  # fmt: skip
+        out.add(CONTACT + RUBBING.index(rubs.way), k, 0, *(np.atleast_2d(np.asarray(v, dtype=float)) for v in numbers))
+    for j, freedom in enumerate(row.freedoms if load.viscous else ()):
+        unit = 1.0 if not freedom.turns else L**-2
+        out.add(LAW, first + j, 0, *rows((0.0, 0.0), 2)[:, None], np.atleast_2d(load.viscous * unit))
+
+
 KINDS: dict[type[Load], Callable[[_Places, Any, Acting], None]] = {
     Gravity: _weight,
     Wrench: _wrench,
@@ -558,5 +603,6 @@ KINDS: dict[type[Load], Callable[[_Places, Any, Acting], None]] = {
     TorsionSpring: _elastic,
     Damper: _damper,
     ForceLaw: _tabled,
+    Friction: _friction,
 }
 """What puts a load into the tables, by its class."""

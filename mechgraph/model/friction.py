@@ -171,7 +171,8 @@ class Friction(Load):
             return [*found, self.where + unknown("pair", self.of, known)]
         if found or (coupling is None and not isinstance(pair.type, PairType)):
             return found
-        if next(load for load in names.loads if isinstance(load, Friction) and load.of == self.of) is not self:
+        own = [load for load in names.loads if isinstance(load, Friction) and load.of == self.of]
+        if len(own) > 1 and own[0] is not self:
             found.append("of: is declared before; a pair or coupling takes one mg.Friction")
         found += self._of_pair(pair) if coupling is None else self._of_coupling(coupling)
         found += self._of_numbers()
@@ -291,6 +292,43 @@ def rubs_as_plane(row: PairType) -> bool:
 def rubs_as_contact(row: PairType) -> bool:
     """Whether its elements touch at a place."""
     return row.touching is not None or row.opens
+
+
+class Rubs(NamedTuple):
+    """A place at which a pair rubs: in which ``way``, the freedoms in which it turns and slides there, the ``side`` of the middle on which
+    it lies (0: in the middle).
+    """
+
+    way: str
+    turn: int | None = None
+    slide: int | None = None
+    side: float = 0.0
+
+
+def places_in(load: Friction, row: PairType) -> Iterator[Rubs]:
+    """All places at which a pair of this type rubs, in order."""
+    alone = {
+        "opening": row.opens,
+        "contact": rubs_as_contact(row),
+        "plane": rubs_as_plane(row),
+        "ball": rubs_as_ball(row),
+    }
+    if way := next((way for way, so in alone.items() if so), None):
+        yield Rubs(way)
+        return
+    axes: dict[int, dict[bool, int]] = {}
+    for j, f in enumerate(row.freedoms):
+        axes.setdefault(int(np.argmax(np.abs(f.twist[:3] if f.turns else f.twist[3:]))), {})[f.turns] = j
+    for found in axes.values():
+        turn, slide = found.get(True), found.get(False)
+        if row.takes_pitch:
+            yield Rubs("thread", turn)
+        if not row.takes_pitch or load.length is not None:
+            yield from (Rubs("axis", turn, slide, side) for side in ((0.0,) if load.length is None else (1.0, -1.0)))
+            if load.width is not None:
+                yield Rubs("couple", turn, slide)
+        if load.thrust_radius is not None:
+            yield Rubs("collar", turn)
 
 
 def _is(freedom: Any, *, turn: bool) -> bool:

@@ -566,7 +566,8 @@ def cannot(system: System, loads: Loads, held: bool) -> str | None:
         return "dry friction holds freedoms and lets them go"
     if system.n_freedoms * len(system.m.links) >= SPARSE_FROM:
         return f"it has {system.n_freedoms} freedoms and {len(system.m.links)} links; expected fewer than {SPARSE_FROM} of the product"
-    return next(filter(None, map(why_not_load, (*loads.stored, *loads.rest))), None) or why_not(system)
+    whys = (why_not_load(load, system.m) for load in (*loads.stored, *loads.rest))
+    return next(filter(None, whys), None) or why_not(system)
 
 
 def library_for(system: System, loads: Loads, held: bool, engine: str) -> Any:

@@ -171,12 +171,15 @@ class Trajectory:
         known = self._kept.setdefault("accuracy", np.zeros(self._count))
         known[places] = np.maximum(known[places], error)
 
-    def take(self, records: Records, forces: bool) -> None:
-        """Keep all positions from the records of a compiled solution."""
-        self._solved[:] = True
-        self._kept |= {
-            name: records[name] for name in (*MOVED, *(("points", *KEPT) if forces else ())) if name in records
-        }
+    def take(self, records: Records, forces: bool, rubbing: tuple[str, ...] = ()) -> None:
+        """Keep all positions from the records of a compiled solution, with the names of the places ``rubbing``."""
+        self._solved[:], self.rubbing = True, rubbing
+        asked = (*MOVED, *(("points", *KEPT, "friction", "taken", "normals", "speeds") if forces else ()))
+        self._kept |= {name: records[name] for name in asked if name in records}
+        if rubbing:  # no teeth rub, and nothing is at rest where the kernel decides
+            own = self._kept["efforts"] - self._kept["given"] - self._kept["coupled"]
+            none = np.zeros((6, len(self.whole.couplings), self._count))
+            self._kept |= {"range": np.stack([own, own], axis=1), "teeth": 0.0 * own, "rubbing": none}
         self.has_forces, self._largest = forces, records.largest
 
     def _keep(self, name: str, places: Index, values: Array) -> None:
@@ -595,12 +598,10 @@ class Trajectory:
     def effort_range(self, pair: int) -> Array:
         """Least and greatest effort of drives at rest, ``(..., f, 2)``; the effort itself in motion and where nothing rubs."""
         columns = self._columns(pair)
-        own = self._efforts(columns)[0]
-        unit = np.where(self._system.is_length[columns], self._L, self._L**2)[:, None, None]
-        ends = np.repeat(own[:, None], 2, axis=1)
+        ends = np.repeat(self._efforts(columns)[0][:, None], 2, axis=1)
         if "range" in self._kept:
-            found = unit * self._kept["range"][columns]
-            ends = np.where(self._driven(columns)[:, None], found, ends)
+            unit = np.where(self._system.is_length[columns], self._L, self._L**2)[:, None, None]
+            ends = np.where(self._driven(columns)[:, None], unit * self._kept["range"][columns], ends)
         return self._out(ends)
 
     def at_places(self, name: str, of: str) -> Array:
