@@ -404,6 +404,96 @@ def test_a_flank_that_would_pull_is_a_warning():
         mg.solve(m.replace(couplings=[mg.Mesh("m", "a", "b")], loads=swings), given)
 
 
+# --- backlash in time ---------------------------------------------------------------------------------------------------------
+
+
+INERTIA = np.array([1e-4, 9e-4])
+
+
+def heavy_stage(backlash, planar=False, **more):
+    """A helical pair a little further apart than its teeth ask for, 60 teeth of module 2; in the plane without helix."""
+    helix = 0.0 if planar else 0.2
+    d = 0.06 / np.cos(helix) + 1e-4
+    at = {"p": (0, 0), "w": (d, 0)} if planar else {"p": (0, 0, 0), "w": (d, 0, 0)}
+    inertia = [i if planar else np.diag([i] * 3) for i in INERTIA]
+    return mg.Mechanism(
+        "stage",
+        [mg.Link("frame"), *(mg.Link(k, 1.0, at[k], i) for k, i in zip(at, inertia, strict=True))],
+        [mg.Pair(k, "R", "frame", k, point=x, **({} if planar else {"axis": Z})) for k, x in at.items()],
+        gears=[
+            mg.Gear(k, k, n, at[k], None if planar else Z, module=0.002, helix_angle=b, width=0.02)
+            for k, n, b in (("p", 20, helix), ("w", 40, -helix))
+        ],
+        couplings=[mg.Mesh("m", "p", "w", backlash=backlash, restitution=0.6, **more)],
+        planar=planar,
+    )
+
+
+@pytest.mark.parametrize("planar", [False, True])
+@pytest.mark.parametrize("flank", ["forward", "backward"])
+def test_flanks_part_and_strike_in_time(planar, flank):
+    """Free flight over the gap, Newton's law of restitution, momentum: times, impulses, energy lost of the first four blows."""
+    m, sign = heavy_stage(1e-4, planar, flank=flank), 1.0 if flank == "forward" else -1.0
+    fact = mg.mesh_facts(m)["m"]
+    assert fact.backlash > 1.7e-4  # with what the distance leaves
+    lean = np.cos(np.arctan(m.gears[0].base_lean))
+    c = -lean * np.array([gear.base_radius for gear in m.gears])
+    r = mg.respond(m, np.linspace(0, 0.05, 41), rates={"p": -2.0 * sign, "w": 0.0})
+    w, t, at, room = np.array([-2.0 * sign, 0.0]), 0.0, 0.0, fact.backlash_angles[0] * m.gears[0].base_radius * lean
+    assert len(r.events) == 4
+    for event in r.events:
+        speed = c @ w
+        end = sign * room if sign * speed > 0 else 0.0
+        t, at = t + (end - at) / speed, end
+        p = -1.6 * speed / (c @ (c / INERTIA))
+        after = w + c / INERTIA * p
+        lost = 0.5 * INERTIA @ (w**2 - after**2)
+        np.testing.assert_allclose([event.t, event.impulse, event.energy_lost], [t, abs(p), lost], rtol=1e-9)
+        np.testing.assert_allclose(np.linalg.norm(event.impulses["p"][3:]), abs(p), rtol=1e-9)
+        w = after
+    assert np.abs(r.energy.balance).max() < 1e-12 * r.energy.kinetic.max()
+    closed = mg.respond(
+        m, [0.0, 0.01], rates={"p": -2.0 * sign}
+    )  # no rate of the wheel: flanks that touch keep touching
+    np.testing.assert_allclose(closed["w"].velocity[0], sign, rtol=1e-12)
+
+
+@pytest.mark.parametrize("torque", [1.0, -1.0])
+def test_flanks_that_press_are_a_mesh_without_backlash(torque):
+    """Motion, bearings and teeth, once the flank of the load is reached; the other one is a gap away."""
+    loads, t = [mg.Effort("p", torque), mg.Effort("w", -0.5 * torque)], np.linspace(0, 0.05, 11)
+    flank = "forward" if torque > 0 else "backward"
+    loose, tight = (mg.respond(heavy_stage(j, flank=flank), t, loads=loads) for j in (1e-4, 0.0))
+    np.testing.assert_allclose(loose["w"].position, tight["w"].position, atol=1e-12)
+    for what in ("force", "moment"):
+        np.testing.assert_allclose(getattr(loose["p"], what), getattr(tight["p"], what), atol=1e-9)
+    np.testing.assert_allclose(loose.coupling("m").normal_force, tight.coupling("m").normal_force, rtol=1e-9)
+    other = mg.respond(heavy_stage(1e-4, flank="backward" if torque > 0 else "forward"), t, loads=loads)
+    assert other.events[0].t > 0
+    np.testing.assert_allclose(
+        np.abs(other["m.play"].position[-1]),
+        mg.mesh_facts(heavy_stage(1e-4))["m"].backlash_angles[0]
+        * 0.02
+        / np.cos(0.2)
+        * np.cos(heavy_stage(0.0).gears[0].transverse_angle)
+        * np.cos(np.arctan(heavy_stage(0.0).gears[0].base_lean)),
+        rtol=1e-6,
+    )
+    np.testing.assert_allclose(other.coupling("m").normal_force[-1], tight.coupling("m").normal_force[-1], rtol=1e-9)
+
+
+def test_backlash_of_centers_that_move_is_refused_in_time():
+    pairs = [
+        mg.Pair("A", "R", "frame", "one", point=(0, 0, 0), axis=Z),
+        mg.Pair("P", "P", "frame", "slide", point=(0.0605, 0, 0), axis=X),
+        mg.Pair("B", "R", "slide", "two", point=(0.0605, 0, 0), axis=Z),
+    ]
+    gears = [g.replace(point=(x, 0, 0)) for g, x in zip(spur(), (0, 0.0605), strict=True)]
+    m = mg.Mechanism("m", pairs=pairs, gears=gears, couplings=[mg.Mesh("m", "a", "b", backlash=1e-4)])
+    with pytest.raises(mg.DeclarationError, match="leave backlash out, or hold the centers"):
+        mg.respond(m, [0.0, 0.1])
+
+
 # --- planets -----------------------------------------------------------------------------------------------------------------
 
 

@@ -15,8 +15,10 @@ import numpy as np
 
 from mechgraph.errors import DeclarationError
 from mechgraph.model.couplings import Axes, BaseCoupling, BevelGears, Rack, SpurGears
-from mechgraph.model.gears import Gear, involute, tip_radius
+from mechgraph.model.gears import Gear, GearRack, involute, tip_radius
 from mechgraph.model.meshes import Bevels, Mesh, Parallel, WithRack
+from mechgraph.model.pair import Link, Pair
+from mechgraph.model.response_setup import Stop
 from mechgraph.quantities import door
 
 if TYPE_CHECKING:
@@ -235,6 +237,43 @@ def _reaches_of_rack(met: WithRack) -> tuple[float, float]:
     tip = sqrt(max(tip_radius(pinion) ** 2 - pinion.base_radius**2, 0.0))
     # the tip line of the rack is a module above its pitch line
     return tip - pinion.radius * sin(a), (pinion.module - (distance - pinion.radius)) / sin(a)
+
+
+def with_play(m: Mechanism) -> tuple[Mechanism, list[Stop]]:
+    """The mechanism with the gap between the flanks of meshes with backlash as a freedom, ``m.play``, and the stops of these.
+
+    The gap is that along the line of action: the backlash, of the distance and declared, by the part of a velocity along the pitch circle
+    that the line takes up. It begins closed, on the flank that is given, else forward.
+    """
+    pairs, links, couplings, stops = list(m.pairs), list(m.links), [], []
+    for c in m.couplings:
+        if isinstance(c, Mesh) and c.backlash > 0.0 and not c.play:
+            name, met = f"{c.name}.play", c.seen(m)
+            links.append(Link(name))
+            pairs.append(Pair(name, "P", m.frame, name, point=(0.0, 0.0, 0.0), axis=(1.0, 0.0, 0.0)))
+            line = met.flanks(True)[0](met.a, met.b, np.array(met.numbers)[:, None, None])
+            n, z, arm = (v[:, 0, 0] for v in (line.along, met.a.axis, line.point - met.a.point))
+            way = z if isinstance(met.one, GearRack) else np.cross(z, arm)
+            known = _facts(m, c).backlash
+            gap = (c.backlash if np.isnan(known) else known) * float(abs(n @ way) / np.linalg.norm(way))
+            ends = (-gap, 0.0) if c.flank == "backward" else (0.0, gap)
+            stops.append(Stop(f"{name}.Tz", *ends, restitution=c.restitution))
+            c = c.replace(play=f"{name}.Tz")
+        couplings.append(c)
+    return (m.replace(links=links, pairs=pairs, couplings=couplings) if stops else m), stops
+
+
+def without_play(m: Mechanism) -> Mechanism:
+    """The mechanism without the freedoms of such gaps, as it is drawn."""
+    plays = {c.play.rpartition(".")[0]: c for c in m.couplings if isinstance(c, Mesh) and c.play == f"{c.name}.play.Tz"}
+    if not plays:
+        return m
+    return m.replace(
+        links=[one for one in m.links if one.name not in plays],
+        pairs=[one for one in m.pairs if one.name not in plays],
+        couplings=[c.replace(play="") if c in plays.values() else c for c in m.couplings],
+        drives=[one for one in m.drives if one.freedom.rpartition(".")[0] not in plays],
+    )
 
 
 # --- how far from the pitch point teeth touch -------------------------------------------------------------------------------

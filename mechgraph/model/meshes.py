@@ -98,6 +98,14 @@ class Mesh(LineCoupling):
             choices=FLANKS,
         ),
     ] = "auto"
+    restitution: Annotated[float, NUMBER("with which flanks strike each other, in time", minimum=0.0)] = 0.0
+    play: Annotated[
+        str,
+        TEXT(
+            "a slide that counts by how much the flanks have parted; `respond` adds it where there is backlash",
+            default="none",
+        ),
+    ] = ""
 
     held: ClassVar[tuple[bool, bool]] = (False, False)
     """Which gears must not slide along their axes."""
@@ -130,7 +138,16 @@ class Mesh(LineCoupling):
                 found.append(f"a {one.kind} and a {two.kind} do not mesh; expected {_words_of_kinds(one.kind)}")
             elif m.has_geometry and m.once(_placed_soundly):
                 found += self.seen(m).misfits(fitting_of(m))
+                if self.play and not found:
+                    found += [fault] if (fault := m.freedom_fault(self.play, single=True)) else self._play_faults(m)
         return [where + fault for fault in found]
+
+    def _play_faults(self, m: Any) -> list[str]:
+        if self.placed(m).linear:
+            return []
+        return [
+            "its flanks part where both gears turn on pairs R about their axes, or slide on P; leave backlash out, or hold the centers"
+        ]
 
     def seen(self, m: Any) -> Meeting:
         """Both gears where they meet."""
@@ -162,18 +179,21 @@ class Mesh(LineCoupling):
             ones = {name: 1.0 for some in names for name in some}
             return self._put(m, steps, ones if plain else None, ends=(one.place, two.place))
         met = self.seen(m)
-        flanks = met.flanks(self.flank != "backward")
+        both = self.flank == "auto" or bool(self.play)
+        flanks = met.flanks(both or self.flank == "forward")
         ends, coefficients = (one.place, two.place), None
         if plain:
             line = flanks[0](met.a, met.b, np.array(met.numbers)[:, None, None])
             coefficients = self._coefficients(m, steps, line, ends)
+        if coefficients is not None and self.play:
+            coefficients[m.full_name(self.play)] = -1.0
         known = {
             "ends": ends,
             "numbers": met.numbers,
             "relation": flanks[0],
             "period": met.period,
             "held": met.held,
-            "other": flanks[1] if self.flank == "auto" else flanks[0],
+            "other": flanks[1] if both else flanks[0],
             "turning": tuple(not isinstance(gear, GearRack) for gear in (one, two)),
         }
         return self._put(m, steps, coefficients, **known)

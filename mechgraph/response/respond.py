@@ -36,6 +36,7 @@ from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import MOTIONS, RESPONSE, Tolerances
 from mechgraph.model.declaration import mapping_faults
+from mechgraph.model.gear_facts import with_play
 from mechgraph.model.loads import Law, Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import declared
@@ -445,6 +446,16 @@ def started(m: Mechanism, start: Mapping[str, float], given: Prescribed) -> tupl
     return system, x, columns
 
 
+def _rates_with_flanks(
+    m: Mechanism, task: Task, x: Array, rates: Mapping[str, float], begin: float, closed: Mapping[str, float]
+) -> Array:
+    """The rates with which flanks that touch keep ``closed``, where those given let them."""
+    try:
+        return start_rates(m, task, x, {**closed, **rates}, begin)
+    except DeclarationError:
+        return start_rates(m, task, x, rates, begin)
+
+
 def start_rates(m: Mechanism, task: Task, x: Array, rates: Mapping[str, float], begin: float) -> Array:
     """Rates ``(F,)`` at the beginning: those given and prescribed, the others as small as the closure lets them be.
 
@@ -677,6 +688,8 @@ def respond(
         raise DeclarationError(f"respond {m.name!r}", faults)
     declared = m if replaced is None else m.replace(loads=replaced)
     bounces = {f"{pair.name}.gap": pair.restitution for pair in declared.pairs if pair.restitution is not None}
+    declared, flanks = with_play(declared)
+    limits = (*flanks, *limits)
     declared, gaps = with_contacts(declared, limits, declared.tol or 0.0 if tol is None else tol)
     m = declared
     m = meant(declared, tol, "respond")
@@ -700,7 +713,7 @@ def respond(
         task = replace(task, held=free_motion(system, x, columns, task.engine).passive)
     task = replace(task, library=library_for(system, task.loads, bool(task.held), engine))
     try:
-        dq = start_rates(m, task, x, wanted_rates, begin)
+        dq = _rates_with_flanks(m, task, x, wanted_rates, begin, {stop.freedom: 0.0 for stop in flanks})
     except Stopped as stop:
         raise ResponseError(f"mechanism {m.name!r}: {stop}") from None
     standing = Rests.of(m, task, limits, bounces)

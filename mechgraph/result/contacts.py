@@ -539,7 +539,7 @@ def lift_offs(values: Trajectory) -> tuple[LiftOff, ...]:
 
 def _flanks(values: Trajectory) -> Iterator[tuple[Mesh, Array, Mask]]:
     """Meshes with the forces ``(T,)`` that their flanks push with, and where these would have to pull."""
-    meshes = [(k, one) for k, one in enumerate(values.whole.couplings) if isinstance(one, Mesh)]
+    meshes = [(k, one) for k, one in enumerate(values.whole.couplings) if isinstance(one, Mesh) and not one.play]
     if not meshes or not values.has_forces:
         return
     multipliers, loose = values.multipliers()

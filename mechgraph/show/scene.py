@@ -18,6 +18,7 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Array
 from mechgraph.model.friction import Friction
+from mechgraph.model.gear_facts import without_play
 from mechgraph.model.loads import Effort, Law, Wrench
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
@@ -145,7 +146,7 @@ def scene_at(
     m: Mechanism, place: DrawnPlace, positions: Any, solution: Solution | None = None, *, forces: bool = False
 ) -> Scene:
     """The scene of a mechanism that stands somewhere; a ``solution`` gives values to loads that vary, and to reactions."""
-    stage = DrawnPose(m, place, len(positions))
+    stage = DrawnPose(without_play(m), place, len(positions))
     parts = [
         *gearing(stage, solution, positions),
         *cams(stage),
