@@ -581,3 +581,61 @@ def test_the_printed_equations_are_the_solved_ones(unknowns):
         A, b = system.assemble(state)
         np.testing.assert_allclose(A @ np.array(values), b, atol=1e-9)
     assert "N_C(B.w-i)" in f.text()
+
+
+@pytest.mark.parametrize("polygon", [False, True])
+@pytest.mark.parametrize("load", [8.0, 3.0])
+def test_a_span_that_hangs_loose(load, polygon):
+    """Tension ``M / arm`` in the other span alone, torque by power; with chords its rollers keep their distance, tooth by tooth."""
+    teeth, at = {"p": 9, "w": 15}, {"p": (0.0, 0.0, 0.0), "w": (0.4, 0.0, 0.0)}
+    pitch = 0.0254
+    m = mg.Mechanism(
+        "chain",
+        pairs=[mg.Pair(k, "R", "frame", k, point=x, axis=Z) for k, x in at.items()],
+        gears=[mg.Pulley(k, k, at[k], Z, teeth=n, pitch=pitch) for k, n in teeth.items()],
+        couplings=[mg.BeltDrive("C", over=["p", "w"], slack="p-w", polygon=polygon)],
+        drives=["p"],
+        loads=[mg.Effort("w", -load)],
+    )
+    report = mg.check(m)
+    assert (report.mobility, report.redundancy) == (1, 0)
+    step = 2 * np.pi / teeth["p"]
+    turn = np.linspace(0.0, 2 * step, 41)
+    s = mg.solve(m, {"p": mg.Motion(turn, velocity=5.0)})
+    chain, q, ratio = s.coupling("C"), s["w"].position[:, 0], s["w"].velocity[:, 0] / 5.0
+    np.testing.assert_allclose(s["p"].effort[:, 0], load * ratio, rtol=1e-9)
+    assert not chain.tension["p-w"].any()
+    assert (chain.tension["w-p"] > 0).all()
+    # a pitch of the one is a pitch of the other
+    np.testing.assert_allclose(q[[20, 40]], np.array([1, 2]) * 2 * np.pi / teeth["w"], rtol=1e-9)
+    if not polygon:
+        np.testing.assert_allclose(chain.tension["w-p"], load / (teeth["w"] * pitch / (2 * np.pi)), rtol=1e-9)
+        return
+    assert np.ptp(ratio) > 0.03 * ratio.mean()
+    # the tight span as a bar of a four-bar between two rollers, over the positions between two changes of rollers
+    bars = []
+    for k, n in teeth.items():
+        angles = s[k].position[:, :1] + 2 * np.pi / n * np.arange(n)
+        R = pitch / (2 * np.sin(np.pi / n))
+        bars.append(np.array(at[k][:2])[:, None, None] + R * np.array([np.cos(angles), np.sin(angles)]))
+    force = np.stack([s["w"].force[:, 0], s["w"].force[:, 1]]) / chain.tension["w-p"]
+    apart = bars[0][:, :, :, None] - bars[1][:, :, None, :]
+    length = np.linalg.norm(apart, axis=0)
+    along = np.abs(np.einsum("ct,ctij->tij", force, apart)) / length
+    for i in range(0, 40, 3):
+        bar = along[i] > 1 - 1e-9  # rollers on the line of the force
+        assert bar.any()
+        same = (along[i + 1] > 1 - 1e-9) & bar
+        np.testing.assert_allclose(length[i + 1][same], length[i][same], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        ({"slack": "w-x"}, r"slack: unknown span 'w-x'"),
+        ({"slack": "w-p", "pretension": 3.0}, "leave length= and pretension= out"),
+    ],
+)
+def test_what_hangs_loose_is_one_span(more, told):
+    with pytest.raises(mg.DeclarationError, match=told):
+        drive(**more)

@@ -127,7 +127,8 @@ class BeltDrive(LineCoupling):
     one closure row each. ``s.coupling("name").tension["p1-p2"]`` is the tension of a span, ``.span`` its length, ``.wrap["p1"]`` an angle
     of wrap. Where no center moves the belt is redundant once: tensions are NaN without ``pretension``, the mean tension of the spans,
     weighted with their lengths (as of an elastic belt; what stretches on the pulleys is left out). A pulley on a spring-loaded arm
-    determines them.
+    determines them, and so does a span that hangs loose, ``slack="w-p"``, as that of a chain behind its driving sprocket: the others pull
+    alone.
 
     Examples
     --------
@@ -161,6 +162,9 @@ class BeltDrive(LineCoupling):
     polygon: Annotated[
         bool, FLAG("whether it is a chain of which the chords count: its speed rises and falls with every tooth")
     ] = False
+    slack: Annotated[
+        str, TEXT("a span that hangs loose, `p1-p2`: it has no tension, and holds nothing", default="none")
+    ] = ""
     belt: Annotated[str, TEXT("of one span: the name of the whole belt", default="the whole belt")] = ""
     span: Annotated[int | None, INTEGER("of one span: its place, from 0", default="the whole belt")] = None
     counts: ClassVar[tuple[Mapping[str, float], Mapping[str, float]] | None] = None
@@ -211,6 +215,11 @@ class BeltDrive(LineCoupling):
         assert steps is not None
         return steps
 
+    @property
+    def tight(self) -> tuple[int, ...]:
+        """The places of the spans that pull."""
+        return tuple(k for k, name in enumerate(self.span_names) if name != self.slack)
+
     # --- faults ------------------------------------------------------------------------------------------------------
 
     def faults(self, m: Any) -> list[str]:
@@ -236,6 +245,14 @@ class BeltDrive(LineCoupling):
                 yield f"backs: {unknown('pulley', name, self.over)}"
         if not set(self.over) <= known:
             return
+        if self.slack and self.slack not in self.span_names:
+            yield f"slack: {unknown('span', self.slack, self.span_names)}"
+        if self.slack and (self.length is not None or self.pretension is not None):
+            yield (
+                "slack = "
+                + shown(self.slack)
+                + ": leave length= and pretension= out, which say how tight the whole belt is"
+            )
         pulleys = self.pulleys(m)
         for one, two in zip(pulleys, (*pulleys[1:], pulleys[0]), strict=True):
             if one.link == two.link and one is not two:
@@ -257,7 +274,7 @@ class BeltDrive(LineCoupling):
             return ""
         plain = {"name": "", "span": None}
         alike = {k for k, c in there.items() if c.replace(**plain) == self.replace(**plain)}
-        return ", ".join(name for k, name in enumerate(self.span_names) if k not in alike)
+        return ", ".join(self.span_names[k] for k in self.tight if k not in alike)
 
     def _misfits(self, m: Any) -> Iterator[str]:
         """What is wrong with the places of its pulleys."""
@@ -298,10 +315,10 @@ class BeltDrive(LineCoupling):
                 f"nothing counts the turns between the pulleys of {uncounted}, which have no teeth; give teeth= and pitch=, or a pair Fr "
                 "beside the bearings about the same axis, as mg.parts.bearings has it"
             )
-        elif self.polygon and self._fixed(m):
+        elif self.polygon and not self.slack and self._fixed(m):
             yield (
-                "polygon = True: no center moves, and a chain whose speed rises and falls with every tooth has slack there, which is not "
-                "modeled; hold a sprocket on an arm or slide, or leave polygon= out"
+                "polygon = True: no center moves, and a chain whose speed rises and falls with every tooth hangs loose somewhere; name the "
+                f"span behind the sprocket that drives, slack={self.span_names[0]!r} say, or hold a sprocket on an arm or slide"
             )
         elif (
             self.length is not None and self._fixed(m) and abs(self.length - made.length[0]) > fitting * made.length[0]
@@ -352,7 +369,7 @@ class BeltDrive(LineCoupling):
         if self.span is not None:
             return (self.placed(m),)
         names = self.span_names
-        spans = (self.replace(name=f"{self.name}.{name}", belt=self.name, span=k) for k, name in enumerate(names))
+        spans = (self.replace(name=f"{self.name}.{names[k]}", belt=self.name, span=k) for k in self.tight)
         return tuple(one.placed(m) for one in spans)
 
     def placed(self, m: Any) -> Self:

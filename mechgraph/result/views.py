@@ -584,8 +584,9 @@ class BeltResult(Shown):
     def __init__(self, values: Trajectory, name: str) -> None:
         self._values, self._name = values, name
         own = [(k, c) for k, c in enumerate(values.whole.couplings) if isinstance(c, BeltDrive) and c.belt == name]
-        self._spans = {c.span_names[c.span or 0]: k for k, c in own}
+        rows = {c.span_names[c.span or 0]: k for k, c in own}
         self._belt = own[0][1]
+        self._spans = {name: rows.get(name) for name in self._belt.span_names}
 
     def document(self) -> Document:
         """Ranges of the values over the positions, and where they are reached."""
@@ -622,8 +623,11 @@ class BeltResult(Shown):
 
     @property
     def tension(self) -> dict[str, Array]:
-        """Tension of every span ``(...)``, ``"p1-p2"``: minus the multiplier of its row; NaN where it is not unique."""
-        return self._of_spans(-self._values.multiplier(k) for k in self._spans.values())
+        """Tension of every span ``(...)``, ``"p1-p2"``: minus the multiplier of its row, NaN where it is not unique; zero of a
+        slack one.
+        """
+        loose = np.zeros(self._values.batch)
+        return self._of_spans(loose if k is None else -self._values.multiplier(k) for k in self._spans.values())
 
     @property
     def span(self) -> dict[str, Array]:

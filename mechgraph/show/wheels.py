@@ -352,7 +352,7 @@ def gears_of(m: Mechanism, poses: Mapping[str, Array]) -> tuple[list[Wheel], lis
         if type(gear) in PLACED:
             named[gear.name] = number(PLACED[type(gear)](gear, seats[gear.name]))
     for c in m.couplings:
-        if isinstance(c, BeltDrive) and not c.span:
+        if isinstance(c, BeltDrive) and c.span == c.tight[0]:
             over = tuple(named[name] for name in c.over)
             belts.append(DrawnBelt(c.belt, over, tuple(c.senses.tolist()), c.span_names))
         elif isinstance(c, Mesh):
