@@ -284,6 +284,27 @@ def test_a_rod_lands_with_friction(mu, speed, e):
     assert np.abs(r.energy.balance).max() < 1e-8
 
 
+@pytest.mark.parametrize("e", [0.0, 0.5])
+def test_a_box_lands_on_two_rough_feet_at_once(e):
+    """Both slip: the moment of their friction about the center shifts the blow to the foot in front, and the box does not turn."""
+    mu, b, h, v = 0.2, 0.3, 0.2, 1.0
+    feet = [
+        touching(f"K{i}", "frame", "box", True, restitution=e, gap=v * v / 2 / G).replace(point=(x, 0, 0))
+        for i, x in ((1, -b), (2, b))
+    ]
+    dry = [mg.Friction(f"K{i}", mu=mu) for i in (1, 2)]
+    m = mg.Mechanism(
+        "box", [mg.Link("frame"), body("box", 2.0, (0, h, 0))], feet, loads=[mg.Gravity((0, -G, 0)), *dry], planar=True
+    )
+    r = mg.respond(m, (0, 0.15), rates={"K1.Ts": 2.0, "K1.Rz": 0.0}, rtol=1e-9, atol=1e-11)
+    strikes = {str(one)[:2]: one for one in r.events[:2]}
+    for name, side in (("K1", -1), ("K2", 1)):
+        normal = (1 + e) * v * (1 + side * mu * h / b)
+        assert strikes[name].impulse == pytest.approx(normal, rel=1e-9)
+        np.testing.assert_allclose(strikes["K1"].impulses[name][3:5], [-mu * normal, normal], rtol=1e-9)
+    assert np.abs(r.energy.balance).max() < 1e-9
+
+
 def test_a_block_slides_on_a_floor_that_only_holds_it_up():
     """A point mass on the floor, which slides v^2 / (2 mu g) far and stays."""
     links = [mg.Link("frame"), body("block", 2.0)]

@@ -207,7 +207,9 @@ def forces_of_block(
         found, rubs, flank = solve.forces(dq)
         held, holds, hold_terms = _held(here, task, f, applied + inertia, given + rubs.efforts, site.largest)
         loads = loads if held is None else applied + inertia + held
-        given = given + rubs.efforts - rubs.teeth
+        given = given + rubs.efforts
+    if rubs is not None:
+        given = given - rubs.teeth
         found = replace(found, coupled=found.coupled + rubs.teeth)
     own = np.zeros_like(found.efforts)
     own[task.driven] = (found.efforts - given - found.coupled)[task.driven]

@@ -37,7 +37,7 @@ class Friction(Load):
     the contact from the pitch point against their relative turn, or what leaves ``efficiency`` of the power that goes in. A flat belt:
     a limit alone, ``T1 / T2 <= e^(mu wrap)`` (Euler, Eytelwein); ``preload`` is a tension more in its strands.
 
-    Solved in ``solve`` and ``study``; in ``respond`` for pairs of one freedom. Sources: J. E. Shigley and J. J. Uicker, Theory of
+    Solved in ``solve`` and ``study``; in ``respond`` by events. Sources: J. E. Shigley and J. J. Uicker, Theory of
     Machines and Mechanisms, 1995, chapter 13
     (friction circle); G. Niemann and H. Winter, Maschinenelemente II, 2003, chapter 21 (teeth).
 

@@ -644,6 +644,10 @@ class PathStage:
         stage._first[1] = math.copysign(math.sqrt(self._mass / stage._mass) * y[1], arc.rate)
         return stage
 
+    def task_at(self, t: Array) -> Task:
+        """See ``Stage``."""
+        return self.task
+
     def states(self, t: Array, y: Array) -> tuple[ClosedChart, Array]:
         """See ``Stage``."""
         mass = np.array([self._terms(u)[0] for u in y[0].tolist()])

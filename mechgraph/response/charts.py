@@ -349,6 +349,7 @@ class ChartStage:
         self._sizes = len(x), len(dq)
         self._last = _Known(t, np.concatenate([x, dq, np.zeros_like(dq)]), *self._sizes)
         self._path = [self._last]
+        self._ways = [task.loads.ways if task.loads.ways is None else task.loads.followed(dq[:, None])[:, 0]]
         self._of_time = tuple(load for some in (task.loads.stored, task.loads.rest) for load in some if load.of_time)
         self._kernel: KernelRates | None = None
         self.trouble: Stopped | None = None
@@ -391,6 +392,23 @@ class ChartStage:
             self._last = _Known(t, found.state, *self._sizes)
             self._y, self._shape = y, lambda: (found.steepness, found.condition)
         return found
+
+    @property
+    def _loads(self) -> Loads:
+        """The loads, with the ways in which freedoms slipped where the last step ended."""
+        return replace(self.task.loads, ways=self._ways[-1])
+
+    def task_at(self, t: Array) -> Task:
+        """See ``Stage``."""
+        if self._ways[0] is None:
+            return self.task
+        ways = np.stack([self._ways[i] for i in self._before(t)], axis=1)
+        return replace(self.task, loads=replace(self.task.loads, ways=ways))
+
+    def _before(self, t: Array) -> Index:
+        """Places ``(T,)`` of the known states before times."""
+        times = np.array([known.t for known in self._path])
+        return np.asarray(np.maximum(np.searchsorted(times, t, side="right") - 1, 0), dtype=np.intp)
 
     def _near(self, t: float) -> _Known:
         """The known state next to a time."""
@@ -439,6 +457,8 @@ class ChartStage:
         self._evaluated(t, y)
         self.trouble = None
         self._path.append(self._last)
+        loads = self._loads
+        self._ways.append(None if loads.ways is None else loads.followed(self._last.dq[:, None])[:, 0])
         return not self.chart.worn(*self._shape(), y[: self.n])
 
     def following(self, t: float, y: Array) -> ChartStage:
@@ -447,8 +467,7 @@ class ChartStage:
 
     def states(self, t: Array, y: Array) -> tuple[ClosedChart, Array]:
         """See ``Stage``."""
-        times = np.array([known.t for known in self._path])
-        before = np.maximum(np.searchsorted(times, t, side="right") - 1, 0)
+        before = self._before(t)
         guess = np.concatenate(
             [self._path[i].ahead(self.task.system, t[before == i]) for i in dict.fromkeys(before.tolist())], axis=1
         )
@@ -462,7 +481,7 @@ class ChartStage:
         closed = self.chart.close(near.ahead(self.task.system, at), y[:n], p[0])
         if not closed.done.all():
             return None
-        found = moved(closed, y[n:-2], p[1:], self.task.loads, at)
+        found = moved(closed, y[n:-2], p[1:], self._loads, at)
         rates = found.rates
         state = np.concatenate([closed.here.x[:, 0], rates.dq[:, 0], rates.ddq[:, 0]])
         self._last = _Known(t, state, *self._sizes)

@@ -123,7 +123,7 @@ class RestPlace:
         columns, _ = named_columns(m, system, {d.freedom: 0.0 for d in m.drives})
         q = system.coordinates_of(x[:, None])[columns, 0].tolist()
         still = Prescribed({d.freedom: partial(_still, value) for d, value in zip(m.drives, q, strict=True)})
-        self.task = Task(system, Loads.of(m.loads), still, columns, engine_for(system.n_rows, 1, engine))
+        self.task = Task(system, Loads.of(m), still, columns, engine_for(system.n_rows, 1, engine))
         self.go(x)
         if not self.n:
             raise DeclarationError(f"{call} {m.name!r}", ["every freedom is driven; m.replace(drives=[]) frees them"])

@@ -221,6 +221,9 @@ class Stage(Protocol):
     def following(self, t: float, y: Array) -> Stage:
         """The stage that takes over."""
 
+    def task_at(self, t: Array) -> Task:
+        """What moves at times ``(T,)`` of accepted steps: the task, with the ways in which freedoms slip then."""
+
     def states(self, t: Array, y: Array) -> tuple[ClosedChart, Array]:
         """Closed states at times ``(T,)`` of accepted steps with coordinates ``y (k, T)``, and the rates ``v (n, T)`` of the columns that
         their factors hold fixed.

@@ -62,7 +62,9 @@ from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import Factors
 from mechgraph.maths.se3 import Array, Index, cross, rotate, rotate_back
 from mechgraph.maths.tolerances import PATH, RESPONSE
+from mechgraph.model.friction import rubbing_loads
 from mechgraph.model.loads import Load
+from mechgraph.model.mechanism import Mechanism
 
 
 class Stopped(Exception):
@@ -131,7 +133,9 @@ class Chart:
         self.steepness, self.condition = self.shape(f)
         self._singles = system.single_rows[self.free]
         self.turns = bool((self._singles < 0).any())
-        self._rows = system.single_rows[prescribed]
+        rows = system.single_rows[prescribed]
+        # turns of balls that are held stay as they are, since nothing moves them
+        self._given, self._rows = rows >= 0, rows[rows >= 0]
 
     def shape(self, f: FactoredClosure) -> tuple[float, float]:
         """The largest rate of a freedom for unit rates of the independent ones, and the condition, at a state."""
@@ -161,7 +165,7 @@ class Chart:
         """
         s, n = self.system, len(self.free)
         x = x.copy()
-        x[self._rows] = p
+        x[self._rows] = p[self._given]
         single = self._singles >= 0
         x[self._singles[single]] = self.x0[self._singles[single], None] + u[single]
         total, before = np.zeros(x.shape[1]), np.full(x.shape[1], np.inf)
@@ -277,34 +281,53 @@ SPARSE_FROM = 8000
 
 @dataclass(frozen=True)
 class Loads:
-    """Loads by whether they have a potential energy; ``dry`` friction, which acts against the ``senses (F,)`` in which freedoms slip.
+    """Loads by whether they have a potential energy; ``dry`` friction, which acts against the ``ways`` in which freedoms slip.
 
-    A sense is 1 or -1, and 0 where a freedom does not slip; ``stuck`` are the freedoms that friction holds. With ``senses`` loads are those
-    of a motion with friction, without it friction is refused.
+    ``ways (F,)`` or ``(F, T)``: rates of what slips, zero where nothing does, of any size; they tell the direction of what is about to
+    slip, and the side to which the freedoms of each of the ``rough`` ones, by their places, move. ``stuck`` are the freedoms that friction
+    holds. With ``ways`` loads are those of a motion with friction, without them friction is refused.
     """
 
     stored: tuple[Load, ...]
     rest: tuple[Load, ...]
     dry: tuple[Any, ...] = ()
-    senses: Array | None = None
+    ways: Array | None = None
+    rough: tuple[tuple[int, ...], ...] = ()
     stuck: tuple[int, ...] = ()
 
     @classmethod
-    def of(cls, loads: tuple[Load, ...]) -> Loads:
-        """The loads of a mechanism, a spring apart from its damper."""
-        parts = [load.parts() for load in loads]
+    def of(cls, m: Mechanism) -> Loads:
+        """The loads of a mechanism, a spring apart from its damper, without the limits of belts, which are no forces."""
+        dry = tuple(rubbing_loads(m, m.loads))
+        parts = [load.parts() for load in m.loads if load in dry or not load.follows_reactions]
         return cls(
             tuple(stored for stored, _ in parts if stored is not None),
             tuple(rest for _, rest in parts if rest is not None),
-            tuple(load for load in loads if load.follows_reactions),
+            dry,
         )
 
+    def followed(self, dq: Array) -> Array:
+        """The ways ``(F, T)`` at rates ``dq (F, T)``: where several freedoms slip as one, the way in which they move now."""
+        assert self.ways is not None
+        out = np.array(np.broadcast_to(self.ways.reshape(len(dq), -1), dq.shape))
+        for columns in (list(some) for some in self.rough if len(some) > 1):
+            slips = out[columns].any(axis=0) & dq[columns].any(axis=0)
+            out[columns] = np.where(slips, dq[columns], out[columns])
+        return out
+
     def directions(self, dq: Array) -> Array:
-        """Rates ``(F, T)`` that tell where friction acts: those of freedoms that slip, also where these are about to."""
-        assert self.senses is not None
-        sense = self.senses[:, None]
-        speed = np.maximum(sense * dq, 0.0)
-        return np.asarray(sense * np.maximum(speed, 1e-100))  # above zero also where it is about to move
+        """Rates ``(F, T)`` that tell where friction acts: those of freedoms that slip, on the side of their ways also where they have just
+        passed zero, so that the equations of motion are smooth there; the ways where they are about to slip.
+        """
+        assert self.ways is not None
+        ways = np.broadcast_to(self.ways.reshape(len(dq), -1), dq.shape)
+        out = np.zeros_like(dq)
+        for columns in map(list, self.rough):
+            rates, way = dq[columns], ways[columns]
+            side = np.where((rates * way).sum(axis=0) < 0.0, -1.0, 1.0)
+            slow = np.abs(rates).max(axis=0) <= 1e-100
+            out[columns] = np.where(slow, 1e-100 * way, side * rates) * way.any(axis=0)
+        return out
 
 
 @dataclass(frozen=True)
@@ -475,7 +498,7 @@ def moved(closed: ClosedChart, v: Array, p: Array, loads: Loads, t: Array) -> Mo
     Z, Zp = columns.Z, columns.Zp
     dq = (Z * v).sum(axis=1) + (Zp * p[0]).sum(axis=1)
     velocities, ddq, inertia = columns.bound(dq, (Zp * p[1]).sum(axis=1))
-    V, rough = velocities.V, loads.senses is not None
+    V, rough = velocities.V, loads.ways is not None
     (stored, by_stored), (rest, by_rest) = (
         applied(here, some, velocities, t, rough) for some in (loads.stored, loads.rest)
     )

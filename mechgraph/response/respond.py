@@ -75,7 +75,8 @@ from mechgraph.response.motion_equations import (
     positions_together,
     stopping,
 )
-from mechgraph.response.resting import Rests, friction_faults, read_stops, with_contacts
+from mechgraph.response.resting import Rests, read_stops, with_contacts
+from mechgraph.response.rough import friction_faults
 from mechgraph.result.solution import Solution
 from mechgraph.result.summary import SolutionData, solution_data, summary
 from mechgraph.result.trajectory import Trajectory
@@ -319,7 +320,7 @@ class Course:
                     raise ResponseError(
                         f"mechanism {self.mechanism.name!r}: the loops do not close at some time of {flat[places[part]]}"
                     )
-                yield places[part], stage.task, closed, v, done[:, part]
+                yield places[part], stage.task_at(flat[places[part]]), closed, v, done[:, part]
 
     def positions(self, t: Array) -> Array:
         """Internal states ``(nx, T)`` at times ``(T,)``."""
@@ -598,9 +599,9 @@ def respond(
 
     The accelerations of as many independent freedoms as the mechanism has mobility are unknowns beside the reactions:
     ``M(u) u'' + h(u, u') = Q``. Steppers of ``scipy.integrate``; the loops are closed at every output. Arguments from ``t`` to
-    ``stops`` default to those of ``m.response``. Dry friction (``Friction``) of pairs with one freedom slips, sticks and reverses by
-    events, so that nothing creeps at rest; where several freedoms stick together, how they share the load is not determined: NaN. Impacts
-    know no friction.
+    ``stops`` default to those of ``m.response``. Dry friction (``Friction``) of pairs and teeth slips, sticks and reverses by events, so
+    that nothing creeps at rest; where several pairs stick together, how they share the load is not determined: NaN. Impacts know the
+    friction of contacts that are closed, by Poisson's law, and none of other pairs.
 
     Parameters
     ----------
@@ -687,13 +688,12 @@ def respond(
     if faults:
         raise DeclarationError(f"respond {m.name!r}", faults)
     declared = m if replaced is None else m.replace(loads=replaced)
+    faults += friction_faults(declared, how.passive)
     bounces = {f"{pair.name}.gap": pair.restitution for pair in declared.pairs if pair.restitution is not None}
     declared, flanks = with_play(declared)
     limits = (*flanks, *limits)
     declared, gaps = with_contacts(declared, limits, declared.tol or 0.0 if tol is None else tol)
-    m = declared
     m = meant(declared, tol, "respond")
-    faults += friction_faults(m, how.passive)
     begin = float(times[0])
     prescribed = read_motions(m, how.motions, times, faults)
     wanted = gaps | read_start(m, how.start, prescribed, begin, faults) if not faults else {}
@@ -708,7 +708,7 @@ def respond(
         if tol is None and m.tol is None:
             hinted(declared, error)
         raise
-    task = Task(system, Loads.of(m.loads), prescribed, columns, engine_for(system.n_rows, 1, engine))
+    task = Task(system, Loads.of(m), prescribed, columns, engine_for(system.n_rows, 1, engine))
     if how.passive == "held":
         task = replace(task, held=free_motion(system, x, columns, task.engine).passive)
     task = replace(task, library=library_for(system, task.loads, bool(task.held), engine))

@@ -1,19 +1,12 @@
 """What holds freedoms for a while: stops on which they rest, friction by which they stick.
 
-Stops: freedoms that may not pass a limit. They strike it, rebound, rest on it and leave it.
+Stops: freedoms that may not pass a limit. They strike it, rebound, rest on it and leave it (see ``impact``).
 
-At an impact with stops ``i`` closing at the rates ``w_i = g_i . v`` the impulses ``p_i >= 0`` are those of Newton's law of restitution,
-
-    v+ = v + M^-1 G^T p,   w+ + e w >= 0,   p . (w+ + e w) = 0,
-
-with ``G`` the rows ``g_i`` of independent rates. Stops that are closed at rest hold as long as they press: ``f >= 0``, ``G v' >= 0``,
-``f . G v' = 0``. Both are linear complementarity problems of a positive semidefinite matrix ``G M^-1 G^T``, solved as least squares with
-``p >= 0``.
-
-Dry friction: a freedom slips one way, which turns where its rate passes zero, or it sticks. Where it sticks it is held, until it would slip
-one way against the greatest friction at rest. Freedoms at rest that move in proportion stick and slip together. Which do what, where rates
-are zero, is a linear complementarity problem in accelerations and friction; its states are tried one after the other. Nothing is smoothed,
-so that what sticks stands still.
+Dry friction: freedoms that rub as one (see ``rough``) slip, against the direction of their rates, or they stick, all at rest. Where they
+stick they are held, until they would slip against the greatest friction at rest. Freedoms at rest that move in proportion stick and slip
+together. Which do what, where rates are zero, is a complementarity problem in accelerations and friction: its states are tried, the
+stillest ones first; of many, what contradicts a state is changed in it until nothing does. What begins to slip in several freedoms goes
+the way in which it then accelerates. Nothing is smoothed, so that what sticks stands still.
 
 Source: Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts, 1996, chapters 5 and 6.
 """
@@ -23,24 +16,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import product
+from itertools import combinations, product
 from typing import Any, Protocol
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from mechgraph.force.block import unique_reactions
 from mechgraph.force.friction import OUTCOMES, places_of
-from mechgraph.force.loads import kinetic_energy
-from mechgraph.force.reactions import ForceProblem, user_wrench
 from mechgraph.kinematics.assembly import closed_start
 from mechgraph.kinematics.prescribed import with_pairs_at
-from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.linear import rank_of, singular_values
-from mechgraph.maths.se3 import Array, cross
+from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import MOTIONS, RESPONSE
-from mechgraph.model.friction import Friction
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.response_setup import Event, Stop
@@ -48,8 +35,10 @@ from mechgraph.pairs.contact_types import pressing
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.quantities import items_of, wrong
 from mechgraph.response.charts import Prescribed, Task, no_force
+from mechgraph.response.impact import Cone, FreeMotion, Limit, evaluated
 from mechgraph.response.integration import LOOKS_IN_STEP, Occurrence, first_root, with_turns
-from mechgraph.response.motion_equations import NO_INERTIA, ClosedChart, Moved, Stopped, accelerations, moved
+from mechgraph.response.motion_equations import Moved, Stopped
+from mechgraph.response.rough import Rough, rough_freedoms
 
 
 def read_stops(m: Mechanism, stops: Any, faults: list[str]) -> tuple[Stop, ...]:
@@ -82,70 +71,16 @@ def with_contacts(m: Mechanism, stops: Iterable[Stop], tol: float) -> tuple[Mech
     return (with_pairs_at(m, free, m.drives, closed_start(m, tol=tol)) if free else m), gaps
 
 
-def _rubs_in(pair: Pair) -> int | None:
-    """The one freedom of a pair in which it rubs; None where there are several."""
-    slides = [j for j, freedom in enumerate(pair.type.freedoms) if not freedom.turns and j != pair.type.gap]
-    if pair.type.touching or pair.type.opens:
-        return slides[0] if len(slides) == 1 and pair.radius_b is None else None
-    return 0 if len(pair.type.freedoms) == 1 else None
-
-
-def friction_faults(m: Mechanism, passive: str) -> list[str]:
-    """Friction that a motion in time does not carry."""
-    found = []
-    for load in m.loads:
-        if isinstance(load, Friction):
-            pair = next((pair for pair in m.pairs if pair.name == load.of), None)
-            if pair is None:
-                found.append(f"{load.where}is that of a coupling, which is not followed in time; leave it out")
-            elif _rubs_in(pair) is None:
-                found.append(
-                    f"{load.where}slips in several freedoms (type {pair.type.symbol}) together, which is not followed in time; leave it "
-                    "out, take the pair apart into pairs of one freedom, or let a contact be a point in a planar mechanism"
-                )
-            elif passive == "held":
-                found.append(f"{load.where}is not followed beside passive='held'; give passive='free'")
-    return found
-
-
-@dataclass(frozen=True)
-class _Limit:
-    """One limit of one freedom, internal units: ``sign * (q - value) >= 0``; ``contact``: the pair that opens there."""
-
-    stop: Stop
-    name: str
-    column: int
-    row: int
-    sign: float
-    value: float
-    contact: str = ""
-
-    @property
-    def user(self) -> float:
-        """The limit in the user's units."""
-        return float(getattr(self.stop, self.name))
-
-    def occurrence(self, t: float, meets: bool) -> Occurrence:
-        """What ``Response.events`` says of it."""
-        text = f"{self.stop.freedom} {'meets' if meets else 'leaves'} its {self.name} stop"
-        if self.contact:
-            text = f"{self.contact} {'lands' if meets else 'opens'}"
-        event = Event(self.stop.freedom, self.user, name=text)
-        return Occurrence(event, t, (self.sign > 0) != meets)
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Stuck:
-    """Freedoms that stick together, the first held where it stands (in the user's units); ``signs`` of their rates when they slip."""
+    """What rubs at rest and sticks and slips together: its ``columns``, and as many of these as move independently, ``free``, at their
+    places (in the user's units).
+    """
 
+    of: tuple[Rough, ...]
     columns: tuple[int, ...]
-    signs: tuple[float, ...]
-    user: float
-
-    @property
-    def column(self) -> int:
-        """The freedom that is held."""
-        return self.columns[0]
+    free: tuple[int, ...]
+    places: tuple[float, ...]
 
 
 class Moving(Protocol):
@@ -181,46 +116,40 @@ class _Held:
 
 @dataclass(frozen=True)
 class _Holding:
-    """What holds freedoms at a time: limits that they rest on, freedoms that stick; ``senses (F,)`` in which others slip."""
+    """What holds freedoms at a time: limits that they rest on, what sticks; ``ways (F,)`` or ``(F, T)`` in which others slip.
 
-    limits: tuple[_Limit, ...] = ()
+    ``held``: freedoms that stick and move independently, with their places; the others that stick stand still by these.
+    """
+
+    limits: tuple[Limit, ...] = ()
     stuck: tuple[_Stuck, ...] = ()
-    senses: Array | None = None
+    ways: Array | None = None
+    held: tuple[tuple[int, float], ...] = ()
 
     def task(self, task: Task, at_rest: Sequence[str] = ()) -> Task:
         """What moves with these held; friction of the pairs ``at_rest`` is that at rest."""
         loads = task.loads
-        holds: list[Any] = [*self.limits, *self.stuck]
-        if self.senses is not None:
+        if self.ways is not None:
             dry = tuple(
                 replace(load, mu=load.coefficient_at_rest) if load.of in at_rest else load for load in loads.dry
             )
-            task = replace(task, loads=replace(loads, dry=dry, senses=self.senses, stuck=self.stuck_columns))
-        if not holds:
+            stuck = tuple(dict.fromkeys(column for one in self.stuck for column in one.columns))
+            task = replace(task, loads=replace(loads, dry=dry, ways=self.ways, stuck=stuck))
+        if not self.columns:
             return task
-        columns = np.append(task.columns, [one.column for one in holds]).astype(np.intp)
-        prescribed: Any = _Held(task.prescribed, tuple(one.user for one in holds))
+        columns = np.append(task.columns, self.columns).astype(np.intp)
+        places = [limit.user for limit in self.limits] + [place for _, place in self.held]
+        prescribed: Any = _Held(task.prescribed, tuple(places))
         return replace(task, prescribed=prescribed, columns=columns)
 
     @property
-    def stuck_columns(self) -> tuple[int, ...]:
-        """All freedoms that stick."""
-        return tuple(column for one in self.stuck for column in one.columns)
+    def columns(self) -> list[int]:
+        """The freedoms that are held, in order: those of limits, and of what sticks."""
+        return [limit.column for limit in self.limits] + [column for column, _ in self.held]
 
-    def slipping(self, one: _Stuck, sense: float) -> _Holding:
-        """The same where freedoms that stick slip one way instead."""
-        assert self.senses is not None
-        senses = self.senses.copy()
-        senses[list(one.columns)] = sense * np.array(one.signs)
-        return replace(self, stuck=tuple(other for other in self.stuck if other is not one), senses=senses)
-
-
-def evaluated(task: Task, t: Array, x: Array, dq: Array) -> tuple[Moved, Configuration]:
-    """Accelerations of a task at states ``x (nx, T)`` near each other with rates ``dq (F, T)``."""
-    chart, here = task.chart(x[:, 0]), Configuration(task.system, x)
-    f = chart.solver.factored(here, np.repeat(chart.which, here.T))
-    at = ClosedChart(here, f, np.ones(here.T, dtype=bool), chart.held)
-    return moved(at, dq[chart.moving], task.prescribed_at(t)[1:], task.loads, t), here
+    def sticks(self, one: Rough) -> bool:
+        """Whether something that rubs sticks."""
+        return any(one in some.of for some in self.stuck)
 
 
 def _first_below(height: Callable[[Array], Array], t: Array, h: Array, slack: float) -> float | None:
@@ -235,16 +164,16 @@ def _first_below(height: Callable[[Array], Array], t: Array, h: Array, slack: fl
 
 @dataclass
 class Rests:
-    """The stops and the friction of a motion; ``task`` is what moves without them, ``holding`` what holds freedoms now.
-
-    ``rough``: freedoms with friction, by column, and the names of their pairs.
-    """
+    """The stops and the friction of a motion; ``task`` is what moves without them, ``holding`` what holds freedoms now."""
 
     task: Task
-    limits: tuple[_Limit, ...]
-    rough: dict[int, str] = field(default_factory=dict)
+    limits: tuple[Limit, ...]
+    rough: tuple[Rough, ...] = ()
     holding: _Holding = field(default_factory=_Holding)
-    _leaving: dict[int, float] = field(default_factory=dict)
+    _leaving: Array | None = None
+    """Ways in which what has stuck begins to slip."""
+    _rested: tuple[Rough, ...] = ()
+    """What was at rest at the last event."""
 
     @classmethod
     def of(cls, m: Mechanism, task: Task, stops: Iterable[Stop], bounces: Mapping[str, float]) -> Rests:
@@ -260,13 +189,10 @@ class Rests:
                 value = getattr(stop, name)
                 if value is not None:
                     contact = contacts[stop.freedom].name if stop in own else ""
-                    limit = _Limit(stop, name, column, int(s.single_rows[column]), sign, float(value) / unit, contact)
+                    limit = Limit(stop, name, column, int(s.single_rows[column]), sign, float(value) / unit, contact)
                     limits.append(limit)
-        rough = {}
-        for load in task.loads.dry:
-            place = _rubs_in(s.m.pair(load.of))
-            assert place is not None
-            rough[int(s.first_column[s.m.place_of_pair(load.of)]) + place] = load.of
+        rough = rough_freedoms(s, task.loads.dry)
+        task = replace(task, loads=replace(task.loads, rough=tuple(one.columns for one in rough)))
         return cls(task, tuple(limits), rough)
 
     def faults(self, x: Array) -> list[str]:
@@ -314,7 +240,7 @@ class Rests:
             if push(looks[-1:])[0] < 0.0:
                 times.append(_first_below(push, looks, push(looks), 0.0) or looks[0])
         met = min((one for one in times if one is not None), default=None)
-        self._leaving = {}
+        self._leaving = None
         if self.rough:
             met = self._turned(motion, looks, rates[0], met)
             met = self._yielded(motion, looks, rates[0], met, apart)
@@ -327,33 +253,31 @@ class Rests:
         return np.asarray((sign * motion.efforts_held(times)[first : first + len(held)]).min(axis=0))
 
     def _turned(self, motion: Moving, looks: Array, rates: Array, met: float | None) -> float | None:
-        """The first time at which a freedom that slips comes to rest, if that is before another."""
-        senses = self.holding.senses
-        assert senses is not None
-        noise = RESPONSE.lowest * np.abs(rates[list(self.rough)]).max()
-        for column in self.rough:
-            if self._is_open(column, self.holding):
+        """The first time at which what slips comes to rest, or turns back, if that is before another."""
+        ways = self.holding.ways
+        assert ways is not None
+        noise = RESPONSE.lowest * max(np.abs(rates[list(one.columns)]).max() for one in self.rough)
+        for one in self.rough:
+            columns = list(one.columns)
+            if self._is_open(one, self.holding):
                 continue
-            if senses[column]:
-                h = senses[column] * rates[column]
-                found = _first_below(partial(_rate, motion, column, senses[column]), looks, h, noise)
-            elif column not in self.holding.stuck_columns and not self._blocked(column):
-                moves = np.flatnonzero(np.abs(rates[column]) > noise)
+            if ways[columns].any():
+                # of several freedoms the way as the step begins: it may turn on and on
+                way = rates[columns, 0] if len(columns) > 1 else ways[columns]
+                way = way / (np.linalg.norm(way) or 1.0)
+                found = _first_below(partial(_rate, motion, columns, way), looks, way @ rates[columns], noise)
+            elif not self.holding.sticks(one) and not set(columns) <= set(self.holding.columns):
+                moves = np.flatnonzero(np.abs(rates[columns]).max(axis=0) > noise)
                 found = float(looks[moves[0]]) if moves.size else None
             else:
                 continue
             met = found if met is None or (found is not None and found < met) else met
         return met
 
-    def _is_open(self, column: int, holding: _Holding) -> bool:
-        """Whether a freedom is that of a contact that is open."""
-        name = self.rough[column]
-        contacts = [limit for limit in self.limits if limit.contact == name]
+    def _is_open(self, one: Rough, holding: _Holding) -> bool:
+        """Whether it is a contact that is open."""
+        contacts = [limit for limit in self.limits if limit.contact == one.name]
         return bool(contacts) and not any(limit in holding.limits for limit in contacts)
-
-    def _blocked(self, column: int) -> bool:
-        """Whether a freedom is held by a limit."""
-        return column in [one.column for one in self.holding.limits]
 
     def _yielded(self, motion: Moving, looks: Array, rates: Array, met: float | None, apart: float) -> float | None:
         """The first time at which friction does not hold any more, if that is before another."""
@@ -365,34 +289,88 @@ class Rests:
         if count > len(looks):
             looks = np.linspace(looks[0], looks[-1], count + 1)
             x, rates = motion.positions(looks), motion.rates(looks)[0]
-        for one, sense in product(self.holding.stuck, (1.0, -1.0)):
-            height = partial(self._margin, motion, self.holding, one, sense)
-            found = _first_below(height, looks, -self._verge(self.holding, one, sense, looks, x, rates), 0.0)
+        held, _ = evaluated(self.holding.task(self.task), looks, x, rates)
+        for kept in self._modes(self.holding, held):
+
+            def height(t: Array, kept: tuple[_Stuck, ...] = kept) -> Array:
+                return -self._verge(self.holding, kept, t, motion.positions(t), motion.rates(t)[0])[0]
+
+            beyond, _ = self._verge(self.holding, kept, looks, x, rates, held)
+            found = _first_below(height, looks, -beyond, MOTIONS.rounding)
             if found is not None and (met is None or found < met):
-                met, self._leaving = found, {one.column: sense}
+                at = np.array([found])
+                _, ways = self._verge(self.holding, kept, at, motion.positions(at), motion.rates(at)[0])
+                met, self._leaving = found, ways[:, 0]
         return met
 
-    def _margin(self, motion: Moving, holding: _Holding, one: _Stuck, sense: float, t: Array) -> Array:
-        return -self._verge(holding, one, sense, t, motion.positions(t), motion.rates(t)[0])
+    def _motions(self, holding: _Holding, held: Moved) -> Array:
+        """Rates ``(F, k, T)`` of all freedoms for unit rates of those that stick, in the state in which they do."""
+        return held.columns.Zp[:, len(self.task.columns) + len(holding.limits) :]
 
-    def _verge(self, holding: _Holding, one: _Stuck, sense: float, t: Array, x: Array, dq: Array) -> Array:
-        """The acceleration ``(T,)`` one way with which freedoms that stick would slip against friction at rest; not a bit where it jams.
+    def _modes(self, holding: _Holding, held: Moved) -> list[tuple[_Stuck, ...]]:
+        """What goes on to stick in every way in which something of what sticks may slip by itself.
 
-        Of a contact that opens, which may have no such state, the effort beyond that of friction, over its greatest one at rest.
+        Where freedoms that stick depend on each other several have to slip at once: sets that move none of the others, and are not parts of
+        larger ones, are those to which all that stands still by them belongs.
         """
-        pair = self.rough[one.column]
-        presses = [i for i, limit in enumerate(holding.limits) if limit.contact == pair]
-        if presses and len(one.columns) == 1:
-            found, _ = evaluated(holding.task(self.task), t, x, dq)
-            efforts = found.held[len(self.task.columns) :]
+        sets, B = holding.stuck, self._motions(holding, held)[..., 0]
+
+        def rank(some: Sequence[int]) -> int:
+            return _rank([B[list(sets[i].columns)] for i in some])
+
+        every = range(len(sets))
+        # sets of which all parts are looked at
+        if len(sets) > 8 or rank(every) == sum(rank([i]) for i in every):
+            return [tuple(sets[j] for j in every if j != i) for i in every if rank([i])]
+        found: list[set[int]] = []
+        for count in reversed(every):
+            for kept in combinations(every, count):
+                r = rank(kept)
+                closed = {i for i in every if rank([*kept, i]) == r}
+                if r < B.shape[1] and not any(closed <= other for other in found):
+                    found.append(closed)
+        return [tuple(sets[i] for i in sorted(kept)) for kept in found]
+
+    def _verge(
+        self, holding: _Holding, kept: Sequence[_Stuck], t: Array, x: Array, dq: Array, held: Moved | None = None
+    ) -> tuple[Array, Array]:
+        """The acceleration ``(T,)``, over the largest there, with which what is not ``kept`` would slip against friction at rest, and the
+        ways ``(F, T)``; minus infinity where it jams.
+
+        It would slip against the friction that holds it. Of a contact that opens, which may have no such state, the effort beyond that of
+        friction, over its greatest one at rest. ``held``: the state in which all sticks, if it is known.
+        """
+        held = evaluated(holding.task(self.task), t, x, dq)[0] if held is None else held
+        first = len(self.task.columns)
+        efforts, B = held.held[first:], self._motions(holding, held)
+        freed = [one for some in holding.stuck if some not in kept for one in some.of]
+        columns, weights = [c for one in freed for c in one.columns], [w for one in freed for w in one.weights]
+        fixed = [c for some in kept for c in some.columns]
+        ways = np.zeros((len(dq), len(t)))
+        for i in range(len(t)):
+            N = _null(B[fixed, :, i])
+            moves = B[columns, :, i] @ N
+            c = np.linalg.lstsq((moves.T * weights) @ moves, -(N.T @ efforts[len(holding.limits) :, i]), rcond=None)[0]
+            ways[columns, i] = moves @ c
+        size = np.abs(ways).max(axis=0)
+        ways /= np.where(size > 0.0, size, 1.0)
+        presses = [i for i, limit in enumerate(holding.limits) if limit.contact == freed[0].name]
+        places = [len(holding.limits) + i for i, (column, _) in enumerate(holding.held) if column in columns]
+        if presses and len(freed) == 1 and len(places) == len(columns):
             normal = holding.limits[presses[0]].sign * efforts[presses[0]]
-            rubs = [load for load in self.task.loads.dry if load.of == pair]
+            rubs = [load for load in self.task.loads.dry if load.of == freed[0].name]
             most = sum(load.coefficient_at_rest * (normal + load.preload / self.task.system.par.L) for load in rubs)
-            beyond = -sense * efforts[len(holding.limits) + holding.stuck.index(one)] - most
-            return np.asarray(beyond / (np.abs(efforts).sum(axis=0) + 1e-300))
-        task = holding.slipping(one, sense).task(self.task, [self.rough[column] for column in one.columns])
-        found, _ = evaluated(task, t, x, dq)
-        return np.nan_to_num(sense * one.signs[0] * found.rates.ddq[one.column], nan=-np.inf)
+            beyond = np.sqrt((efforts[places] ** 2).sum(axis=0)) - most
+            return np.asarray(beyond / (np.abs(efforts).sum(axis=0) + 1e-300)), ways
+        task = self._independent(replace(holding, stuck=(), held=()), B[..., 0], kept, ())
+        assert task.ways is not None
+        loads = replace(self.task.loads, ways=task.ways).followed(dq)
+        found, _ = evaluated(replace(task, ways=loads + ways).task(self.task, [one.name for one in freed]), t, x, dq)
+        assert found.rubs is not None
+        none = np.zeros((6, len(self.task.system.m.links), len(t)))
+        slows = (found.columns.Z * found.columns.accelerations(none, found.rubs.efforts)[0]).sum(axis=1)
+        largest = np.abs(slows).max(axis=0) + np.abs(found.rates.ddq).max(axis=0) + 1e-300
+        return np.nan_to_num((ways * found.rates.ddq).sum(axis=0) / largest, nan=-np.inf), ways
 
     # --- at an event -----------------------------------------------------------------------------------------------------
 
@@ -403,29 +381,28 @@ class Rests:
         """
         closed = tuple(one for one in self.limits if one.sign * (x[one.row] - one.value) <= RESPONSE.touching)
         was, after, first = self.holding, dq, np.inf
-        blow: dict[_Limit, dict[str, Any]] = {}
+        blow: dict[Limit, dict[str, Any]] = {}
         lost = spent = 0.0
-        resting: tuple[_Limit, ...] = ()
-        pressing: tuple[_Limit, ...] = ()
+        resting: tuple[Limit, ...] = ()
+        pressing: tuple[Limit, ...] = ()
         if closed:
-            task = _Holding(senses=self._senses(dq)).task(self.task)
-            before = _Free(task, t, x, dq, closed)
+            task = _Holding(ways=self._ways(dq)).task(self.task)
+            before = FreeMotion(task, t, x, dq, closed)
             e = np.array([limit.stop.restitution for limit in closed])
-            rough = self._rough_blow(before)
-            after, lost, p = before.struck(e) if rough is None else before.struck_rough(*rough, e[0])
-            free = _Free(task, t, x, after, closed)
+            cones = self._cones(closed)
+            strike = (lambda e: before.struck_rough(e, cones)) if cones and before.hit.any() else before.struck
+            after, lost, p = strike(e)
+            free = FreeMotion(task, t, x, after, closed)
             if (free.still & (free.w > 0.0)).any():
-                e = np.where(free.still, 0.0, e)
-                after, lost, p = before.struck(e) if rough is None else before.struck_rough(*rough, e[0])
-                free = _Free(task, t, x, after, closed)
+                after, lost, p = strike(np.where(free.still, 0.0, e))
+                free = FreeMotion(task, t, x, after, closed)
             which, w_rate = free.pressing()
             pressing = tuple(closed[i] for i in which)
             resting = tuple(closed[i] for i in np.flatnonzero(free.still & free.moves))
             hops = 2.0 * free.w / np.where((w_rate < 0.0) & ~free.still & (free.w > 0.0), -w_rate, np.inf)
             first = float(hops[hops > 0.0].min(initial=np.inf)) / 2
-            hit, spent = (before.w < 0.0) & ~before.still, before.spent(p, after)
-            if hit.any():
-                blow = {closed[i]: before.blow(i, p, spent) for i in np.flatnonzero(hit).tolist()}
+            spent = before.spent(p, after)
+            blow = {closed[i]: before.blow(i, p, spent) for i in np.flatnonzero(before.hit).tolist()}
         if self.rough:
             self.holding, after = self._settled(t, x, after, resting)
         else:
@@ -439,96 +416,171 @@ class Rests:
         found += [one.occurrence(t, False) for one in was.limits if one not in now]
         return after, np.array([spent, 0.0, -lost]), first, [*found, *self._rubbing(t, was)]
 
-    def _rough_blow(self, before: _Free) -> tuple[int, float] | None:
-        """The freedom in which a contact that is struck rubs, and its coefficient; None where what is struck is smooth."""
-        rubs = {name: column for column, name in self.rough.items()}
-        struck = (before.w < 0.0) & ~before.still
-        rough = [one.contact for one in before.closed if one.contact in rubs]
-        if not rough or not struck.any():
-            return None
-        name = rough[0]
-        if len(before.closed) > 1:
-            raise Stopped(
-                f"an impact while contact {name} with friction and others are closed is not followed; leave its friction out"
-            )
-        return rubs[name], sum(load.mu for load in self.task.loads.dry if load.of == name)
+    def _cones(self, closed: Sequence[Limit]) -> list[Cone]:
+        """The friction of what is closed."""
+        by_name = {one.name: one.columns for one in self.rough}
+        mu = {load.of: load.mu for load in self.task.loads.dry}
+        return [
+            Cone(i, by_name[one.contact], mu[one.contact]) for i, one in enumerate(closed) if one.contact in by_name
+        ]
 
-    def _senses(self, dq: Array) -> Array | None:
-        """The senses ``(F,)`` of the freedoms with friction that move; None where none has friction."""
+    def _ways(self, dq: Array) -> Array | None:
+        """The ways ``(F,)`` of what rubs and moves; None where nothing rubs."""
         if not self.rough:
             return None
-        senses, columns = np.zeros(len(dq)), list(self.rough)
-        senses[columns] = np.sign(dq[columns])
-        return senses
+        ways = np.zeros(len(dq))
+        for columns in (list(one.columns) for one in self.rough):
+            ways[columns] = np.sign(dq[columns]) if len(columns) == 1 else dq[columns]
+        return ways
 
     def _rubbing(self, t: float, was: _Holding) -> Iterator[Occurrence]:
-        """What became of freedoms with friction."""
-        if was.senses is None or self.holding.senses is None:
+        """What became of what rubs; what is struck back does not count as reversed."""
+        if was.ways is None or self.holding.ways is None:
             return
         names = self.task.system.m.freedom_names()
-        for column, pair in self.rough.items():
-            before, now = was.senses[column], self.holding.senses[column]
-            sticks, stuck = column in self.holding.stuck_columns, column in was.stuck_columns
+        for one in self.rough:
+            before, now = was.ways[list(one.columns)], self.holding.ways[list(one.columns)]
+            sticks, stuck = self.holding.sticks(one), was.sticks(one)
+            turned = one in self._rested and float(before @ now) < 0.0
             what = (
-                "sticks"
-                if sticks and not stuck
-                else "slips"
-                if stuck and now
-                else "reverses"
-                if before * now < 0
-                else ""
+                "sticks" if sticks and not stuck else "slips" if stuck and now.any() else "reverses" if turned else ""
             )
             if what:
-                yield Occurrence(Event(names[column], what="velocity", name=f"{pair} {what}"), t, bool(now > before))
+                freedom = Event(names[one.columns[0]], what="velocity", name=f"{one.name} {what}")
+                yield Occurrence(freedom, t, bool(now.sum() > before.sum()))
 
-    def _settled(self, t: float, x: Array, dq: Array, resting: tuple[_Limit, ...]) -> tuple[_Holding, Array]:
+    def _settled(self, t: float, x: Array, dq: Array, resting: tuple[Limit, ...]) -> tuple[_Holding, Array]:
         """What holds freedoms from a time on, and the rates then: the first state that agrees with itself, the stillest ones first."""
-        senses = self._senses(dq)
-        assert senses is not None
-        found, _ = evaluated(_Holding(senses=senses).task(self.task), np.array([t]), x[:, None], dq[:, None])
+        ways = self._ways(dq)
+        assert ways is not None
+        found, _ = evaluated(_Holding(ways=ways).task(self.task), np.array([t]), x[:, None], dq[:, None])
         Z, size = found.columns.Z[..., 0], float(np.nan_to_num(np.abs(found.rates.ddq)).max(initial=0.0))
-        # rates that would end within the square of what counts as rest on a stop
-        slow = [c for c in self.rough if dq[c] ** 2 <= 2.0 * RESPONSE.lowest**2 * size]
-        senses[slow] = 0.0
-        for column in slow:
-            if (
-                np.abs(Z[column]).max(initial=0.0) <= MOTIONS.still
-                and abs(found.rates.ddq[column, 0]) > MOTIONS.still * size
-            ):
-                senses[column] = np.sign(found.rates.ddq[column, 0])
-        groups = self._together(Z, [c for c in slow if np.abs(Z[c]).max(initial=0.0) > MOTIONS.still], x)
-        # states that are tried: 3^4, with as many stops
-        if len(groups) > 4 or len(resting) > 6:
-            names = ", ".join(self.rough[one.column] for one in groups)
-            raise Stopped(
-                f"more than 4 freedoms with friction are at rest at once, each by itself ({names}), which is not decided"
-            )
+        slow = []
+        for one in self.rough:
+            columns = list(one.columns)
+            # rates that would end within the square of what counts as rest on a stop, of several freedoms, which pass zero at a distance,
+            # within that
+            lowest = RESPONSE.lowest ** (2 if len(columns) == 1 else 1)
+            if (dq[columns] ** 2).max() > 2.0 * lowest * size:
+                continue
+            ways[columns] = 0.0
+            if np.abs(Z[columns]).max(initial=0.0) > MOTIONS.still:
+                slow.append(one)
+            elif np.abs(found.rates.ddq[columns, 0]).max() > MOTIONS.still * size:
+                ways[columns] = found.rates.ddq[columns, 0]
+        self._rested = tuple(slow)
+        sets = self._together(Z, slow, x)
         # what is at rest is so exactly
-        still = self._independent(_Holding(senses=senses), Z, groups, [0.0] * len(groups))
+        still = self._independent(_Holding(ways=ways), Z, sets)
         dq = evaluated(still.task(self.task), np.array([t]), x[:, None], dq[:, None])[0].rates.dq[:, 0]
-        options = [self._options(one) for one in groups]
-        states = product(product(*options), product((True, False), repeat=len(resting)))
-        why = 0
-        for ways, held in sorted(states, key=lambda one: sum(map(abs, one[0])) + one[1].count(False)):
-            limits = tuple(one for one, holds in zip(resting, held, strict=True) if holds)
-            holding = self._independent(_Holding(limits, (), senses.copy()), Z, groups, ways)
-            found, _ = evaluated(holding.task(self.task), np.array([t]), x[:, None], dq[:, None])
+        at, why = _At(Z, sets, resting, size, np.array([t]), x[:, None], dq[:, None]), 0
+        # states that are tried one after the other: 3^4, with as many stops
+        few = len(sets) <= 4 and len(resting) <= 6
+        options = map(self._options, sets)
+        states = (
+            _State(ways, holds) for ways in product(*options) for holds in product((True, False), repeat=len(resting))
+        )
+        tries = iter(sorted(states, key=lambda one: one.motion)) if few else iter(())
+        state = next(tries) if few else _State(tuple(self._options(one)[0] for one in sets), (True,) * len(resting))
+        for count in range(81 * 64 if few else 50 * (len(sets) + len(resting))):
+            holding, found = self._tried(ways, state, at)
             if found.rubs is not None and found.rubs.outcome[0]:
-                why = int(found.rubs.outcome[0])
-            elif self._agrees(holding, found, groups, ways, resting, size, t, x, dq):
-                self._painleve(holding, resting, t, x, dq, agrees=True)
-                return holding, found.rates.dq[:, 0]
-        self._painleve(_Holding(resting, (), senses), resting, t, x, dq, agrees=False)
+                why, better = int(found.rubs.outcome[0]), None
+            else:
+                better = self._amiss(state, holding, found, at)
+                if better is None:
+                    self._painleve(holding, resting, t, x, dq, agrees=True)
+                    return holding, found.rates.dq[:, 0]
+            # of many all that is amiss is changed at once, later on the first of it, so that it does not go in circles
+            after = next(tries, None) if few else better if better is None or count < 8 else state.first_of(better)
+            if after is None:
+                break
+            state = after
+        self._painleve(_Holding(resting, (), ways), resting, t, x, dq, agrees=False)
         raise no_force(self.task, OUTCOMES[why or OUTCOMES.index("no finite force")], t)
 
+    def _tried(self, ways: Array, state: _State, at: _At) -> tuple[_Holding, Moved]:
+        """A state, with the ways of what moves already, and the accelerations in it."""
+        limits = tuple(one for one, holds in zip(at.resting, state.holds, strict=True) if holds)
+        sticks = [one for one, way in zip(at.sets, state.ways, strict=True) if not way]
+        holding = self._independent(_Holding(limits, ways=ways.copy()), at.Z, sticks)
+        assert holding.ways is not None
+        begin: list[_Stuck] = []
+        for one, way in zip(at.sets, state.ways, strict=True):
+            columns = list(one.columns)
+            if way and self._leaves(one):
+                assert self._leaving is not None
+                holding.ways[columns] = self._leaving[columns]
+            elif way and len(one.free) == 1:
+                holding.ways[columns] = way * at.motion(one)[:, 0]
+            elif way:
+                begin.append(one)
+        if begin:
+            holding.ways[:] = self._begun(holding, begin, at)
+        return holding, at.moved(holding.task(self.task))
+
+    def _begun(self, holding: _Holding, begin: Sequence[_Stuck], at: _At) -> Array:
+        """The ways with those in which something slips in several freedoms from rest: along the accelerations that they lead to."""
+        free = [column for one in begin for column in one.free]
+        ends = np.cumsum([0, *(len(one.free) for one in begin)])
+        assert holding.ways is not None
+        ways = holding.ways
+
+        def put(d: Array) -> Array:
+            out = ways.copy()
+            for one, i, j in zip(begin, ends[:-1], ends[1:], strict=True):
+                out[list(one.columns)] = at.motion(one) @ d[i:j]
+            return out
+
+        def along(d: Array) -> Array:
+            found = at.moved(replace(holding, ways=put(d)).task(self.task))
+            a = np.nan_to_num(found.rates.ddq[free, 0])
+            return np.concatenate([part / (np.linalg.norm(part) or 1.0) for part in np.split(a, ends[1:-1])])
+
+        def off(d: Array) -> Array:
+            return d - along(d)
+
+        found = scipy.optimize.root(off, along(np.zeros(len(free))), tol=1e-13)
+        return put(along(np.asarray(found.x)))
+
+    def _amiss(self, state: _State, holding: _Holding, found: Moved, at: _At) -> _State | None:
+        """None where what slips goes on, what presses does so, what is free leaves, and what sticks would not slip; otherwise the state
+        with all of that changed that is amiss.
+        """
+        a, slack = found.rates.ddq[:, 0], MOTIONS.still * at.size
+        ways, holds = list(state.ways), list(state.holds)
+        assert holding.ways is not None
+        for i, (one, way) in enumerate(zip(at.sets, state.ways, strict=True)):
+            columns = list(one.free)
+            least = -slack if self._leaves(one) else slack
+            if way and not holding.ways[columns] @ a[columns] >= least * np.linalg.norm(holding.ways[columns]):
+                ways[i] = 0.0
+        first = len(self.task.columns)
+        efforts = found.held[first:, 0]
+        strong = MOTIONS.still * float(np.abs(efforts).max(initial=0.0))
+        pushes = iter(
+            one.sign * effort >= -strong
+            for one, effort in zip(holding.limits, efforts[: len(holding.limits)], strict=True)
+        )
+        for i, limit in enumerate(at.resting):
+            holds[i] = next(pushes) if state.holds[i] else not limit.sign * a[limit.column] >= -slack
+        for kept in self._modes(holding, found) if holding.held else ():
+            beyond, slips = self._verge(holding, kept, at.t, at.x, at.dq, found)
+            if beyond[0] > MOTIONS.still:
+                for i, some in enumerate(at.sets):
+                    way = slips[some.free[0], 0]
+                    if not state.ways[i] and slips[list(some.columns)].any():
+                        ways[i] = 1.0 if len(some.free) > 1 else float(np.sign(way))
+        better = _State(tuple(ways), tuple(holds))
+        return None if better == state else better
+
     def _painleve(
-        self, holding: _Holding, resting: Sequence[_Limit], t: float, x: Array, dq: Array, *, agrees: bool
+        self, holding: _Holding, resting: Sequence[Limit], t: float, x: Array, dq: Array, *, agrees: bool
     ) -> None:
         """Stop where a contact that slips has no normal force N >= 0, or two: its normal acceleration is b + p N with p < 0."""
-        columns = {name: column for column, name in self.rough.items()}
+        slips = [one.name for one in self.rough if holding.ways is not None and holding.ways[list(one.columns)].any()]
         for limit in resting:
-            column = columns.get(limit.contact)
-            if column is None or holding.senses is None or not holding.senses[column]:
+            if limit.contact not in slips:
                 continue
             b, p = self._normal_law(holding, limit, t, x, dq)
             if p >= 0.0 or agrees != (b > 0.0):
@@ -539,7 +591,7 @@ class Rests:
                 raise Stopped(f"{law}: it may press with N = -b / p, or leave (Painleve)", OUTCOMES[3])
             raise Stopped(f"{law}: no N >= 0 holds it up (Painleve)", OUTCOMES[2])
 
-    def _normal_law(self, holding: _Holding, limit: _Limit, t: float, x: Array, dq: Array) -> tuple[float, float]:
+    def _normal_law(self, holding: _Holding, limit: Limit, t: float, x: Array, dq: Array) -> tuple[float, float]:
         """The normal acceleration of a contact that slips, without a normal force, and for a unit one with its friction."""
         task = replace(holding, limits=tuple(one for one in holding.limits if one is not limit)).task(self.task)
         found, here = evaluated(task, np.array([t]), x[:, None], dq[:, None])
@@ -555,190 +607,122 @@ class Rests:
         a, _ = found.columns.accelerations(np.zeros((6, len(s.m.links), 1)), efforts)
         return float(limit.sign * found.rates.ddq[column, 0]), float(limit.sign * (found.columns.Z[column] * a).sum())
 
-    def _options(self, one: _Stuck) -> tuple[float, ...]:
-        """To stick, or to slip one way or the other; what has just left does not stick."""
-        left = [self._leaving[c] * s for c, s in zip(one.columns, one.signs, strict=True) if c in self._leaving]
-        return (left[0],) if left else (0.0, 1.0, -1.0)
+    def _leaves(self, one: _Stuck) -> bool:
+        """Whether it has just begun to slip."""
+        return self._leaving is not None and bool(self._leaving[list(one.columns)].any())
 
-    def _together(self, Z: Array, columns: Sequence[int], x: Array) -> list[_Stuck]:
-        """Freedoms that move in proportion, each set as one that sticks."""
-        s, out, left = self.task.system, [], list(columns)
+    def _options(self, one: _Stuck) -> tuple[float, ...]:
+        """To stick, or to slip, of one freedom one way or the other; what has just begun to slip goes on."""
+        if self._leaves(one):
+            assert self._leaving is not None
+            return (float(np.sign(self._leaving[one.free[0]])) if len(one.free) == 1 else 1.0,)
+        return (0.0, 1.0, -1.0) if len(one.free) == 1 else (0.0, 1.0)
+
+    def _together(self, Z: Array, slow: Sequence[Rough], x: Array) -> list[_Stuck]:
+        """What is at rest, that of one freedom which moves in proportion as one that sticks."""
+        s, out, left = self.task.system, [], list(slow)
         while left:
-            unit = Z[left] / np.linalg.norm(Z[left], axis=1)[:, None]
-            along = unit @ unit[0]
-            mine = np.abs(unit - along[:, None] * unit[0]).max(axis=1) <= MOTIONS.proportional
-            first = left[0]
-            size = s.par.L if s.is_length[first] else 1.0
-            members = [(c, float(np.sign(a))) for c, a, m in zip(left, along, mine, strict=True) if m]
-            place = float(x[s.single_rows[first]]) * size
-            out.append(_Stuck(tuple(c for c, _ in members), tuple(sign for _, sign in members), place))
-            left = [c for c, m in zip(left, mine, strict=True) if not m]
+            rows = [Z[list(one.columns)] for one in left]
+            single = _rank(rows[:1]) == 1
+            mine = [
+                one
+                for one, own in zip(left, rows, strict=True)
+                if one is left[0] or (single and _rank([rows[0], own]) == 1)
+            ]
+            free: list[int] = []
+            for column in left[0].columns:
+                if _rank([Z[[*free, column]]]) > len(free):
+                    free.append(column)
+            places = [
+                float(x[s.single_rows[c]]) * (s.par.L if s.is_length[c] else 1.0) if s.single_rows[c] >= 0 else 0.0
+                for c in free
+            ]
+            columns = dict.fromkeys(column for one in mine for column in one.columns)
+            out.append(_Stuck(tuple(mine), tuple(columns), tuple(free), tuple(places)))
+            left = [one for one in left if one not in mine]
         return out
 
-    def _independent(self, holding: _Holding, Z: Array, groups: Sequence[_Stuck], ways: Sequence[float]) -> _Holding:
-        """The state with what sticks, of freedoms that limits leave free, and the senses of what slips."""
-        held = [one.column for one in holding.limits]
-        for one, way in zip(groups, ways, strict=True):
-            if way:
-                holding = holding.slipping(one, way)
-            elif self._is_open(one.column, holding):
+    def _independent(
+        self, holding: _Holding, Z: Array, sets: Sequence[_Stuck], beside: Sequence[int] | None = None
+    ) -> _Holding:
+        """The state in which sets stick, of which no contact is open: as many of their freedoms are held as move beside those of limits."""
+        used = [limit.column for limit in holding.limits] if beside is None else list(beside)
+        stuck, held = [], []
+        for one in sets:
+            closed = tuple(some for some in one.of if not self._is_open(some, holding))
+            if not closed:
                 continue
-            elif rank_of(singular_values(Z[[*held, one.column]]), MOTIONS.still) > len(held):
-                held, holding = [*held, one.column], replace(holding, stuck=(*holding.stuck, one))
-        return holding
-
-    def _agrees(
-        self,
-        holding: _Holding,
-        found: Moved,
-        groups: Sequence[_Stuck],
-        ways: Sequence[float],
-        resting: Sequence[_Limit],
-        size: float,
-        t: float,
-        x: Array,
-        dq: Array,
-    ) -> bool:
-        """Whether what slips goes on, what presses does so, what is free leaves, and what sticks would not slip."""
-        a, slack = found.rates.ddq[:, 0], MOTIONS.still * size
-        for one, way in zip(groups, ways, strict=True):
-            least = -slack if one.column in self._leaving else slack
-            if way and not way * one.signs[0] * a[one.column] >= least:
-                return False
-        first, at = len(self.task.columns), (np.array([t]), x[:, None], dq[:, None])
-        efforts = found.held[first:, 0]
-        strong = MOTIONS.still * float(np.abs(efforts).max(initial=0.0))
-        pushes = all(one.sign * effort >= -strong for one, effort in zip(holding.limits, efforts, strict=False))
-        leaves = all(one.sign * a[one.column] >= -slack for one in resting if one not in holding.limits)
-        holds = all(self._verge(holding, one, way, *at)[0] <= slack for one in holding.stuck for way in (1.0, -1.0))
-        return pushes and leaves and holds
+            columns = dict.fromkeys(column for some in closed for column in some.columns)
+            stuck.append(replace(one, of=closed, columns=tuple(columns)))
+            for column, place in zip(one.free, one.places, strict=True):
+                if rank_of(singular_values(Z[[*used, column]]), MOTIONS.still) > len(used):
+                    used.append(column)
+                    held.append((column, place))
+        return replace(holding, stuck=tuple(stuck), held=tuple(held))
 
 
-def _gap(motion: Moving, limit: _Limit, t: Array) -> Array:
+@dataclass(frozen=True)
+class _State:
+    """For every set at rest the way in which it slips, 0 where it sticks; for every limit that is rested on whether it holds."""
+
+    ways: tuple[float, ...]
+    holds: tuple[bool, ...]
+
+    @property
+    def motion(self) -> int:
+        """How much moves in it."""
+        return int(sum(map(abs, self.ways))) + self.holds.count(False)
+
+    def first_of(self, better: _State) -> _State:
+        """The state with the first of the changes to another one."""
+        values, others = [*self.ways, *self.holds], [*better.ways, *better.holds]
+        i = next(i for i, (value, other) in enumerate(zip(values, others, strict=True)) if value != other)
+        values[i] = others[i]
+        n = len(self.ways)
+        return _State(tuple(map(float, values[:n])), tuple(map(bool, values[n:])))
+
+
+@dataclass(frozen=True)
+class _At:
+    """Where a state is looked for: the motions ``Z (F, n)`` with nothing held, what is at rest, limits that are rested on, the size of
+    accelerations, time ``(1,)``, state ``(nx, 1)`` and rates ``(F, 1)``.
+    """
+
+    Z: Array
+    sets: Sequence[_Stuck]
+    resting: Sequence[Limit]
+    size: float
+    t: Array
+    x: Array
+    dq: Array
+
+    def motion(self, one: _Stuck) -> Array:
+        """Rates ``(columns, k)`` of a set for unit rates of those of its freedoms that move independently."""
+        return np.asarray(self.Z[list(one.columns)] @ np.linalg.pinv(self.Z[list(one.free)]))
+
+    def moved(self, task: Task) -> Moved:
+        """Accelerations of a task there."""
+        return evaluated(task, self.t, self.x, self.dq)[0]
+
+
+def _rank(parts: Sequence[Array]) -> int:
+    """The number of independent motions of freedoms; those in proportion are one."""
+    rows = np.concatenate(parts)
+    size = np.linalg.norm(rows, axis=1)
+    moves = size > MOTIONS.still
+    return rank_of(singular_values(rows[moves] / size[moves, None]), MOTIONS.proportional) if moves.any() else 0
+
+
+def _null(A: Array) -> Array:
+    """Orthonormal columns for which rows ``A (m, n)``, which may depend on each other, are zero."""
+    size = np.linalg.norm(A, axis=1)
+    rows = A[size > MOTIONS.still] / size[size > MOTIONS.still, None]
+    return np.asarray(scipy.linalg.null_space(rows, MOTIONS.proportional)) if len(rows) else np.eye(A.shape[1])
+
+
+def _gap(motion: Moving, limit: Limit, t: Array) -> Array:
     return np.asarray(limit.sign * (motion.positions(t)[limit.row] - limit.value))
 
 
-def _rate(motion: Moving, column: int, sense: float, t: Array) -> Array:
-    return np.asarray(sense * motion.rates(t)[0, column])
-
-
-def _phase(D: Array, w: Array, mu: float, least: float) -> Array:
-    """Impulses (normal, along) of a phase of an impact at rates ``w (2,)``, the normal one ``least`` or more."""
-    for way in (0.0, 1.0, -1.0):
-        # the impulse along the contact that goes with a normal one: along = shift + slope * normal
-        shift, slope = (0.0, -way * mu) if way else (-w[1] / D[1, 1], -D[1, 0] / D[1, 1])
-        end, rise = w[0] + D[0, 1] * shift, D[0, 0] + D[0, 1] * slope
-        if end + rise * least < 0.0 and rise <= 0.0:
-            continue
-        normal = least if end + rise * least >= 0.0 else -end / rise
-        p = np.array([normal, shift + slope * normal])
-        slips = way * (w[1] + D[1] @ p) >= 0.0
-        if slips if way else abs(p[1]) <= mu * normal:
-            return p
-    raise Stopped("an impact with friction has no impulses that agree with themselves", OUTCOMES[2])
-
-
-class _Free:
-    """The equations of motion at a state, nothing held: what closed limits do."""
-
-    def __init__(self, task: Task, t: float, x: Array, dq: Array, closed: tuple[_Limit, ...]) -> None:
-        found, self.here = evaluated(task, np.array([t]), x[:, None], dq[:, None])
-        self.dq, self.mass, self.motions, self.closed = dq, found.columns.mass, found.columns, closed
-        self.columns = np.array([limit.column for limit in closed])
-        self.sign = np.array([limit.sign for limit in closed])
-        self.Z = found.columns.Z[..., 0]
-        G = self.sign[:, None] * self.Z[self.columns]
-        # rate of a freedom for unit rates of the independent ones below which these do not move it
-        self.moves = np.abs(G).max(axis=1, initial=0.0) > 1e-12
-        self.impulse_to_rate = self._yielding(G)
-        self.D = G @ self.impulse_to_rate
-        self.w, self.w_rate = self.sign * dq[self.columns], self.sign * np.nan_to_num(found.rates.ddq[self.columns, 0])
-
-    def _yielding(self, G: Array) -> Array:
-        """Independent rates ``(n, k)`` that unit impulses along rows ``G (k, n)`` bring."""
-        out, left = np.zeros(G.T.shape), np.zeros(G.T.shape)
-        for i in np.flatnonzero(np.abs(G).max(axis=1, initial=0.0) > 1e-12):
-            (out[:, [i]], left[:, [i]]) = accelerations(self.mass, G[i][:, None])
-        if np.abs(left).max(initial=0.0) > RESPONSE.unopposed * np.abs(G).max(initial=0.0):
-            raise Stopped(NO_INERTIA)
-        return out
-
-    @property
-    def still(self) -> NDArray[np.bool_]:
-        """Which limits are closed at rest: they would open by next to nothing before they close again."""
-        return np.asarray(
-            self.w**2 <= 2.0 * RESPONSE.lowest * np.maximum(np.abs(self.w_rate), RESPONSE.lowest), dtype=bool
-        )
-
-    def _least(self, D: Array, c: Array) -> Array:
-        """``p >= 0`` with ``D p + c >= 0`` and ``p . (D p + c) = 0``."""
-        w, U = np.linalg.eigh(D)
-        kept = w > 1e-12 * w.max(initial=0.0)
-        root = np.sqrt(w[kept])[:, None] * U[:, kept].T
-        return np.asarray(scipy.optimize.nnls(root, -(U[:, kept].T @ c) / np.sqrt(w[kept]))[0])
-
-    def struck(self, e: Array) -> tuple[Array, float, Array]:
-        """Rates after an impact with coefficients of restitution ``e``, the kinetic energy lost, and the impulses of the limits."""
-        if (~self.moves & (self.w < 0.0) & ~self.still).any():
-            raise Stopped("a freedom is moved against its stop by prescribed motions alone, which no force can hold up")
-        p = self._least(self.D, self.w + e * np.minimum(self.w, 0.0))
-        efforts = np.zeros(len(self.dq))
-        np.add.at(efforts, self.columns, self.sign * p)
-        return self._after(self.impulse_to_rate @ p, efforts)
-
-    def struck_rough(self, column: int, mu: float, e: float) -> tuple[Array, float, Array]:
-        """The same of the one contact that is closed, which rubs in a freedom: by Poisson's law, compression and then expansion.
-
-        In both phases ends ``w+ >= 0`` where the normal impulse has its least value, 0 and e times that of compression; the one along
-        the contact is in Coulomb's cone with the rate at the end of the phase.
-        """
-        G = np.stack([self.sign[0] * self.Z[self.columns[0]], self.Z[column]])
-        to_rate = self._yielding(G)
-        D, w = G @ to_rate, np.array([self.w[0], self.dq[column]])
-        first = _phase(D, w, mu, 0.0)
-        p = first + _phase(D, w + D @ first, mu, e * first[0])
-        efforts = np.zeros(len(self.dq))
-        efforts[[self.columns[0], column]] = self.sign[0] * p[0], p[1]
-        return self._after(to_rate @ p, efforts)
-
-    def _after(self, change: Array, efforts: Array) -> tuple[Array, float, Array]:
-        """Rates after a ``change (n,)`` of the independent ones, and the energy lost, with the impulses in the freedoms."""
-        here, after = self.here, self.dq + self.Z @ change
-        before, behind = (float(kinetic_energy(here, here.link_twists(dq[:, None]))[0]) for dq in (self.dq, after))
-        if self.spent(efforts, after) < -RESPONSE.lost_energy * before:
-            raise Stopped(
-                "an impact would gain energy: contacts that are closed beside it lead it back; give them restitution=0"
-            )
-        return after, before - behind, efforts
-
-    def spent(self, impulses: Array, after: Array) -> float:
-        """The energy that ``impulses (F,)`` take: not what the kinetic energy loses where prescribed motions do work in the impact."""
-        return float(-0.5 * impulses @ (self.dq + after))
-
-    def blow(self, i: int, impulses: Array, spent: float) -> dict[str, Any]:
-        """What an occurrence says of an impact with the ``impulses (F,)`` in freedoms, as limit ``i`` is struck; the user's units."""
-        here, par = self.here, self.here.system.par
-        efforts = impulses[:, None].copy()
-        loads = self.motions.inertia_of(
-            self.motions.accelerations(np.zeros((6, len(here.system.m.links), 1)), efforts)[0]
-        )
-        found = unique_reactions(ForceProblem(here, loads, efforts, np.zeros(0, dtype=np.intp), self.motions.f))[..., 0]
-        found[:3] += cross(here.pair_points[..., 0], found[3:])
-        # what a contact presses is among the reactions
-        efforts[here.system.gaps] = 0.0
-        found += here.pair_sums(here.E * efforts)[..., 0]
-        unit = par.L if here.system.is_length[self.columns[i]] else par.L**2
-        wrenches = zip(here.system.m.pairs, user_wrench(par, found).T, strict=True)
-        return {
-            "impulse": float(unit * self.sign[i] * impulses[self.columns[i]]),
-            "energy_lost": float(spent * par.L**2),
-            "impulses": {pair.name: wrench for pair, wrench in wrenches},
-        }
-
-    def pressing(self) -> tuple[list[int], Array]:
-        """Which of the limits that are closed at rest press, so that they hold: independent ones; and the accelerations then."""
-        rest = np.flatnonzero(self.still)
-        p = np.zeros(len(self.w))
-        if len(rest):
-            p[rest] = self._least(self.D[np.ix_(rest, rest)], self.w_rate[rest])
-        return np.flatnonzero(p > 0.0).tolist(), self.w_rate + self.D @ p
+def _rate(motion: Moving, columns: list[int], way: Array, t: Array) -> Array:
+    return np.asarray(way @ motion.rates(t)[0, columns])

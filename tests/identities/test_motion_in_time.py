@@ -6,9 +6,10 @@ from strategies import closed_mechanism, with_drives, with_loads
 
 import mechgraph as mg
 from mechgraph.kinematics.assembly import closed_start
+from mechgraph.response.impact import Limit
 from mechgraph.response.integration import LOOKS_IN_STEP
 from mechgraph.response.motion_equations import Chart, Columns, accelerations, in_unit_inertias
-from mechgraph.response.resting import Rests, _Holding, _Limit
+from mechgraph.response.resting import Rests, _Holding
 
 T = np.linspace(0.0, 0.25, 6)
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
@@ -136,7 +137,7 @@ class Sinking:
 def test_what_is_passed_at_once_is_met_at_the_first_look(monkeypatch):
     """So that the least is lost: a limit that is passed, and one that no longer presses."""
     first = LOOKS_IN_STEP[1]
-    limit = _Limit(mg.Stop("A", lower=0.0), "lower", 0, 0, 1.0, 0.0)
+    limit = Limit(mg.Stop("A", lower=0.0), "lower", 0, 0, 1.0, 0.0)
     assert Rests(None, (limit,)).met(Sinking(), 0.0, 1.0) == first
     monkeypatch.setattr(Rests, "_pressing", lambda self, motion, times: motion.positions(times)[0])
     assert Rests(None, (limit,), holding=_Holding((limit,))).met(Sinking(), 0.0, 1.0) == first
