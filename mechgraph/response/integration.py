@@ -363,8 +363,8 @@ class Integration:
             f"at the length of the last {RESPONSE.look} steps of {self.method}, some {left:.0e} more lead to t = {end:g}; "
             "where loads are stiff, method='Radau' takes far fewer. Declare dry friction with mg.Friction; smooth other loads that jump"
         )
-        # steps to come from which on the motion is given up: hours and days
-        if left > 1e8:
+        # steps to come from which on the motion is given up: an hour and more of .5 ms each
+        if left > 1e7:
             raise Stopped(message)
         # steps to come from which on the user is told: minutes
         if left > 100_000 and not self._told:
