@@ -157,3 +157,22 @@ def test_where_no_solution_is_real_none_is_returned_and_all_are_counted() -> Non
     assert (len(s), s.total, s.poses.shape) == (0, 3, (0, 5, 4, 4, 4))
     assert len(s.complex) + s.infinite + sum(one.count for one in s.degenerate) == 3
     assert "0 mechanisms, of 3 solutions" in str(s)
+
+
+def test_a_link_that_begins_elsewhere_than_at_the_identity_comes_back_by_markers() -> None:
+    """The same dyad: a body whose frame stands elsewhere on it is led through the same places."""
+    poses = np.array([[0, 0, 0], [1.0, 0.4, 0.3], [1.6, 1.1, 0.9]])
+    own = _planar(np.array([0.7, -0.4, 1.1]))
+    m = dyad().replace(links=[mg.Link("frame"), mg.Link("crank"), mg.Link("body", points={"tip": (0.5, 0.2)})])
+    plain, moved = (
+        mg.synthesize(m, mg.poses("body", X), ["B.point"])
+        for X in (poses, np.array([_planar(row) @ own for row in poses]))
+    )
+    assert np.abs(plain.values - moved.values).max() < 1e-9
+    (one,) = moved
+    assert one.pair("B").on_b is not None
+    assert one.link("body").points == m.link("body").points
+    row = dict(zip(one.freedom_names(), moved.coordinates[0, 2].tolist(), strict=True))
+    body = mg.kinematics(one.replace(drives=one.freedom_names()), row).link("body")
+    assert np.abs(body.pose - _planar(poses[2]) @ own).max() < 1e-9
+    assert np.abs(moved.poses[0, 2, 2] - _planar(poses[2]) @ own).max() < 1e-9

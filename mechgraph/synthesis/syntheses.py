@@ -10,7 +10,6 @@ from typing import Any, get_args
 import numpy as np
 
 from mechgraph.errors import DeclarationError, counted
-from mechgraph.force.loads import user_poses
 from mechgraph.graph.chains import Chain
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Array
@@ -169,7 +168,7 @@ class Synthesis:
         names = (*p.unknowns.names, *self.sweep.names)
         swept = np.repeat(self.swept[:, i][None], len(values), axis=0)
         out = Syntheses(
-            p.m,
+            p.first.declared,
             tuple(m for m, _, _ in made),
             names,
             np.concatenate([values, swept], axis=1),
@@ -256,9 +255,9 @@ class Synthesis:
         whole = np.where(free, np.round((q - start) / np.where(free, period, 1.0)), 0.0)
         q = np.where(asked, q, q - whole * np.where(free, period, 0.0))
         numbers = goal.numbers.with_values(p.places, x[: of.u, None])
-        poses = user_poses(Configuration(p.system_with(RowNumbers(*(v.real for v in vars(numbers).values()))), states))
+        here = Configuration(p.system_with(RowNumbers(*(v.real for v in vars(numbers).values()))), states)
         begin = dict(zip(m.freedom_names(), q[0, :F].tolist(), strict=True))
-        return m.replace(start=begin), q[:, :F], np.moveaxis(poses, 1, 0)
+        return p.first.back(m).replace(start=begin), q[:, :F], p.first.poses_of(here)
 
     def _fitness(self, m: Mechanism, q: Array) -> Fitness:
         driver, output = driver_of(m, self.tasks)
@@ -304,7 +303,7 @@ class FittedSynthesis:
         """The mechanism of fitted rows, and its coordinates ``(rows, F)``."""
         p = self.problem
         q = p.system.coordinates_of(here.x).T[:, : len(p.m.freedom_names())]
-        m = p.unknowns.mechanism(p.outside(here.z[:, None])[:, 0])
+        m = p.first.back(p.unknowns.mechanism(p.outside(here.z[:, None])[:, 0]))
         return m.replace(start=dict(zip(m.freedom_names(), q[0].tolist(), strict=True))), q
 
     def measured(self, what: Any, sign: float = 1.0, none: float = 1e3) -> Callable[[FitPoint], Array]:
@@ -320,11 +319,11 @@ class FittedSynthesis:
         shape = (self.fit.rows, len(p.m.links), 4, 4)
         closed = [float(np.abs(here.at.residual).max(initial=0.0)) for here in points]
         return Syntheses(
-            p.m,
+            p.first.declared,
             tuple(m for m, _ in made),
             p.unknowns.names,
             np.array([p.outside(here.z[:, None])[:, 0] for here in points]).reshape(len(points), len(p.unknowns.names)),
-            np.array([np.moveaxis(user_poses(here.at.here), 1, 0) for here in points]).reshape(-1, *shape),
+            np.array([p.first.poses_of(here.at.here) for here in points]).reshape(-1, *shape),
             np.array([q for _, q in made]).reshape(len(made), self.fit.rows, len(p.m.freedom_names())),
             np.array(closed),
             ComplexSyntheses(np.zeros((0, len(p.unknowns.names)))),

@@ -16,14 +16,16 @@ from typing import Any
 import numpy as np
 
 from mechgraph.errors import DeclarationError
+from mechgraph.force.loads import user_poses
 from mechgraph.kinematics.prescribed import DriverMotion
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Array, Index, cross, move_twist
 from mechgraph.model.gears import moving_lines
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.parameters import Declared, declared
-from mechgraph.synthesis.tasks import asked_of
+from mechgraph.synthesis.tasks import PoseTask, asked_of
 from mechgraph.synthesis.unknowns import UnknownPlace, Unknowns, marker_twists, norms_of, unit_rates
 from mechgraph.variants.numbers import MARKER
 
@@ -96,6 +98,67 @@ class RowNumbers:
         return self.point, z, (self.second - (z * self.second).sum(axis=1, keepdims=True) * z) / self.norms[1][:, None]
 
 
+class FirstPoses:
+    """Links that begin at other poses than the identity, ``poses (4, 4)`` by link.
+
+    Pairs by point and axis want the frames of their links on the global one at row 0. So such a link is sought in a frame of its own that
+    lies there, ``m`` and ``tasks``; what is found comes ``back`` in the frame that was declared, its pairs by markers.
+    """
+
+    def __init__(self, declared: Mechanism, tasks: Any, unknown: Sequence[str], faults: list[str]) -> None:
+        every = tasks if isinstance(tasks, list | tuple) else [tasks]
+        found = [(task.link, task.first(declared)) for task in every if isinstance(task, PoseTask)]
+        known = [(link, X) for link, X in found if X is not None and link in declared.link_names()]
+        self.declared, self.poses = declared, dict(known)
+        self.m, self.tasks = declared, tasks
+        if not self.poses:
+            return
+        faults += [
+            f"unknown {name!r}: is a point of a link of which the first pose is not the identity; begin there, or give the point"
+            for name in unknown
+            for link in self.poses
+            if name.startswith(f"{link}.")
+        ]
+        moved = [
+            link.replace(points={name: X[:3, :3] @ p + X[:3, 3] for name, p in link.points.items()})
+            if (X := self.poses.get(link.name)) is not None
+            else link
+            for link in declared.links
+        ]
+        self.m = declared.replace(links=moved)
+        self.tasks = [
+            task.after(declared, self.poses[task.link], faults)
+            if isinstance(task, PoseTask) and task.link in self.poses
+            else task
+            for task in every
+        ]
+
+    def back(self, m: Mechanism) -> Mechanism:
+        """A mechanism found, in the frames that were declared."""
+        if not self.poses:
+            return m
+        links = [old if old.name in self.poses else new for old, new in zip(self.declared.links, m.links, strict=True)]
+        return m.replace(links=links, pairs=[self._by_markers(pair) for pair in m.pairs])
+
+    def _by_markers(self, pair: Pair) -> Pair:
+        if pair.on_a is not None or not self.poses.keys() & {pair.a, pair.b}:
+            return pair
+        sides = []
+        for link, marker in zip((pair.a, pair.b), pair.markers, strict=True):
+            X = self.poses.get(link, np.eye(4))
+            axis, second = (np.asarray(v) @ X[:3, :3] for v in (marker.axis, marker.second))
+            sides.append(Marker((np.asarray(marker.point) - X[:3, 3]) @ X[:3, :3], axis, second))
+        return pair.replace(point=None, axis=None, second=None, on_a=sides[0], on_b=sides[1])
+
+    def poses_of(self, here: Configuration) -> Array:
+        """Poses ``(T, N, 4, 4)`` of the links as declared."""
+        X = np.moveaxis(user_poses(here), 1, 0)
+        for link, X0 in self.poses.items():
+            k = self.declared.link_names().index(link)
+            X[:, k] = X[:, k] @ X0
+        return X
+
+
 class RowProblem:
     """What is asked of a mechanism, what is unknown, and the equations of both.
 
@@ -114,9 +177,10 @@ class RowProblem:
 
     def __init__(self, m: Mechanism, tasks: Any, unknown: Sequence[str]) -> None:
         faults: list[str] = []
-        self.m = m
+        self.first = FirstPoses(m, tasks, unknown, faults)
+        self.m = m = self.first.m
         self.name = f"synthesis of {m.name!r}"
-        self.tasks = asked_of(m, tasks, faults)
+        self.tasks = asked_of(m, self.first.tasks, faults)
         if moving := m.once(moving_lines):
             faults.append(f"the relation of the coupling {moving[0]!r} is no polynomial; leave it out (couplings=)")
         if self.tasks is None or not m.has_geometry:

@@ -7,7 +7,7 @@ Every task is short for numbers by name, one a position: values of freedoms, coo
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -72,6 +72,34 @@ class PoseTask:
             given = self._coordinates(m, given, faults)
         out = {f"{self.link}.{part}": column for part, column in zip((*slides, *turns), given.T, strict=True)}
         return out | _timed(m, self.at, len(given), faults)
+
+    def first(self, m: Mechanism) -> Array | None:
+        """The first pose ``(4, 4)``, where it is whole and not the identity."""
+        X = self._whole(m)
+        return None if X is None or np.isnan(X[0]).any() or np.allclose(X[0], np.eye(4), atol=1e-9) else X[0]
+
+    def after(self, m: Mechanism, X0: Array, faults: list[str]) -> PoseTask:
+        """The same asked of the link in another frame, which lies on the global one where the link stands at ``X0``."""
+        X = self._whole(m)
+        assert X is not None
+        nothing = np.isnan(X).any(axis=(1, 2))
+        if not np.isnan(np.asarray(self.places, dtype=float)).reshape(len(X), -1).all(axis=1)[nothing].all():
+            faults.append(f"poses of {self.link!r}: a link that begins elsewhere is asked for whole poses, or nothing")
+        out = X @ np.linalg.inv(X0)
+        out[0] = np.eye(4)
+        return replace(self, places=out)
+
+    def _whole(self, m: Mechanism) -> Array | None:
+        """The poses ``(n, 4, 4)``; None where they are none."""
+        X = real_array(self.places)
+        if X is None or X.shape[1:] not in ((4, 4), (3,)) or not len(X) or (X.ndim == 2 and not m.planar):
+            return None
+        if X.ndim == 3:
+            return X
+        out = np.tile(np.eye(4), (len(X), 1, 1))
+        c, s = np.cos(X[:, 2]), np.sin(X[:, 2])
+        out[:, :2, :2], out[:, :2, 3] = np.array([[c, -s], [s, c]]).transpose(2, 0, 1), X[:, :2]
+        return out
 
     def _coordinates(self, m: Mechanism, X: Array, faults: list[str]) -> Array:
         R = X[:, :3, :3]
@@ -177,7 +205,8 @@ def poses(link: str, poses: Any, *, at: Mapping[str, Any] | None = None) -> Pose
     link : str
         The link.
     poses : (n, 4, 4) array
-        Its poses; in a planar mechanism also ``(n, 3)``: x, y [length], angle [rad]. NaN asks for nothing. The first is the identity.
+        Its poses; in a planar mechanism also ``(n, 3)``: x, y [length], angle [rad]. NaN asks for nothing. Where the first
+        one is not the identity, what is found comes back with the pairs of the link by markers.
     at : mapping, optional
         Values of freedoms at the same positions (prescribed timing).
 
