@@ -53,11 +53,12 @@ class ClassMember:
 class RowBlock:
     """Rows ``rows (G,)`` of equal shape.
 
-    Of their equations the combinations ``mixing (G, rank, n)`` are independent, of their coordinates ``ways (G, F, settled)`` are moved:
-    what the equations leave free, passive motions, does not move.
+    Of their equations the combinations ``mixing (G, rank, n)`` are independent, of their coordinates ``ways (G, F, f)`` are free, and so
+    many combinations are ``settled``: along passive motions, which the equations leave free, nothing moves.
     """
 
     rows: Index
+    settled: int
     ways: Array
     mixing: Array | None
 
@@ -132,7 +133,8 @@ class TaskClass:
 
     def _read(self, rng: np.random.Generator) -> None:
         """Ranks of all rows at a random mechanism of the class, and a start there."""
-        found, x = self.random_closed(rng, 1)
+        # random mechanisms of which the best one is the start
+        found, x = self.random_closed(rng, 6)
         self.start, self.x = found[0], x[:, 0]
         rows = self.at(self.start, self.x[:, None])
         J, B = rows.by_coordinates[..., 0], rows.by_unknowns[..., 0]
@@ -146,6 +148,11 @@ class TaskClass:
             self._block(shape, [i for i, own in enumerate(shapes) if own == shape], n, rng)
             for shape in dict.fromkeys(shapes)
         ]
+        if self.u and self.conditions.any():
+            every, joined = np.arange(len(found)), ClassMember.joined(found)
+            here = self.leg(joined, joined, every).at(x, np.zeros(len(found)), every)
+            best = int(np.argmin(np.linalg.cond(here.matrix)))
+            self.start, self.x = found[best], x[:, best]
 
     def random_closed(self, rng: np.random.Generator, n: int) -> tuple[list[ClassMember], Array]:
         """Random mechanisms of the class at random positions: what they do there are tasks that they solve; their states ``(nx, n)``.
@@ -208,12 +215,10 @@ class TaskClass:
         """Rows of ``(rank, settled, free)`` such equations and coordinates, of ``n`` equations in all."""
         rank, settled, free = shape
         mix = np.linalg.qr(rng.normal(size=(len(rows), n, n)) + 1j * rng.normal(size=(len(rows), n, n)))[0][:, :rank]
-        ways = np.linalg.qr(rng.normal(size=(len(rows), free, free)))[0][:, :, :settled]
-        every = np.broadcast_to(np.eye(free), (len(rows), free, free))
         columns = np.array([self.free[i] for i in rows], dtype=np.intp).reshape(len(rows), free)
-        lifted = np.zeros((len(rows), self.F, settled))
-        np.put_along_axis(lifted, columns[:, :, None], every if settled == free else ways, axis=1)
-        return RowBlock(np.array(rows), lifted, None if rank == n else mix)
+        ways = np.zeros((len(rows), self.F, free))
+        ways[np.arange(len(rows))[:, None], columns, np.arange(free)] = 1.0
+        return RowBlock(np.array(rows), settled, ways, None if rank == n else mix)
 
     # --- states ------------------------------------------------------------------------------------------------------
 
@@ -421,10 +426,17 @@ class Arrow:
         out, T = [], self.rows.T
         for block in self.of.blocks:
             J, B = (self._mixed(block, v) for v in (self.rows.by_coordinates, self.rows.by_unknowns))
-            n = block.ways.shape[2]
-            Q, upper = np.linalg.qr(J @ block.ways[:, None], mode="complete")
-            upper = upper[:, :, :n] + np.where(np.eye(n, dtype=bool) & (upper[:, :, :n] == 0), 1e-300, 0.0)
-            back = block.ways[:, None] @ np.linalg.inv(upper) @ Q[..., :n].conj().swapaxes(2, 3)
+            J, n = J @ block.ways[:, None], block.settled
+            if n < J.shape[3]:
+                # of passive motions, which a moving frame of the states turns, only the least norm is never led astray
+                Q, sigma, V = np.linalg.svd(J)
+                back = V[..., :n, :].conj().swapaxes(2, 3) / np.maximum(sigma[..., None, :n], 1e-300)
+            else:
+                Q, upper = np.linalg.qr(J, mode="complete")
+                back = np.linalg.inv(
+                    upper[:, :, :n] + np.where(np.eye(n, dtype=bool) & (upper[:, :, :n] == 0), 1e-300, 0.0)
+                )
+            back = block.ways[:, None] @ back @ Q[..., :n].conj().swapaxes(2, 3)
             out.append((Q[..., n:].conj().swapaxes(2, 3), back, B))
         return out, np.concatenate([_beneath(N @ B, T) for N, _, B in out], axis=1)
 
