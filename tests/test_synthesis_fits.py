@@ -79,6 +79,39 @@ def test_the_least_largest_error_is_below_that_of_least_squares() -> None:
     assert (errors > 0.999 * errors.max()).sum() >= 2
 
 
+def test_the_least_ratio_of_lengths_is_less_than_that_of_all_others_near_by_that_do_the_same() -> None:
+    """Of three pairs of angles: with A, B, D given, C is as far from B in all three positions as the rocker sees them."""
+    pairs, A, D = np.deg2rad([[0, 0], [40, 15], [75, 45]]), 0j, 3 + 0j
+
+    def ratio(B: complex) -> float:
+        seen = D + np.exp(-1j * pairs[:, 1]) * ((B - A) * np.exp(1j * pairs[:, 0]) + A - D)
+        rows = np.array([[p.real, p.imag, 1.0] for p in seen])
+        x, y, _ = np.linalg.solve(rows, (abs(seen) ** 2) / 2)
+        lengths = abs(np.array([B - A, x + 1j * y - B, x + 1j * y - D, D - A]))
+        return float(lengths.max() / lengths.min())
+
+    m = four_bar()
+    # without the point on the coupler, which counts as an element of it
+    m = m.replace(links=[mg.Link(link.name) for link in m.links])
+    s = mg.synthesize(m, mg.function("A", "D", pairs), ["B.point", "C.point"], minimize="ratio", starts=1)
+    best = s.values[0, 0] + 1j * s.values[0, 1]
+    assert s.fitness[0].ratio == pytest.approx(ratio(best), rel=1e-9)
+    assert not any("Stopped" in text for text in s.evidence)
+    ways = np.exp(2j * np.pi * np.arange(16) / 16)
+    assert min(ratio(best + step * way) for way in ways for step in (0.01, 0.1, 0.3)) > s.fitness[0].ratio
+
+
+def test_fits_begin_with_exact_solutions_of_parts_of_the_task() -> None:
+    """A function of another four-bar: every part of it that determines a mechanism exactly gives that one among its answers."""
+    other = {"A": (0, 0), "B": (-0.3, 0.8), "C": (2.6, 1.9), "D": (3, 0)}
+    given = mg.Mechanism("other", pairs=[mg.Pair(k, "R", *ENDS[k], point=at) for k, at in other.items()], planar=True)
+    angles = np.linspace(0.0, 1.2, 8)
+    pairs = np.column_stack([angles, mg.kinematics(given, {"A": angles})["D"].position[:, 0]])
+    s = mg.synthesize(four_bar(), mg.function("A", "D", pairs), ["B.point", "C.point"], fit="least_squares", starts=2)
+    assert s.values[0] == pytest.approx([-0.3, 0.8, 2.6, 1.9], abs=1e-7)
+    assert any("do a part of the positions exactly" in text for text in s.evidence)
+
+
 def formula(z: np.ndarray, targets: np.ndarray) -> float:
     """Mean square distance of points from the curve of a four-bar, at 180 crank angles; large where it cannot turn so far."""
     A, B, C, D, P = (z[k : k + 2] @ [1, 1j] for k in range(0, 10, 2))

@@ -300,8 +300,14 @@ class Measure:
         if not self.of_dimensions and self.output is None:
             named_outputs(m, {str(what): what}, ())
 
-    def __call__(self, m: Mechanism, q: Array, driver: str | None) -> Array:
-        """Its values ``(k,)`` of a mechanism at positions ``q (n, F)``, NaN where the driver does not lead to one."""
+    def __call__(self, m: Mechanism, q: Array, driver: str | None, smooth: bool = False) -> Array:
+        """Its values ``(k,)`` of a mechanism at positions ``q (n, F)``, NaN where the driver does not lead to one.
+
+        ``smooth`` asks for smooth functions of the dimensions of which it is the largest one.
+        """
+        if self.of_dimensions and smooth:
+            lengths = distances(m)
+            return lengths if self.what == "size" else np.divide.outer(lengths, lengths).ravel()
         if self.of_dimensions:
             return np.array([sizes(m)[self.what == "ratio"]])
         names = m.freedom_names()
@@ -352,14 +358,19 @@ def frame_outputs(m: Mechanism, driver: str) -> list[str]:
     return [name for p in at_frame if (name := p.freedom_names[0]) != driver]
 
 
-def sizes(m: Mechanism) -> tuple[float, float]:
-    """Largest distance of two elements of a link (points of its pairs, named points), and longest over shortest of all distances."""
+def distances(m: Mechanism) -> Array:
+    """Distances of two elements of a link (points of its pairs, named points), of all links; elements at one place left out."""
     at: dict[str, list[Array]] = {link.name: [np.asarray(p) for p in link.points.values()] for link in m.links}
     for pair in m.pairs:
         for link, marker in zip((pair.a, pair.b), pair.markers, strict=True):
             at[link].append(np.asarray(marker.point))
-    lengths = [float(np.linalg.norm(a - b)) for points in at.values() for a, b in combinations(points, 2)]
-    longest = max(lengths, default=0.0)
+    lengths = np.array([np.linalg.norm(a - b) for points in at.values() for a, b in combinations(points, 2)])
     # elements nearer to each other, as part of the longest distance, are at one place
-    shortest = min((length for length in lengths if length > 1e-9 * longest), default=np.nan)
-    return longest, longest / shortest
+    return lengths[lengths > 1e-9 * lengths.max(initial=0.0)]
+
+
+def sizes(m: Mechanism) -> tuple[float, float]:
+    """The largest of all distances, and its ratio to the least one; NaN where there are none."""
+    lengths = distances(m)
+    longest = float(lengths.max(initial=0.0))
+    return longest, longest / float(lengths.min(initial=np.inf)) if lengths.size else np.nan

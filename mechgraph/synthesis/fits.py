@@ -11,7 +11,7 @@ sign at a row is refused, and of what is found the path follower of ``solve`` ha
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -346,22 +346,25 @@ def fitted(
     limits: Sequence[Limit] = (),
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
+    exact: Iterable[Array] = (),
 ) -> Fitted:
-    """The optima to which ``starts`` dimensions lead: the declared ones, random ones about these.
+    """The optima to which dimensions lead: the declared ones, those that do parts of the task exactly, and up to ``starts`` random ones.
 
+    ``exact`` are values of all names.
     ``way``, ``goal`` and ``limits`` are those of ``constrained``. All starts are followed a few steps, the best of them to the end.
     """
     low, high = fit.limits(bounds)
     rng, u = np.random.default_rng(seed), len(fit.z0)
     box = np.where(np.isfinite(low[:u]), low[:u], fit.z0 - 0.5), np.where(np.isfinite(high[:u]), high[:u], fit.z0 + 0.5)
     begun: list[FitPoint] = []
-    for tried in range(1, starts + 1):
-        z = fit.z0 if tried == 1 else rng.uniform(*box)
+    told = [fit.p.inside(values[:, None])[:, 0] for values in exact]
+    tries = [fit.z0, *told, *(rng.uniform(*box) for _ in range(starts - 1 - len(told)))]
+    for tried, z in enumerate(tries, 1):
         here = fit.begun(np.clip(z, low[:u], high[:u]))
         if here is not None:
             begun.append(least_squares(fit, here, low, high, 12))
         if progress is not None:
-            progress(f"start {tried} of {starts}")
+            progress(f"start {tried} of {len(tries)}")
     if not begun and (evolved := _evolved(fit, *box, seed)) is not None:
         begun.append(evolved)
     order = sorted(range(len(begun)), key=lambda i: _size(fit, begun[i]))
@@ -398,9 +401,11 @@ def fitted(
             kept.append(here)
     same = sum(abs(value(here) - value(ends[0])) <= 1e-4 * abs(value(ends[0])) + 1e-12 for here in ends) if ends else 0
     words = [
-        f"{counted(len(begun), 'start')} of {starts} led to all rows; the best {min(4, len(begun))} were followed to the end, "
+        f"{counted(len(begun), 'start')} of {len(tries)} led to all rows; the best {min(4, len(begun))} were followed to the end, "
         f"{same} of them to the best one."
     ]
+    if told:
+        words.append(f"{counted(len(told), 'start')} of these do a part of the positions exactly.")
     if unsafe + lost:
         words.append(
             f"Left out: {unsafe} of which the path does not lead through all rows, {lost} without an end within the limits."
@@ -572,17 +577,18 @@ class _RowCourse:
         return np.eye(len(w))[-1] - (self.squares_slope(w) if self.goal is None else self.slopes(self.goal, w))
 
     def slopes(self, f: Callable[[FitPoint], Array], w: Array) -> Array:
-        """Forward differences of numbers that have no exact derivatives."""
+        """Central differences of numbers that have no exact derivatives; of one side where the rows come to that one alone."""
         here = self.trials.kept = self.point(w)
-        v, base, step, u = self.fit.vector(here), f(here), 1e-6, len(here.z)
+        v, base, step, u = self.fit.vector(here), f(here), 1e-5, len(here.z)
         out = np.zeros((len(base), len(v)))
         # one number a row: it changes with the driver of its own row alone, so that all drivers are moved at once
         row, _ = np.nonzero(self.fit.open)
         alone = len(base) == self.fit.rows
         ways = [np.eye(len(v))[k] for k in range(u if alone else len(v))]
         for k, way in enumerate([*ways, np.arange(len(v)) >= u] if alone and row.size else ways):
-            ahead, came = self.fit.moved(here, *self.fit.parts(v + step * way))
-            slope = (f(ahead) - base) / step if came else np.zeros(len(base))
+            sides = [self.fit.moved(here, *self.fit.parts(v + side * way)) for side in (step, -step)]
+            a, b = (f(there) if came else base for there, came in sides)
+            slope = (a - b) / (step * max(1, sum(came for _, came in sides)))
             if k < len(ways):
                 out[:, k] = slope
             else:

@@ -165,7 +165,7 @@ PACKED = Path(__file__).with_name("start-sets.npz")
 """Start sets that come with the package, names are ``key/array``; made by ``tests/benchmarks/make_task_starts.py``."""
 
 
-def _kept(of: TaskClass) -> TaskStart | None:
+def kept(of: TaskClass) -> TaskStart | None:
     """The start set of a class that is kept by the user, or else came with the package, where there is one and it is closed."""
     key = key_of(of)
     return _read(of, cache_folder() / f"task-{key}.npz", "") or _read(of, PACKED, f"{key}/")
@@ -267,7 +267,7 @@ def _account(of: TaskClass, known: TaskEnds, run: TrackRun, lost_before: int) ->
 
 def start_of(of: TaskClass, rng: np.random.Generator, cache: bool, progress: Progress) -> TaskStart:
     """The start set of a class: a kept one, or else one that is made, and kept where it is whole."""
-    known = _kept(of) if cache else None
+    known = kept(of) if cache else None
     if known is not None:
         return known
     made = start_set(of, rng, progress)

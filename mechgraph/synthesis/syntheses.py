@@ -23,7 +23,7 @@ from mechgraph.synthesis.answers import ComplexSyntheses, Degenerate, Fitnesses,
 from mechgraph.synthesis.classes import ClassMember, NoClass, TaskClass
 from mechgraph.synthesis.fitness import Fitness, Measure, fitness, limits_of
 from mechgraph.synthesis.fits import Fit, FitPoint, Fitted, fitted
-from mechgraph.synthesis.solve import Progress, TaskEnds, TaskStart, ends, real_states, start_of
+from mechgraph.synthesis.solve import Progress, TaskEnds, TaskStart, ends, kept, real_states, start_of
 from mechgraph.synthesis.structures import WHERE, structures
 from mechgraph.synthesis.symmetries import orbits, symmetries
 from mechgraph.synthesis.system import RowNumbers, RowProblem
@@ -36,22 +36,16 @@ class Synthesis:
 
     def __init__(
         self,
-        m: Mechanism,
+        problem: RowProblem,
         tasks: Any,
-        unknown: Sequence[str],
         sweep: Mapping[str, Any],
         seed: int,
         cache: bool,
         progress: Progress,
     ) -> None:
-        self.problem, self.rng, self.cache, self.progress = (
-            RowProblem(m, tasks, unknown),
-            np.random.default_rng(seed),
-            cache,
-            progress,
-        )
+        self.problem, self.rng, self.cache, self.progress = problem, np.random.default_rng(seed), cache, progress
         self.tasks = tasks
-        p, faults = self.problem, []
+        p, m, faults = problem, problem.m, list[str]()
         faults += [
             f"unknown {name!r}: is no component of a point, an axis or a second direction" for name in p.unknowns.others
         ]
@@ -291,6 +285,31 @@ def driver_of(m: Mechanism, tasks: Any) -> tuple[str | None, str | None]:
     return (names[0], None) if len(names) == 1 else (None, None)
 
 
+def subset_values(problem: RowProblem, tasks: Any, subsets: int, seed: int, cache: bool) -> Array:
+    """Values ``(n, names)`` of all real solutions of so many subsets of rows with as many conditions as unknowns.
+
+    None where no start set of such tasks is kept or came with the package: to make one takes longer than a fit.
+    """
+    rng, given = np.random.default_rng(seed), ~np.isnan(problem.asked)
+    alike = 1 + np.flatnonzero((given[1:] == given[1]).all(axis=1))
+    try:
+        each = int(TaskClass(problem.with_rows(np.array([0, alike[0]])), rng).conditions.sum())
+        R = problem.u // max(each, 1)
+        if not 0 < R < len(alike) or R * each != problem.u or not problem.closed_at_start:
+            raise NoClass
+        of = Synthesis(problem.with_rows(np.append(0, alike[:R])), tasks, {}, seed, cache, None).of
+    except (NoClass, DeclarationError):
+        return np.zeros((0, len(problem.unknowns.names)))
+    if not cache or (start := kept(of)) is None:
+        return np.zeros((0, len(problem.unknowns.names)))
+    picks = np.unique([np.sort(rng.choice(alike, R, replace=False)) for _ in range(subsets)], axis=0)
+    drive = np.moveaxis(problem.asked[picks], 0, -1).astype(complex)
+    goals = ClassMember(problem.numbers.taken(np.zeros(len(picks), dtype=np.intp)), np.nan_to_num(drive))
+    found = ends(of, start, goals, rng, None)
+    real = [real_states(of, goals.taken(np.array([i])), one.x)[0] for i, one in enumerate(found)]
+    return problem.outside(np.concatenate(real, axis=1)[: of.u]).T
+
+
 class FittedSynthesis:
     """What a fit asks, and its answers."""
 
@@ -306,10 +325,12 @@ class FittedSynthesis:
         m = p.first.back(p.unknowns.mechanism(p.outside(here.z[:, None])[:, 0]))
         return m.replace(start=dict(zip(m.freedom_names(), q[0].tolist(), strict=True))), q
 
-    def measured(self, what: Any, sign: float = 1.0, none: float = 1e3) -> Callable[[FitPoint], Array]:
-        """A quantity of fitted rows, times a sign; ``none`` where it has no value."""
+    def measured(
+        self, what: Any, sign: float = 1.0, none: float = 1e3, most: bool = True
+    ) -> Callable[[FitPoint], Array]:
+        """A quantity of fitted rows, times a sign; ``none`` where it has no value. ``most``: that must not be large."""
         measure = what if isinstance(what, Measure) else Measure(self.problem.m, what, self.over)
-        return lambda here: np.nan_to_num(sign * measure(*self.rows(here), self.driver), nan=none)
+        return lambda here: np.nan_to_num(sign * measure(*self.rows(here), self.driver, most and sign > 0), nan=none)
 
     def answer(self, found: Fitted) -> Syntheses:
         """The optima found, the best first."""
@@ -389,7 +410,8 @@ def synthesize(
     over : mapping, optional
         Driver -> values at which conditions hold, in place of the positions.
     starts : int
-        From how many dimensions a fit begins: the declared ones, then random ones about these or in ``bounds``.
+        From how many dimensions a fit begins: the declared ones; all real exact solutions of so many subsets of the positions, where a
+        start set of such tasks came with the package or is kept; then random ones about the declared ones or in ``bounds``.
     seed : int
         Seed of all random numbers; exact results of a mechanism do not depend on it.
     cache : bool
@@ -455,8 +477,10 @@ def synthesize(
     if faults:
         raise DeclarationError(where, faults)
     if fitting:
-        return _fitted(m, tasks, unknown, fit, within, limits, goals, require, over, int(starts), int(seed), progress)
-    found = Synthesis(m, tasks, unknown, dict(sweep or {}), int(seed), cache, progress)
+        return _fitted(
+            m, tasks, unknown, fit, within, limits, goals, require, over, int(starts), int(seed), cache, progress
+        )
+    found = Synthesis(RowProblem(m, tasks, unknown), tasks, dict(sweep or {}), int(seed), cache, progress)
     _refuse_other_names(found.problem, within)
     driver, _ = driver_of(m, tasks)
     answers = [one._kept(require, within, limits, driver) for one in found.answers()]
@@ -532,14 +556,17 @@ def _fitted(
     over: Any,
     starts: int,
     seed: int,
+    cache: bool,
     progress: Progress,
 ) -> Syntheses:
     """What comes nearest to what is asked, or meets it and is best in something else."""
+    exact = subset_values(RowProblem(m, tasks, unknown), tasks, starts, seed, cache) if fit else ()
     of = FittedSynthesis(m, tasks, unknown, bounds, over)
     _refuse_other_names(of.problem, bounds)
     goal = of.measured(*goals[0]) if goals else None
-    ends = [
-        (of.measured(measure, none=1e3 if least is None else -1e3), least, most) for _, measure, least, most in limits
+    limited = [
+        (of.measured(measure, none=1e3 if least is None else -1e3, most=least is None), least, most)
+        for _, measure, least, most in limits
     ]
-    found = fitted(of.fit, fit, starts, bounds, goal, ends, seed, progress)
+    found = fitted(of.fit, fit, starts, bounds, goal, limited, seed, progress, exact)
     return of.answer(found)._kept(require, bounds, limits, of.driver)

@@ -9,6 +9,7 @@ The Jacobian is an arrow: a block ``F_q`` per row and a border ``F_z`` of u colu
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -211,6 +212,13 @@ class RowProblem:
         self.closed_at_start = all(pair.on_a is None and pair.contact is None for pair in m.pairs)
         self.rows: Index = np.arange(1 if self.closed_at_start else 0, self.tasks.rows)
         self._read_declared_row()
+
+    def with_rows(self, rows: Index) -> RowProblem:
+        """The same of some rows, the declared one first."""
+        out = copy(self)
+        out.asked = self.asked[rows]
+        out.rows = np.arange(1 if self.closed_at_start else 0, len(rows))
+        return out
 
     def _user_name(self, name: str) -> str:
         """The name by which a coordinate of a free pair was asked."""
