@@ -17,6 +17,7 @@ Name = Literal[
     "draw_assemblies",
     "draw_branches",
     "draw_syntheses",
+    "draw_syntheses_over",
     "film_of",
     "cutter_path",
     "write_curve",

@@ -97,6 +97,9 @@ def test_centre_points_of_four_poses_lie_on_one_cubic() -> None:
     terms = np.array([x**i * y**j for i in range(4) for j in range(4 - i)]).T
     sigma = np.linalg.svd(terms / np.abs(terms).max(axis=0), compute_uv=False)
     assert sigma[-1] < 1e-5 * sigma[-2]
+    drawn = {line.get_label(): line.get_xydata() for line in s.plot().lines}
+    assert np.array_equal(drawn["A: center points"], np.column_stack([x, y]))
+    assert set(drawn) == {"A: center points", "B: circle points"}
 
 
 def test_counts_are_said_before_anything_is_solved() -> None:

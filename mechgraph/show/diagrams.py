@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import chain, combinations, pairwise
+from itertools import chain, combinations, cycle, pairwise
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -40,7 +40,7 @@ from mechgraph.show.curves import Abscissa, lay_out
 from mechgraph.show.skeleton import draw_skeleton
 
 if TYPE_CHECKING:
-    from mechgraph.synthesis.answers import Syntheses
+    from mechgraph.synthesis.answers import Syntheses, SynthesesOver
 from mechgraph.variants.study import Study
 
 LETTER, CLEARED = (0.045, 0.11), 1.3
@@ -809,6 +809,32 @@ def draw_syntheses(found: Syntheses) -> Any:
         for m, fit in zip(found, found.fitness, strict=True)
     ]
     return _side_by_side(found.mechanism, drawn, "there is no mechanism to draw")
+
+
+def draw_syntheses_over(found: SynthesesOver, *, ax: Any = None) -> Any:
+    """Places of the pairs that are sought or swept, of all mechanisms: those at the frame (center points) filled, the moving ones (circle
+    points, at the first position) as rings. The axes.
+
+    Raises
+    ------
+    DeclarationError
+        where there is no real mechanism, or no point is sought.
+    """
+    m, every = found[0].mechanism, [one for s in found for one in s]
+    names = {name.rpartition(".")[0] for s in found for name in s.unknown}
+    pairs = [pair for pair in m.pairs if f"{pair.name}.point" in names]
+    if not every or not pairs:
+        raise DeclarationError(f"picture of {m.name!r}", ["there is no mechanism to draw, or no point is sought"])
+    ax = new_axes((7.0, 5.5), projection=None if m.planar else "3d") if ax is None else ax
+    for colour, pair in zip(cycle(PALETTE), pairs):
+        places = np.array([one.pair(pair.name).point for one in every]).T[: 2 if m.planar else 3]
+        fixed = m.frame in (pair.a, pair.b)
+        name = f"{pair.name}: {'center' if fixed else 'circle'} points"
+        ax.plot(*places, ls="", marker="o", ms=4, color=colour, mfc=colour if fixed else "none", label=said(name))
+    plain(ax)
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.legend(frameon=False)
+    return ax
 
 
 def _side_by_side(m: Mechanism, drawn: Sequence[tuple[Mechanism, str]], none: str) -> Any:

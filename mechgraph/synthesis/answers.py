@@ -447,6 +447,21 @@ class SynthesesOver(Shown, Sequence[Syntheses]):
         """The weakest of all."""
         return weakest(s.completeness for s in self.positions)
 
+    def plot(self) -> Any:
+        """Draw where the pairs that are sought or swept stand: center points at the frame, circle points (at row 0) of moving pairs.
+
+        Returns
+        -------
+        Axes
+            Of matplotlib.
+
+        Raises
+        ------
+        MissingExtraError
+            Without matplotlib.
+        """
+        return methods.call("draw_syntheses_over", self)
+
     def document(self) -> Document:
         """How many mechanisms there are for every value."""
         rows = tuple(
