@@ -174,7 +174,7 @@ def __getattr__(name: str) -> Any:
             from mechgraph.result import free_body as home
         case "OverTime" | "film_of" | "over_time":
             from mechgraph.result import over_time as home
-        case "draw_assemblies" | "draw_branches" | "draw_syntheses" | "draw_syntheses_over":
+        case "draw_branches" | "draw_points" | "draw_side_by_side":
             from mechgraph.show import diagrams as home
         case "view" | "write_report":
             from mechgraph.show.page import write as home

@@ -19,9 +19,8 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.errors import DeclarationError
+from mechgraph.errors import DeclarationError, ShapeError
 from mechgraph.maths.se3 import Array
-from mechgraph.maths.tolerances import SHAPES
 from mechgraph.quantities import (
     LENGTH,
     PURE,
@@ -109,13 +108,6 @@ def cosine(one: Sequence[float], other: Sequence[float]) -> float:
     """Of the angle between two directions."""
     along = sum(a * b for a, b in zip(one, other, strict=True))
     return along / (math.hypot(*one) * math.hypot(*other))
-
-
-def parallel_faults(axis: Sequence[float], second: Sequence[float], where: str) -> list[str]:
-    """A second direction that has no part at right angles to its axis, one line or none."""
-    if abs(cosine(axis, second)) <= 1 - SHAPES.parallel:
-        return []
-    return [f"{where}second = {second!r}: parallel to the axis {axis!r}; give another direction"]
 
 
 def number_fault(value: Any, what: str, *, minimum: float | None = None) -> str | None:
@@ -538,6 +530,96 @@ def _moved_points(value: Any, pose: Array) -> Any:
 
 def _function_fault(value: Any, what: str, minimum: float | None) -> str | None:
     return None if callable(value) else wrong(value, what, "a function")
+
+
+BESIDE = 0.5 * (3.0 - np.sqrt(5.0))
+"""Where in an interval slopes are taken, a part of it that is no ratio of whole numbers, as places where a shape changes are."""
+
+
+def asked(function: Callable[..., Any], at: Sequence[Array], least: int, most: int) -> Array:
+    """Position and derivatives ``(most, 3, n)`` at parameters ``(n,)`` each; zeros for those that may be left out, beyond ``least``.
+
+    Raises
+    ------
+    ShapeError
+        where the function raises (its cause), or returns anything but ``least`` or more finite arrays ``(3, n)``.
+    """
+    if not at[0].size:  # as where all positions are interpolated beside a change point; what reduces nothing raises
+        return np.zeros((most, 3, 0))
+    found = _asked(function, at, least, most)
+    if isinstance(found, np.ndarray):
+        return found
+    first = next((i for i in range(at[0].size) if not _fits(function, [u[i : i + 1] for u in at], least, most)), None)
+    where = "; each of the values alone does" if first is None else f" at {_named([u[first] for u in at])}"
+    text, cause = found
+    raise ShapeError(f"position: {text}{where}") from cause
+
+
+def _asked(
+    function: Callable[..., Any], at: Sequence[Array], least: int, most: int
+) -> Array | tuple[str, Exception | None]:
+    """The arrays, or what is wrong with them and what was raised."""
+    shape = (3, at[0].size)
+    try:
+        given = list(function(*at))[:most]
+        parts = [np.asarray(part, dtype=float) for part in given]
+    except Exception as error:
+        return f"raised {type(error).__name__}: {error}", error
+    wrong = next((part.shape for part in parts if part.shape not in (shape, (3, 1))), None)
+    if wrong is not None or len(parts) < least:
+        got = f"{len(parts)} arrays" if wrong is None else f"an array {wrong}"
+        return f"returned {got}, expected {least} arrays (3, n), here {shape}", None
+    out = np.zeros((most, *shape))
+    for own, part in zip(out, parts, strict=False):
+        own[:] = part
+    return out if np.isfinite(out).all() else ("returned a number that is not finite", None)
+
+
+def _fits(function: Callable[..., Any], at: Sequence[Array], least: int, most: int) -> bool:
+    return isinstance(_asked(function, at, least, most), np.ndarray)
+
+
+def _named(values: Sequence[float]) -> str:
+    return ", ".join(f"{name} = {value:.6g}" for name, value in zip("uv", values, strict=False))
+
+
+def between(grid: Array) -> Array:
+    """Parameters ``(n,)`` in the intervals of a grid ``(n + 1,)`` at which slopes are taken."""
+    return np.asarray(grid[:-1] + BESIDE * np.diff(grid))
+
+
+def slope_faults(
+    ask: Callable[..., Array],
+    at: Sequence[Array],
+    steps: Sequence[tuple[int, int, int]],
+    words: Sequence[str],
+    where: str,
+    room: Array | float = np.inf,
+) -> list[str]:
+    """Derivatives that are not the slopes of what they belong to.
+
+    ``at``: parameters ``(n,)`` each, as from ``between``; of ``steps`` each is a derivative, what it is derived from, and the parameter by
+    which: numbers of what ``ask`` returns ``(orders, 3, n)``, called as in ``words``. Slopes are taken over shorter and shorter steps,
+    none longer than the ``room``: that over one of them fits a true derivative, however fast it changes.
+    """
+    found, known = [], ask(*at)
+    for high, low, by in steps:
+        extent = float(np.ptp(at[by]))
+        most = 1e-3 * np.abs(known[[low, high]]).max() / min(1.0, extent)
+        miss = np.full(at[by].shape, np.inf)
+        for part in (1e-4, 1e-5, 1e-6):
+            h = np.minimum(part * extent, room)
+            ahead, back = (ask(*(u + sign * h * (i == by) for i, u in enumerate(at)))[low] for sign in (1.0, -1.0))
+            miss = np.minimum(miss, np.abs((ahead - back) / (2 * h) - known[high]).max(axis=0))
+            if miss.max() <= most:
+                break
+        else:
+            worst = int(np.argmax(miss))
+            at_worst = _named([u[worst] for u in at])
+            found.append(
+                f"{where}position: {words[high]} differs from the slope of {words[low]} by {miss[worst]:.3g} at {at_worst}"
+            )
+    return found
 
 
 @dataclass(frozen=True)

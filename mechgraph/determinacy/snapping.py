@@ -35,8 +35,9 @@ from mechgraph.fields import tolerance_fault
 from mechgraph.kinematics.assembly import closed_start
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
-from mechgraph.maths.linear import COMPLEX_STEP, singular_values
+from mechgraph.maths.linear import singular_values
 from mechgraph.maths.se3 import Array, Index, compose, cross, inverse, rotation_exp, rotation_log
+from mechgraph.maths.tolerances import COMPLEX_STEP
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.parameters import Declared

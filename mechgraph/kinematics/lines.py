@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 import scipy
 
-from mechgraph.maths.linear import COMPLEX_STEP
 from mechgraph.maths.se3 import Array, Index, cross, rotate
+from mechgraph.maths.tolerances import COMPLEX_STEP
 from mechgraph.model.gears import LineCoupling, LinePlaces, LinesAt, Relation
 
 

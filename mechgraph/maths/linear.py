@@ -38,9 +38,6 @@ from numpy.typing import NDArray
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import RANKS
 
-COMPLEX_STEP = 1e-30
-"""Imaginary step of a derivative, exact where all is analytic: its square is no number beside one."""
-
 Place = slice | Index
 """Places along an axis; a slice takes no copy."""
 

@@ -447,6 +447,9 @@ class ShapeTolerances:
     """What the cosine between axis and second direction lacks of one where they are parallel."""
 
 
+COMPLEX_STEP = 1e-30
+"""Imaginary step of a derivative, exact where all is analytic: its square is no number beside one."""
+
 SHAPES = ShapeTolerances()
 """Of declared things, which know no call: the same for all."""
 

@@ -20,10 +20,9 @@ from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
 
 from mechgraph.errors import DeclarationError
-from mechgraph.fields import FREEDOM_NAME, SERIES, TABLE, Described
+from mechgraph.fields import FREEDOM_NAME, SERIES, TABLE, Described, between
 from mechgraph.maths.se3 import Array
 from mechgraph.pairs.cam_laws import RISES, SCCA, Segment
-from mechgraph.pairs.given import between
 from mechgraph.quantities import LENGTH, PURE, TIME, has_quantity, real_array, shown, wrong
 
 CHEBYSHEV_POINTS = 32

@@ -25,7 +25,6 @@ from mechgraph.fields import (
     axes_of,
     cosine,
     filled_second,
-    parallel_faults,
 )
 from mechgraph.fields import TABLE as NESTED
 from mechgraph.fields import second_direction as second_direction
@@ -45,7 +44,7 @@ from mechgraph.pairs.contact_types import (
     shape_faults_of,
     surface_faults,
 )
-from mechgraph.pairs.curves import Curve
+from mechgraph.pairs.curves import Curve, parallel_faults
 from mechgraph.pairs.journal import Journal, film_faults
 from mechgraph.pairs.pair_type import TABLE, PairType
 from mechgraph.pairs.surfaces import Surface

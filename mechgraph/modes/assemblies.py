@@ -275,7 +275,8 @@ class Assemblies(Shown, Sequence[Mechanism]):
         MissingExtraError
             Without matplotlib.
         """
-        return methods.call("draw_assemblies", self)
+        drawn = [*zip(self.modes, self.kinds, strict=True), *((one.point, "continuum") for one in self.continua)]
+        return methods.call("draw_side_by_side", self.mechanism, drawn, "there is no real assembly to draw")
 
     @property
     def data(self) -> AssembliesData:

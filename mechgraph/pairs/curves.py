@@ -37,13 +37,12 @@ from mechgraph.fields import (
     TEXT,
     Described,
     axes_of,
+    cosine,
     filled_second,
-    parallel_faults,
     second_direction,
 )
-from mechgraph.maths.linear import COMPLEX_STEP
 from mechgraph.maths.se3 import Array, cross
-from mechgraph.maths.tolerances import SHAPES
+from mechgraph.maths.tolerances import COMPLEX_STEP, SHAPES
 from mechgraph.memo import Once
 from mechgraph.quantities import LENGTH, shown
 
@@ -870,6 +869,13 @@ def _guide_faults(curve: Curve, t: Array, x: Array, where: str) -> list[str]:
         f"{where}guide = {shown(curve.guide)}: is the direction of the curve at {point_text(x[:, worst])}; give another, or "
         "frame='minimizing'"
     ]
+
+
+def parallel_faults(axis: Sequence[float], second: Sequence[float], where: str) -> list[str]:
+    """A second direction that has no part at right angles to its axis, one line or none."""
+    if abs(cosine(axis, second)) <= 1 - SHAPES.parallel:
+        return []
+    return [f"{where}second = {second!r}: parallel to the axis {axis!r}; give another direction"]
 
 
 def point_text(x: Array) -> str:

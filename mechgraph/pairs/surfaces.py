@@ -25,14 +25,15 @@ from mechgraph.fields import (
     POINT_LIST,
     POSITIVE,
     Described,
+    asked,
     axes_of,
+    between,
     filled_second,
-    parallel_faults,
+    slope_faults,
 )
 from mechgraph.fields import TABLE as NESTED
 from mechgraph.maths.se3 import Array, cross
-from mechgraph.pairs.curves import Circle, Curve, Line, far_from, remade_from
-from mechgraph.pairs.given import asked, between, slope_faults
+from mechgraph.pairs.curves import Circle, Curve, Line, far_from, parallel_faults, remade_from
 from mechgraph.quantities import LENGTH, PURE, shown, wrong
 
 NO_ENDS = (-np.inf, np.inf)

@@ -12,9 +12,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mechgraph.errors import DeclarationError, ShapeError
-from mechgraph.maths.linear import COMPLEX_STEP
 from mechgraph.maths.se3 import Array, cross
-from mechgraph.maths.tolerances import SHAPES
+from mechgraph.maths.tolerances import COMPLEX_STEP, SHAPES
 from mechgraph.pairs.curves import (
     ORDERS,
     Curve,

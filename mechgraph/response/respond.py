@@ -164,6 +164,7 @@ class Response(Solution):
     (array([0. , 0.5, 1. ]), (3, 1))
     """
 
+    integrated = True
     stopped = ""
     events: tuple[Occurrence, ...] = ()
 
@@ -222,6 +223,14 @@ class Response(Solution):
         array([0.25, 0.75])
         """
         return self._course.response(t)
+
+    def finely(self) -> Response:
+        """The response at times between its outputs too, so that its paths are curves."""
+        if len(self.t) < 2:
+            return self
+        # points that the path of a response has at least
+        between = np.linspace(0.0, 1.0, max(2, -(-400 // (len(self.t) - 1)) + 1))[:-1]
+        return self.at(np.append((self.t[:-1, None] + np.diff(self.t)[:, None] * between).ravel(), self.t[-1]))
 
 
 @dataclass(frozen=True)

@@ -304,9 +304,15 @@ class Solution(Shown):
     """
 
     _wanted = "a Solution; mg.solve(mechanism) makes one"
+    integrated = False
+    """Whether the motion was found in time; then there are values at all times."""
 
     def __init__(self, values: Trajectory) -> None:
         self._values = values
+
+    def finely(self) -> Solution:
+        """The same, as its paths are drawn: a response at times between its outputs too."""
+        return self
 
     @property
     def mechanism(self) -> Mechanism:

@@ -20,7 +20,6 @@ from mechgraph.pairs import cams
 from mechgraph.pairs.cam_laws import CamLaw
 from mechgraph.pairs.journal import Journal
 from mechgraph.quantities import LENGTH, POWER, door, real_array, shown, unit_of, wrong
-from mechgraph.response.respond import Response
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import MaterialPoint
 from mechgraph.show.canvas import HATCH, INK, MUTED, PALETTE, REACTION, Axes, axis_label, new_axes, plain, said
@@ -46,7 +45,7 @@ def abscissa(s: Solution, over: str | None = None) -> Abscissa:
     m, status = s.whole, np.asarray(s.status)
     rows = (-1, status.shape[-1] if status.ndim else 1)
     if over is None:
-        timed = isinstance(s, Response) or (not s.prescribed and s.t is not None)
+        timed = s.integrated or (not s.prescribed and s.t is not None)
         still = s.prescribed[0] if s.prescribed and rows[1] == 1 else "position"
         over = "t" if timed else next((name for name in s.prescribed if _stroke(s, name) > 0), still)
     if over == "t":
@@ -746,7 +745,7 @@ def point_path(s: Solution, points: str | Iterable[str] | None = None, *, ax: Ax
     >>> s = mg.kinematics(mg.load("four-bar"), {"A": [0.0, 0.5, 1.0]})
     >>> ax = show.point_path(s, ["B", "coupler"])
     """
-    s, names = finely(s), _names(s, points)
+    s, names = s.finely(), _names(s, points)
     return _draw(s, {name: motion_of(s, name).position for name in names}, 0, ax)
 
 
@@ -793,17 +792,8 @@ def hodograph(
         raise DeclarationError(
             f"hodograph of {s.mechanism.name!r}", [f"of = {of!r}: expected 'velocity' or 'acceleration'"]
         )
-    s = finely(s)
+    s = s.finely()
     return _draw(s, {name: getattr(motion_of(s, name), of) for name in _names(s, points)}, RANK[of], ax)
-
-
-def finely(s: Solution) -> Solution:
-    """A response at times between its outputs too, so that its paths are curves."""
-    if not isinstance(s, Response) or len(s.t) < 2:
-        return s
-    # points that the path of a response has at least
-    between = np.linspace(0.0, 1.0, max(2, -(-400 // (len(s.t) - 1)) + 1))[:-1]
-    return s.at(np.append((s.t[:-1, None] + np.diff(s.t)[:, None] * between).ravel(), s.t[-1]))
 
 
 def _names(s: Solution, points: str | Iterable[str] | None) -> list[str]:

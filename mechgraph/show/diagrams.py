@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain, combinations, cycle, pairwise
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from mechgraph.graph.chains import Chain
 from mechgraph.graph.linkgraph import link_graph
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.modes.assemblies import Assemblies
 from mechgraph.modes.branches import Branch, Branches
 from mechgraph.quantities import Count, door, unit_of, wrong
 from mechgraph.show.canvas import (
@@ -38,9 +37,6 @@ from mechgraph.show.canvas import (
 )
 from mechgraph.show.curves import Abscissa, lay_out
 from mechgraph.show.skeleton import draw_skeleton
-
-if TYPE_CHECKING:
-    from mechgraph.synthesis.answers import Syntheses, SynthesesOver
 from mechgraph.variants.study import Study
 
 LETTER, CLEARED = (0.045, 0.11), 1.3
@@ -784,61 +780,14 @@ def _driver(study: Study, over: str | None, count: int) -> Abscissa:
     return Abscissa(rows[name][None], axis_label(name, unit_of(m.units, (1, 0, 0))))
 
 
-def draw_assemblies(modes: Assemblies) -> Any:
-    """The skeletons of all assemblies side by side, numbered, then a point of every continuum; the figure.
+def draw_side_by_side(m: Mechanism, drawn: Sequence[tuple[Mechanism, str]], none: str) -> Any:
+    """Skeletons of mechanisms like ``m``, numbered, and what is said of each; the figure.
 
     Raises
     ------
     DeclarationError
-        where there is none.
+        where there are ``none``.
     """
-    drawn = [*zip(modes.modes, modes.kinds, strict=True), *((one.point, "continuum") for one in modes.continua)]
-    return _side_by_side(modes.mechanism, drawn, "there is no real assembly to draw")
-
-
-def draw_syntheses(found: Syntheses) -> Any:
-    """The skeletons of all mechanisms found side by side, numbered, with their worst transmission angles; the figure.
-
-    Raises
-    ------
-    DeclarationError
-        where there is none.
-    """
-    drawn = [
-        (m, f"{'good' if fit.good else 'defect'}, {np.rad2deg(fit.transmission):.3g} deg")
-        for m, fit in zip(found, found.fitness, strict=True)
-    ]
-    return _side_by_side(found.mechanism, drawn, "there is no mechanism to draw")
-
-
-def draw_syntheses_over(found: SynthesesOver, *, ax: Any = None) -> Any:
-    """Places of the pairs that are sought or swept, of all mechanisms: those at the frame (center points) filled, the moving ones (circle
-    points, at the first position) as rings. The axes.
-
-    Raises
-    ------
-    DeclarationError
-        where there is no real mechanism, or no point is sought.
-    """
-    m, every = found[0].mechanism, [one for s in found for one in s]
-    names = {name.rpartition(".")[0] for s in found for name in s.unknown}
-    pairs = [pair for pair in m.pairs if f"{pair.name}.point" in names]
-    if not every or not pairs:
-        raise DeclarationError(f"picture of {m.name!r}", ["there is no mechanism to draw, or no point is sought"])
-    ax = new_axes((7.0, 5.5), projection=None if m.planar else "3d") if ax is None else ax
-    for colour, pair in zip(cycle(PALETTE), pairs):
-        places = np.array([one.pair(pair.name).point for one in every]).T[: 2 if m.planar else 3]
-        fixed = m.frame in (pair.a, pair.b)
-        name = f"{pair.name}: {'center' if fixed else 'circle'} points"
-        ax.plot(*places, ls="", marker="o", ms=4, color=colour, mfc=colour if fixed else "none", label=said(name))
-    plain(ax)
-    ax.set_aspect("equal", adjustable="datalim")
-    ax.legend(frameon=False)
-    return ax
-
-
-def _side_by_side(m: Mechanism, drawn: Sequence[tuple[Mechanism, str]], none: str) -> Any:
-    """Skeletons of mechanisms like ``m``, numbered, and what is said of each."""
     if not drawn:
         raise DeclarationError(f"picture of {m.name!r}", [none])
     # most drawn side by side
@@ -855,6 +804,32 @@ def _side_by_side(m: Mechanism, drawn: Sequence[tuple[Mechanism, str]], none: st
         draw_skeleton(mode, ax=ax)
         ax.set_title(f"{i} ({kind})", fontsize=9)
     return figure
+
+
+def draw_points(mechanisms: Sequence[Mechanism], names: Iterable[str], *, ax: Any = None) -> Any:
+    """Places of the pairs ``names`` of all mechanisms: those at the frame (center points) filled, the moving ones (circle points) as
+    rings. The axes.
+
+    Raises
+    ------
+    DeclarationError
+        where there is no mechanism, or no such pair.
+    """
+    names = set(names)
+    pairs = [pair for m in mechanisms[:1] for pair in m.pairs if pair.name in names]
+    if not pairs:
+        raise DeclarationError("picture of points", ["there is no mechanism to draw, or no point is sought"])
+    m = mechanisms[0]
+    ax = new_axes((7.0, 5.5), projection=None if m.planar else "3d") if ax is None else ax
+    for colour, pair in zip(cycle(PALETTE), pairs):
+        places = np.array([one.pair(pair.name).point for one in mechanisms]).T[: 2 if m.planar else 3]
+        fixed = m.frame in (pair.a, pair.b)
+        name = f"{pair.name}: {'center' if fixed else 'circle'} points"
+        ax.plot(*places, ls="", marker="o", ms=4, color=colour, mfc=colour if fixed else "none", label=said(name))
+    plain(ax)
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.legend(frameon=False)
+    return ax
 
 
 def draw_branches(b: Branches, output: str | None = None, *, ax: Any = None, current: int | None = None) -> Any:

@@ -17,7 +17,6 @@ from mechgraph.files import Format, format_of, optional, whole_file, writable
 from mechgraph.maths.se3 import Array
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import Positive, door, shown, unit_of, wrong
-from mechgraph.response.respond import Response
 from mechgraph.result.solution import Solution
 from mechgraph.show.canvas import (
     DRAWN,
@@ -42,7 +41,6 @@ from mechgraph.show.canvas import (
     shaded,
     tint,
 )
-from mechgraph.show.curves import finely
 from mechgraph.show.scene import DrawnPart, Scene, scene
 
 BODY = "#f2f4f7"
@@ -168,7 +166,7 @@ def traceable(found: Scene) -> dict[str, tuple[str, Array]]:
 
 def course_of(s: Solution | Mechanism, found: Scene, traces: bool | Sequence[str]) -> Scene:
     """The scene whose positions paths run through: of a response that at times between its outputs too."""
-    return scene(finely(s)) if isinstance(s, Response) and traces else found
+    return scene(s.finely()) if isinstance(s, Solution) and s.integrated and traces else found
 
 
 def _pieces(course: Scene, path: Array) -> list[Array]:

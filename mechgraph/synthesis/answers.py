@@ -361,7 +361,11 @@ class Syntheses(Shown, Sequence[Mechanism]):
         MissingExtraError
             Without matplotlib.
         """
-        return methods.call("draw_syntheses", self)
+        drawn = [
+            (m, f"{'good' if fit.good else 'defect'}, {np.rad2deg(fit.transmission):.3g} deg")
+            for m, fit in zip(self, self.fitness, strict=True)
+        ]
+        return methods.call("draw_side_by_side", self.mechanism, drawn, "there is no mechanism to draw")
 
     def document(self) -> Document:
         """A table of the mechanisms, and how sure it is that these are all."""
@@ -460,7 +464,9 @@ class SynthesesOver(Shown, Sequence[Syntheses]):
         MissingExtraError
             Without matplotlib.
         """
-        return methods.call("draw_syntheses_over", self)
+        fields = {name.rpartition(".")[0] for found in self for name in found.unknown}
+        names = [field.removesuffix(".point") for field in sorted(fields) if field.endswith(".point")]
+        return methods.call("draw_points", [m for found in self for m in found], names)
 
     def document(self) -> Document:
         """How many mechanisms there are for every value."""
