@@ -435,7 +435,8 @@ def _whole_numbers(tables: Tabled) -> Iterator[str]:
     pairs, factors, columns, _, loops, steps, couplings, terms, drives, unknowns, loads = known[2:13]
     passives, moved = known[16:18]
     parts = [
-        ("counts", len(COUNTS)), ("first factor of every pair", pairs + 1), ("kinds of factors", factors), ("their first columns", factors + 1),
+        ("counts", len(COUNTS)), ("first factor of every pair", pairs + 1), ("kinds of factors", factors),
+        ("their first columns", factors + 1),
         ("their first state numbers", factors), ("their places among the factor numbers", factors),
         ("links a and b of pairs", 2 * pairs),        ("tree: pair, from a to b, parent, child", 4 * (pairs - loops)),
         ("chords", loops), ("loops: first steps", loops + 1),
