@@ -20,7 +20,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -315,11 +315,7 @@ class Curve(Described, Once):
 
 def remade_from(shape: Any) -> tuple[Any, tuple[Any, ...]]:
     """How a shape is copied and pickled: from its fields alone."""
-    return _remade, (type(shape), {f.name: getattr(shape, f.name) for f in fields(shape)})
-
-
-def _remade(kind: Callable[..., Any], values: dict[str, Any]) -> Any:
-    return kind(**values)
+    return partial(type(shape), **{f.name: getattr(shape, f.name) for f in fields(shape)}), ()
 
 
 def turned(R: Array, v: Array) -> Array:
