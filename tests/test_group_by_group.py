@@ -48,6 +48,7 @@ def test_group_by_group_is_all_at_once(seed: int) -> None:
         )
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("kind", LATTICES)
 def test_large_ones_group_by_group(kind: str) -> None:
     """Blocks of a few rows each, as many as there are loops; the reactions are those of the dense engine."""

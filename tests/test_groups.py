@@ -71,6 +71,7 @@ def random_mechanism(seed: int) -> mg.Mechanism:
     return b.mechanism(f"random {seed}")
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("seed", range(8))
 def test_groups_compose_to_the_whole(seed: int) -> None:
     """Links and pairs add up for every driver, ranks of the groups to the rank of the whole; each hangs on links before it only."""

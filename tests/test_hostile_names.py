@@ -55,7 +55,7 @@ class Tags(HTMLParser):
         }
 
 
-@pytest.mark.daily(14)
+@pytest.mark.daily(5)
 @pytest.mark.parametrize("name", NAMES)
 def test_documents(name: str) -> None:
     m = named(name)
@@ -80,6 +80,7 @@ def test_documents(name: str) -> None:
     assert not HIDDEN.search(mg.check(m).to_json())
 
 
+@pytest.mark.daily(7)
 @pytest.mark.parametrize("name", NAMES)
 def test_tables(name: str, tmp_path: Path) -> None:
     m = named(name)
@@ -93,6 +94,7 @@ def test_tables(name: str, tmp_path: Path) -> None:
             assert not value.startswith(("=", "+", "-", "@")) or np.isfinite(float(value))
 
 
+@pytest.mark.daily(7)
 @pytest.mark.parametrize("name", NAMES)
 def test_errors_and_files(name: str, tmp_path: Path) -> None:
     m = named(name)

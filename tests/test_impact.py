@@ -107,6 +107,7 @@ def four_bar(planar):
     return mg.Mechanism("four-bar", links, pairs, planar=planar)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("planar", [False, True])
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
 def test_a_linkage_strikes_a_wall(planar, e):
@@ -162,6 +163,7 @@ def law(angle, mu, sense, w):
     return LENGTH * s * w * w - G, 1 + 3 * c * (c + sense * mu * s)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("sense", [1, -1])
 @pytest.mark.parametrize(("angle", "mu", "w"), [(0.6, 0.3, 0.0), (1.0, 1.2, 1.5), (1.4, 1.3, -2.0)])
 def test_a_sliding_rod_has_one_normal_force(angle, mu, sense, w):

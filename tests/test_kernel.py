@@ -78,6 +78,7 @@ SERVED = {
 """Members of the library with every kind of pair of constant screws, planar, spatial, overconstrained, of two loops."""
 
 
+@pytest.mark.daily(6)
 @pytest.mark.parametrize("name", sorted(SERVED))
 def test_library(name):
     m = mg.load(name)
@@ -126,6 +127,7 @@ def test_integer_geometry_beside_change_points(side):
     assert agreed(m, {"A": np.linspace(0.0, 2.5, 4)}) == "dense"
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("margin", [1e-1, 1e-3, 1e-6])
 @pytest.mark.parametrize("seed", range(3))
 def test_branches_are_kept_where_they_come_near(seed, margin):

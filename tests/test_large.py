@@ -148,6 +148,7 @@ def test_rates_of_a_chain_of_scissors() -> None:
         assert_allclose(np.abs(s[f"J{3 * i}"].velocity), 1.0, rtol=1e-9)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("name", LATTICES)
 def test_verdicts_are_those_of_the_dense_check(name: str) -> None:
     """NaN in a solution exactly where the report says that a component is not unique."""
@@ -216,6 +217,7 @@ def test_passive_freedoms_are_the_same_on_both_engines() -> None:
         assert_allclose(np.abs(sparse.passive_effort[name]), np.abs(effort), atol=1e-9)
 
 
+@pytest.mark.daily(6)
 @pytest.mark.parametrize("name", FEW)
 def test_a_bordered_system_proves_the_rank(name: str) -> None:
     system, x = assembled(FEW[name]())

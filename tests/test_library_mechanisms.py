@@ -75,6 +75,7 @@ def test_what_cannot_close_says_so() -> None:
     assert set(caught.value.best) == set(m.freedom_names())
 
 
+@pytest.mark.daily(13)
 @pytest.mark.parametrize("name", MOVING)
 def test_the_stored_sweep_can_be_followed(name: str) -> None:
     s = mg.kinematics(mg.load(name))
@@ -83,6 +84,7 @@ def test_the_stored_sweep_can_be_followed(name: str) -> None:
     assert s.checks.accuracy.max() < 1e-9
 
 
+@pytest.mark.daily(9)
 @pytest.mark.parametrize("name", [n for n in MOVING if mg.load(n).expected["full_cycle"]])
 def test_a_full_cycle_ends_where_it_began(name: str) -> None:
     m = mg.load(name)
@@ -108,6 +110,7 @@ def test_locked_freedoms_of_pphchp_stand_still_in_finite_motion() -> None:
     assert ranges["O4.Tz"] > 0.01
 
 
+@pytest.mark.daily(13)
 @pytest.mark.parametrize("name", MOVING)
 def test_the_stored_motion_can_be_solved(name: str) -> None:
     m = mg.load(name)

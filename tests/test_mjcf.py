@@ -130,6 +130,7 @@ def test_a_mechanism_comes_back_with_its_mobility_closure_and_masses(tmp_path, n
         assert r.link(v.name).acceleration == pytest.approx(s.link(v.name).acceleration, abs=1e-7)
 
 
+@pytest.mark.daily(10)
 @pytest.mark.parametrize("ends", [("frame", "body"), ("body", "frame")], ids=["a-b", "b-a"])
 @pytest.mark.parametrize("symbol", mg.pair_types())
 def test_every_pair_of_the_table_is_written_in_either_sense(tmp_path, symbol, ends):

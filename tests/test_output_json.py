@@ -55,7 +55,7 @@ def test_every_command_has_a_schema() -> None:
     assert takes == commands == set(COMMANDS)
 
 
-@pytest.mark.daily(6)
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("call", CALLS, ids=" ".join)
 def test_output_is_valid(call: tuple[str, ...], schema: jsonschema.protocols.Validator) -> None:
     data = run(*call)
@@ -94,6 +94,7 @@ def applied(document: Any, steps: list[dict[str, Any]]) -> Any:
     return document
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("name", ["four-bar", "rssr", "windows-2", "bennett", "rprhrrr", "slider-crank"])
 def test_each_advice_can_be_applied(name: str, tmp_path: Path) -> None:
     data = run("check", name)

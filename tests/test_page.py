@@ -214,7 +214,7 @@ def items_of(page: str, group: str) -> list[dict[str, Any]]:
     return [item for item in data_of(page)["items"] if item["group"] == group]
 
 
-@pytest.mark.daily(8)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("name", mg.library())
 def test_everything_there_is_is_shown(name: str) -> None:
     m = mg.load(name)

@@ -39,6 +39,7 @@ T = np.linspace(0, 1, 5)
 TIP = np.stack([6 - 0.3 * T, -2 + 0.8 * T**2, 0 * T], axis=-1)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize(("engine", "method"), WAYS)
 def test_a_tip_is_moved_and_cylinders_hold_it(engine: str, method: str) -> None:
     """At rest: angles from the cosine law, cylinder forces from moments about A and B; all by hand."""
@@ -83,6 +84,7 @@ def tip_path() -> tuple[np.ndarray, np.ndarray]:
     return t, at.position + np.stack([0.1 * np.sin(t), 0.2 * t, 0 * t], axis=-1)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize(("engine", "method"), WAYS)
 def test_power_and_the_way_back(engine: str, method: str) -> None:
     """Driven by the cylinder strokes found, the same; force at the tip and forces of the cylinders have the same power."""
@@ -170,6 +172,7 @@ def poses(t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return out, np.concatenate([w, v], axis=1), np.concatenate([dw, dv], axis=1)
 
 
+@pytest.mark.daily(5)
 @pytest.mark.parametrize("second", ["U", "S"])
 @pytest.mark.parametrize(("engine", "method"), WAYS)
 def test_a_platform_goes_through_poses(second: str, engine: str, method: str) -> None:
@@ -230,6 +233,7 @@ def test_the_wrench_that_carries_a_pose_has_the_power_of_the_legs() -> None:
     np.testing.assert_allclose(s["leg0"].force, 0.0, atol=1e-9)
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("axis", [X, Y, Z, (1, 1, 1), (1, -2, 0.5)])
 def test_a_link_turns_all_the_way_round(axis: tuple) -> None:
     """A body on a U-S-like chain of three turns; poses that turn by a whole turn about any one axis, whatever the first orientation."""

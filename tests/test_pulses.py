@@ -35,6 +35,7 @@ PULSES = {
 }
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize(
     ("what", "method"), [*((what, "DOP853") for what in PULSES), *(("law", one) for one in ("RK23", "Radau", "LSODA"))]
 )
@@ -211,6 +212,7 @@ def test_a_motor_curve_costs_little_more_than_the_same_line_as_a_damper():
     np.testing.assert_allclose(motor["A"].position[-1], damper["A"].position[-1], rtol=1e-7)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("value", [4.9, 4.999, 5.0 - 1e-7])
 @pytest.mark.parametrize("of", ["P", lambda s: float(s["P"].position[0])])
 def test_a_throw_that_just_passes_a_height_passes_it_twice(of, value):

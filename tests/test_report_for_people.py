@@ -36,7 +36,7 @@ BUILDERS = (
 )
 
 
-@pytest.mark.daily(13)
+@pytest.mark.daily(5)
 @pytest.mark.parametrize("name", BUILDERS)
 def test_the_page_has_25_lines_and_begins_with_the_verdict(name: str) -> None:
     report = mg.check(BUILDERS[name]())
@@ -77,6 +77,7 @@ def random_mechanism(kind: str, types: str, rng: np.random.Generator) -> mg.Mech
     return known.ring(types, list(points), list(axes), drives=[])
 
 
+@pytest.mark.daily(6)
 @pytest.mark.parametrize(
     ("kind", "types"),
     [
@@ -98,6 +99,7 @@ def test_kinds_are_found_in_any_plane_and_about_any_centre(kind: str, types: str
             np.testing.assert_allclose(report.kind.place, centre, atol=1e-8)
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 def test_the_sentence_of_a_planar_and_of_a_spherical_four_bar(seed: int, engine: str) -> None:
@@ -203,7 +205,7 @@ def test_the_command_line_prints_the_page_and_the_whole() -> None:
 # --- advice -----------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.daily(6)
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("name", [*BUILDERS])
 def test_every_advice_does_what_it_says(name: str) -> None:
     report = mg.check(BUILDERS[name]())
@@ -219,6 +221,7 @@ def test_every_advice_does_what_it_says(name: str) -> None:
         assert len(after.mechanism.drives) == len(report.mechanism.drives)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("name", ["four-bar", "slider-crank", "bennett", "spherical-four-bar"])
 @pytest.mark.parametrize("markers", [False, True])
 def test_advice_applies_at_the_position_of_the_report(name: str, markers: bool) -> None:
@@ -277,6 +280,7 @@ def test_a_cylinder_between_balls_and_a_spline_are_advised() -> None:
     assert {p.type.symbol for p in shaft.apply().pairs} == {"R", "U", "P"}
 
 
+@pytest.mark.daily(5)
 @pytest.mark.parametrize("seed", range(12))
 def test_advice_on_random_mechanisms_does_what_it_says(seed: int) -> None:
     rng = np.random.default_rng(seed)

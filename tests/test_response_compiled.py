@@ -87,6 +87,7 @@ MOTIONS = {
 }
 
 
+@pytest.mark.daily(4)
 @pytest.mark.usefixtures("compiled")
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n == "stiff" else n for n in MOTIONS])
 def test_it_is_the_motion_of_the_dense_engine(name):

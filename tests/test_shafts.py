@@ -32,6 +32,7 @@ def assert_bearings(s: mg.Solution) -> None:
     np.testing.assert_allclose(s["A"].force, np.broadcast_to([0, 100 + 5 * g - b, 0], (3, 3)), atol=1e-9)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("method", ["loop_wrench", "newton_euler", "printed"])
 def test_a_motor_on_a_shaft_in_two_ball_bearings(method: str, engine: str) -> None:

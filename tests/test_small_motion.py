@@ -187,6 +187,7 @@ def block(*loads, mass=2.0):
     )
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("power", [1.0, 1.5])
 @pytest.mark.parametrize("start", [-3.0, -0.01, 0.0, 0.4])
 def test_a_block_comes_to_rest_on_one_sided_springs(start, power):

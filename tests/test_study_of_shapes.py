@@ -36,6 +36,7 @@ def alone(study, motions, outputs, i, **how):
     }
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("kind", GEARS)
 def test_gears_of_variants_are_solved_together(kind, engine, monkeypatch):

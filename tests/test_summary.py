@@ -63,6 +63,7 @@ def test_the_first_of_equal_values_is_named() -> None:
     assert found.best.tolist() == [5.0, -1.0]
 
 
+@pytest.mark.daily(5)
 @pytest.mark.parametrize("redundant", ["nan", "minimum_norm"])
 @pytest.mark.parametrize("name", ["four-bar", "7r", "rssr", "bennett", "spherical-four-bar"])
 def test_what_is_unique_is_what_the_report_calls_unique(name: str, redundant: str) -> None:

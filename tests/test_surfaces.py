@@ -135,6 +135,7 @@ def place(name):
     return SAMPLE[name].at(*np.array(INSIDE.get(name, (0.7, 0.4)))[:, None])[0][:, 0]
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("name", SAMPLE)
 def test_derivatives_of_a_surface_and_its_nearest_point(name):
     surface, (u, v) = SAMPLE[name], np.array(INSIDE.get(name, (0.7, 0.4)))[:, None]
@@ -317,6 +318,7 @@ def test_a_pole_that_is_kept_is_named_where_it_ends_the_path():
     assert found == pytest.approx(np.sqrt(0.91) - np.sqrt(0.75), abs=1e-12)
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("off", [9e-5, 1e-6, 1e-7, 1e-9])
 def test_beside_a_pole_that_is_kept_a_path_ends_at_one_place(off, engine):
@@ -350,6 +352,7 @@ def test_a_ball_may_be_declared_on_a_pole():
     holds(*closed(ring(on(mg.Surface.sphere(radius=0.5, axis=(0, 0, 1)), at), n=2), 1, 0.02))
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("name", SAMPLE)
 def test_everything_holds_on_every_surface(name, tmp_path):
     """Jacobian and bias by complex step; power; normal force; files, pickles."""

@@ -58,7 +58,7 @@ def verdict(r: mg.DeterminacyReport) -> tuple[object, ...]:
     return r.finite_mobility, r.redundancy, sum(all(unique.values()) for unique in r.unique.values())
 
 
-@pytest.mark.daily(32)
+@pytest.mark.daily(12)
 @pytest.mark.parametrize("name", SPECIAL)
 @pytest.mark.parametrize(("digits", "seed"), [(2, 1), (4, 2), (6, 3), (9, 4), (12, 5)])
 def test_rounded_special_mechanisms_are_what_they_are_meant_to_be(name: str, digits: int, seed: int) -> None:
@@ -67,7 +67,7 @@ def test_rounded_special_mechanisms_are_what_they_are_meant_to_be(name: str, dig
     assert verdict(found)[:2] == verdict(mg.check(m))[:2]
 
 
-@pytest.mark.daily(9)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("name", [name for name in SPECIAL if name != "three_upu"])
 @pytest.mark.parametrize(("digits", "seed"), [(3, 1), (5, 2), (7, 3)])
 def test_without_a_tolerance_the_report_says_which_would_change_the_verdict(name: str, digits: int, seed: int) -> None:
@@ -125,6 +125,7 @@ def test_random_mechanisms_have_no_hint(seed: int) -> None:
     assert mg.check(closed_mechanism(seed)).rounding is None
 
 
+@pytest.mark.daily(15)
 @pytest.mark.parametrize("name", mg.library())
 def test_exact_mechanisms_have_no_hint(name: str) -> None:
     m = mg.load(name)
@@ -132,7 +133,7 @@ def test_exact_mechanisms_have_no_hint(name: str) -> None:
         assert mg.check(m).rounding is None
 
 
-@pytest.mark.daily(9)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("name", ["slider-crank", "bennett", "sarrus", "three_cranks", "spherical"])
 @pytest.mark.parametrize("digits", [3, 5, 8, 10])
 def test_solutions_of_rounded_mechanisms_differ_by_the_order_of_the_tolerance(name: str, digits: int) -> None:

@@ -125,6 +125,7 @@ HAND_MADE = {
 }
 
 
+@pytest.mark.daily(15)
 @pytest.mark.parametrize("name", mg.library())
 def test_library_mechanisms_come_back_equal(tmp_path: Path, name: str) -> None:
     m = mg.load(name)
@@ -372,6 +373,7 @@ def test_the_schema_is_one() -> None:
     jsonschema.Draft202012Validator.check_schema(SCHEMA)
 
 
+@pytest.mark.daily(15)
 @pytest.mark.parametrize("name", mg.library())
 def test_library_files_keep_the_schema(name: str) -> None:
     text = library_path(name).read_text(encoding="utf-8")
