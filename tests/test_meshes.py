@@ -772,3 +772,21 @@ def test_a_thousand_gears_are_declared_in_linear_time():
     seconds(10)
     few, many = min(seconds(250) for _ in range(2)), min(seconds(500) for _ in range(2))
     assert many < 2.5 * few + 0.05
+
+
+@pytest.mark.parametrize(("z", "loaded"), [(0.06, "G"), (-0.04, "S"), (0.0, "GS")])
+def test_two_drives_load_a_mesh_by_an_unknown_force_and_only_the_bearings_that_bear_it_are_not_unique(z, loaded):
+    """By the lever: a force over one bearing loads this one alone; beside both it loads both."""
+    gears = [
+        mg.Gear(n, link, teeth, (x, 0, z), Z, module=0.002)
+        for n, link, teeth, x in (("a", "one", 20, 0), ("b", "two", 40, 0.06))
+    ]
+    (pa, qa), (pb, qb) = on_bearings("A", "one", (0, 0, 0), Z, "SG"), on_bearings("B", "two", (0.06, 0, 0), Z, "SG")
+    m = mg.Mechanism("twin", pairs=[*pa, *pb], gears=gears, couplings=[mg.Mesh("m", "a", "b")], drives=[qa, qb])
+    unique = mg.check(m).unique
+    for shaft in "AB":
+        for bearing in "SG":
+            across = {unique[shaft + bearing][name] for name in ("Fx", "Fy")}
+            assert across == {bearing not in loaded}
+        assert unique[f"{shaft}S"]["Fz"]
+    assert not unique["m"]["effort"]
