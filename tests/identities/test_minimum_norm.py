@@ -51,6 +51,25 @@ def test_both_engines_and_methods_give_the_same_reactions_and_efforts(drives: tu
             np.testing.assert_allclose(other[p.name].effort, first[p.name].effort, atol=1e-12)
 
 
+def test_a_drive_more_than_needed_leaves_the_least_reactions_as_they_are() -> None:
+    """A wheel geared to the crank and driven too: that strain is of efforts alone, those of the redundant four-bar are of reactions."""
+    m = mg.load("four-bar")
+    wheel = mg.Pair("W", "R", m.frame, "wheel", point=(0.5, 0, 0), axis=Z)
+    push = mg.Wrench(m.links[2].name, force=(1.0, 2.0, 3.0), moment=(0.1, 0.2, 0.3), point=(0, 0, 0))
+    m = m.replace(
+        links=[*m.links, mg.Link("wheel")],
+        pairs=[*m.pairs, wheel],
+        couplings=[mg.Coupling({"A": 1.0, "W": -2.0}, name="g")],
+        loads=[*m.loads, push],
+    )
+    one, two = (
+        mg.solve(m.replace(drives=drives), {name: part * ANGLES["A"] for name, part in given}, redundant="minimum_norm")
+        for drives, given in ((["A"], [("A", 1.0)]), (["A", "W"], [("A", 1.0), ("W", 0.5)]))
+    )
+    for p in m.pairs:
+        np.testing.assert_allclose(two[p.name].reaction, one[p.name].reaction, atol=1e-12)
+
+
 def test_no_self_stress_makes_them_smaller() -> None:
     """Second formulation: scipy's least squares on the sum of |F|^2 + |M / L|^2 at the pair points over all self-stresses."""
     m = mg.load("four-bar")
