@@ -315,7 +315,8 @@ class Curve(Described, Once):
 
 def remade_from(shape: Any) -> tuple[Any, tuple[Any, ...]]:
     """How a shape is copied and pickled: from its fields alone."""
-    return partial(type(shape), **{f.name: getattr(shape, f.name) for f in fields(shape)}), ()
+    cls: Callable[..., Any] = type(shape)
+    return partial(cls, **{f.name: getattr(shape, f.name) for f in fields(shape)}), ()
 
 
 def turned(R: Array, v: Array) -> Array:
