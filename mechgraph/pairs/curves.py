@@ -21,7 +21,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property, partial
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, cast
 
 import numpy as np
 import scipy
@@ -315,8 +315,7 @@ class Curve(Described, Once):
 
 def remade_from(shape: Any) -> tuple[Any, tuple[Any, ...]]:
     """How a shape is copied and pickled: from its fields alone."""
-    cls: Callable[..., Any] = type(shape)
-    return partial(cls, **{f.name: getattr(shape, f.name) for f in fields(shape)}), ()
+    return partial(cast(Any, type(shape)), **{f.name: getattr(shape, f.name) for f in fields(shape)}), ()
 
 
 def turned(R: Array, v: Array) -> Array:
