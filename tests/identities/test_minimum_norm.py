@@ -118,3 +118,32 @@ def test_they_are_the_same_in_any_unit_and_frame() -> None:
         np.testing.assert_allclose(
             moments, 1000 * ratio * np.linalg.norm(s[p.name].moment, axis=-1), atol=1e-6 * size * ratio.max()
         )
+
+
+@pytest.mark.parametrize("options", OPTIONS)
+def test_a_gear_between_cranks_that_turn_alike_anyway_shares_by_the_least_reactions(options: dict) -> None:
+    """A parallelogram whose cranks are geared too: a strain of reactions and of the coupling, the same by any method; it does no work."""
+    pairs = [
+        mg.Pair(name, "R", *on, point=(*at, 0), axis=Z)
+        for name, on, at in (
+            ("A", ("frame", "crank"), (0, 0)),
+            ("B", ("crank", "rod"), (0.3, 1)),
+            ("C", ("rod", "rocker"), (2.3, 1)),
+            ("D", ("frame", "rocker"), (2, 0)),
+        )
+    ]
+    push = mg.Wrench("rod", force=(1, 2, 3), moment=(0.1, 0.2, 0.3), point=(0, 0, 0))
+    geared = mg.Mechanism(
+        "parallelogram",
+        pairs=pairs,
+        couplings=[mg.Coupling({"A": 1.0, "D": -1.0}, name="g")],
+        drives=["A"],
+        loads=[push],
+    )
+    s, first = (mg.solve(geared, {"A": [0.0, 0.2]}, redundant="minimum_norm", **o) for o in (options, OPTIONS[0]))
+    alone = mg.solve(geared.replace(couplings=[]), {"A": [0.0, 0.2]}, redundant="minimum_norm")
+    np.testing.assert_allclose(s["A"].effort, alone["A"].effort, atol=1e-12)
+    np.testing.assert_allclose(s.coupling("g").effort, first.coupling("g").effort, atol=1e-12)
+    norm = [sum((r[p].reaction ** 2).sum() for p in "ABCD") for r in (s, alone)]
+    assert norm[0] < 0.999 * norm[1]
+    assert s.checks.equilibrium.max() < 1e-12
