@@ -254,7 +254,8 @@ class Compiled:
         ((2, 1), (2,))
         """
         room = self._one
-        if type(q) is type(velocity) is type(acceleration) is float and len(self.tables.drives) == 1:
+        given = isinstance(q, float) and isinstance(velocity, float) and isinstance(acceleration, float)  # numpy's too
+        if given and len(self.tables.drives) == 1:
             single, numbers = True, room.numbers
             numbers[0], numbers[1], numbers[2] = q, velocity, acceleration
         else:
