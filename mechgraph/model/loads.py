@@ -800,7 +800,9 @@ class Wrench(Load):
         if self.force is None and self.moment is None:
             found.append(f"{self.where}has neither force nor moment")
         if self.force is not None and self.point is None and not found and names.link(self.link).center is None:
-            found.append(f"{self.where}has a force but no point, and the link no mass center; give point=(x, y, z)")
+            found.append(
+                f"{self.where}has a force but no point, and the link no mass center; give point=(x, y, z), two numbers where planar=True"
+            )
         return found
 
     def act(self, site: LoadSite) -> None:

@@ -625,7 +625,7 @@ class Pair(Described):
             yield f"{where}has both point/axis and markers on_a/on_b; give one form"
         elif self.on_a is None and self.has_geometry:
             if self.point is None:
-                yield f"{where}has an axis but no point; give point=(x, y, z)"
+                yield f"{where}has an axis but no point; give point=(x, y, z), two numbers where planar=True"
             if self.axis is None:
                 yield f"{where}has a point but no axis; type {self.type.symbol} needs axis=(x, y, z)"
 

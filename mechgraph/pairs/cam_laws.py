@@ -738,8 +738,8 @@ def _columns(path: Path) -> dict[str, Array]:
 
 def _factors(part: LawPieces, rise: float, over: float, at_ends: Sequence[bool]) -> LawFactors:
     """Factors of a segment; ``at_ends``: of position and derivatives, whether each jumps where it begins or ends."""
-    if not rise:
-        return LawFactors(0.0, 0.0, 0.0)
+    if not rise:  # of a law that goes and comes back there are none
+        return LawFactors(*(3 * [math.nan if part.largest(1) else 0.0]))
     found = []
     for order in (1, 2, 3):
         jumps = [at_ends[k] or part.jumps(k) for k in range(order)]

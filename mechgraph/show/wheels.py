@@ -27,6 +27,8 @@ TIP, ROOT, RIM = 1.0, 1.25, 1.6
 """Heights of teeth over and below the pitch line, and thickness of what bears them, over the module."""
 FLANK, AROUND, ARC, TEETH_IN_A_ROW = 5, 64, 25, 24
 """Points along a flank, around a circle, and along a belt on a pulley; teeth of a rack that are drawn."""
+SHOWN_TEETH = 20
+"""Teeth of a pinion of which only the radius is declared."""
 READABLE = 8.0
 """Pixels from which on a tooth is drawn as one."""
 
@@ -490,10 +492,11 @@ def _worm(c: Any, P: Array, worm: WheelSeat, wheel: WheelSeat) -> Iterator[Wheel
 
 def _rack(c: Any, P: Array, pinion: WheelSeat, rack: WheelSeat) -> Iterator[Wheel]:
     at, x = _foot(pinion, P)[0], rack.axes[:, 2]
-    y = (at - P) / np.linalg.norm(at - P)
-    yield pinion.wheel(f"{c.name}.a", at, pinion.axes, 0, c.radius, 0.1 * c.radius)
+    y, module = (at - P) / np.linalg.norm(at - P), 2 * c.radius / SHOWN_TEETH
+    row = np.column_stack([x, y, np.cross(x, y)])
+    yield pinion.wheel(f"{c.name}.a", at, pinion.axes, SHOWN_TEETH, c.radius, module, pressure=c.pressure_angle)
     yield rack.wheel(
-        f"{c.name}.b", P, np.column_stack([x, y, np.cross(x, y)]), 0, np.inf, 0.1 * c.radius, length=6.0 * c.radius
+        f"{c.name}.b", P, row, 1, np.inf, module, pressure=c.pressure_angle, length=TEETH_IN_A_ROW * np.pi * module
     )
 
 

@@ -126,7 +126,11 @@ def _missing(m: Mechanism, what: Any) -> str:
     parts = {name.rpartition(".")[0] for name in m.once(_of_couplings)}
     if not owner or owner.removesuffix(".film") in (*m.pair_index, *m.link_index, *parts):
         return "is no quantity"
-    return f"there is no pair or link {shown(owner)} (pairs: {listed(m.pair_index)}; links: {listed(m.link_index)})"
+    couplings = dict.fromkeys(c.belt if isinstance(c, BeltDrive) else c.name for c in m.couplings)
+    known = {"pairs": m.pair_index, "links": m.link_index, "couplings": couplings}
+    there = "; ".join(f"{what}: {listed(names)}" for what, names in known.items() if names)
+    kinds = "pair, link or coupling" if couplings else "pair or link"
+    return f"there is no {kinds} {shown(owner)} ({there})"
 
 
 def _known(m: Mechanism, what: str) -> list[str]:
