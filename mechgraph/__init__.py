@@ -34,10 +34,10 @@ from mechgraph.model.belts import BeltDrive
 from mechgraph.model.couplings import Belt, BevelGears, Coupling, Rack, SpurGears, WormGear
 from mechgraph.model.friction import Friction
 from mechgraph.model.gear_facts import mesh_facts
-from mechgraph.model.gears import BevelGear, Gear, GearRack, Pulley, Worm, WormWheel
+from mechgraph.model.gears import BevelGear, Gear, GearRack, Pulley, Worm, WormWheel, planet_places
 from mechgraph.model.loads import Damper, Effort, ForceLaw, ForceTable, Gravity, Spring, TorsionSpring, Wrench
 from mechgraph.model.mechanism import Mechanism, chain
-from mechgraph.model.meshes import Mesh, planet_places
+from mechgraph.model.meshes import Mesh
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Misfit, Pair, Stiffness
 from mechgraph.model.response_setup import Event, ResponseSetup, Stop

@@ -14,7 +14,6 @@ from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 
-from mechgraph.errors import DeclarationError
 from mechgraph.fields import (
     NUMBER,
     TEXT,
@@ -29,7 +28,6 @@ from mechgraph.model.couplings import (
     fitting_of,
     followed,
     meeting,
-    motion_of,
     plain_pairs,
     teeth_lines,
     way,
@@ -51,10 +49,11 @@ from mechgraph.model.gears import (
     feet,
     gears_by_name,
     involute,
+    off_axis,
     pose_along,
     tip_radius,
 )
-from mechgraph.quantities import LENGTH, door, shown, unknown
+from mechgraph.quantities import LENGTH, shown, unknown
 
 FLANKS = ("auto", "forward", "backward")
 
@@ -675,77 +674,9 @@ def _words_of_kinds(kind: str) -> str:
 # --- planets, and what is doubtful -----------------------------------------------------------------------------------------------
 
 
-@door
-def planet_places(sun: int, ring: int, n: int) -> Array:
-    """Return the angles ``(n,)`` [rad] at which ``n`` planets between a sun and a ring can be put in, as evenly as teeth allow.
-
-    The planets have ``(ring - sun) / 2`` teeth. Even places need ``(sun + ring) / n`` whole; others are multiples of ``2 pi / (sun +
-    ring)``. Neighbors need ``(sun + planet) sin(pi / n) > planet + 2``.
-
-    Parameters
-    ----------
-    sun, ring, n : int
-        Teeth of the sun and of the ring; number of planets.
-
-    Raises
-    ------
-    DeclarationError
-        Planets that would overlap, or whose teeth are no whole number.
-
-    Examples
-    --------
-    >>> import mechgraph as mg
-    >>> import numpy as np
-    >>> np.rad2deg(mg.planet_places(20, 54, 3)).round(4)
-    array([  0.    , 121.6216, 238.3784])
-    """
-    faults = [
-        f"{name} = {shown(value)}: expected a whole number above 0"
-        for name, value in (("sun", sun), ("ring", ring), ("n", n))
-        if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < 1
-    ]
-    if not faults and (ring - sun < 2 or (ring - sun) % 2):
-        faults.append(f"sun = {sun}, ring = {ring}: planets have half the difference, a whole number above 0")
-    if not faults:
-        planet, steps = (ring - sun) // 2, np.round(np.arange(n) * (sun + ring) / n)
-        found = 2 * pi * steps / (sun + ring)
-        gaps = np.diff(np.append(found, 2 * pi))
-        room = float((sun + planet) * np.sin(min(gaps.min(), pi) / 2)) if n > 1 else np.inf
-        if room <= planet + 2:
-            faults.append(
-                f"n = {n}: neighbors overlap, ({sun} + {planet}) sin(half their angle) = {room:.6g}; expected more than {planet + 2}"
-            )
-    if faults:
-        raise DeclarationError("planet_places", faults)
-    return np.asarray(found)
-
-
 def gear_doubts(m: Any) -> list[str]:
     """What is doubtful about the places of gears, pulleys and planets; nothing without geometry."""
-    return [*_off_axis(m), *planet_faults(m)] if m.has_geometry else []
-
-
-def _off_axis(m: Any) -> Iterator[str]:
-    """Gears and pulleys beside the axis about which their link turns."""
-    near, turning, fitting = m.once(meeting), m.once(plain_pairs), fitting_of(m)
-    for gear in m.gears:
-        pairs = [m.pairs[k] for k, _ in turning.get(gear.link, ())]
-        if gear.link == m.frame or isinstance(gear, GearRack) or len(pairs) < len(near[gear.link]):
-            continue
-        away = {}
-        for pair in pairs:
-            marker, z = pair.markers[int(pair.b == gear.link)], np.asarray(gear.axis) / np.linalg.norm(gear.axis)
-            d = np.subtract(marker.point, gear.point)
-            if motion_of(pair) == "turn" and np.abs(np.cross(z, marker.axis)).max() <= fitting * np.linalg.norm(
-                marker.axis
-            ):
-                away[pair.name] = float(np.linalg.norm(np.cross(d, z))), fitting * max(1.0, float(np.abs(d).max()))
-        if away and all(off > least for off, least in away.values()):
-            name = min(away, key=away.__getitem__)
-            yield (
-                f"{gear.kind} {gear.name!r} is {away[name][0]:.6g} beside the axis of pair {name!r}, about which its link turns: it runs "
-                "eccentrically; move its point onto that axis if it should not"
-            )
+    return [*off_axis(m), *planet_faults(m)] if m.has_geometry else []
 
 
 def planet_faults(m: Any) -> list[str]:

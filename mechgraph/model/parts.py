@@ -22,9 +22,9 @@ from mechgraph.maths import inertia
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import SHAPES
 from mechgraph.model.couplings import BaseCoupling, Rack, SpurGears
-from mechgraph.model.gears import Gear
+from mechgraph.model.gears import Gear, planet_places
 from mechgraph.model.loads import Effort, Load, Spring
-from mechgraph.model.meshes import Mesh, planet_places
+from mechgraph.model.meshes import Mesh
 from mechgraph.model.pair import Link, Pair
 from mechgraph.quantities import (
     Count,
