@@ -322,3 +322,114 @@ def test_a_block_slides_on_a_floor_that_only_holds_it_up():
     assert r["K"].friction[1, 0] == pytest.approx(-0.25 * 2.0 * G, rel=1e-10)
     assert r["K"].friction[2, 0] == pytest.approx(0.0, abs=1e-10)
     assert r.energy.friction[-1] == pytest.approx(1.0, rel=1e-9)
+
+
+@pytest.mark.slow
+def test_a_woodpecker_strikes_its_pole_as_a_program_of_its_own_says():
+    """Against Moreau's time stepping of its three coordinates, turned in full, from rest of the sleeve to the first stroke of the beak.
+
+    R. I. Leine, Ch. Glocker, D. H. van Campen, Nonlinear dynamics of the woodpecker toy, ASME DETC 2001; numbers of Glocker's thesis, 1995.
+    """
+    m_sleeve, j_sleeve, m_bird, j_bird, k = 3e-4, 5e-9, 4.5e-3, 7e-7, 5.6e-3
+    r0, r, h, pivot, far, up, back, mu, e = 2.5e-3, 3.1e-3, 5.8e-3, 1e-2, 1.5e-2, 2e-2, 2.01e-2, 0.3, (0.5, 0.0, 0.0)
+    beak = np.array([far - back, up])
+
+    def turned(angle, at):
+        c, s = np.cos(angle), np.sin(angle)
+        return np.array([c * at[0] - s * at[1], s * at[0] + c * at[1]])
+
+    def contacts(q):
+        """Places of beak, lower and upper edge beside the pole, and their rates for unit rates of the coordinates (2, 3, 3)."""
+        arm, tip = turned(q[1], (pivot, 0)), turned(q[2], beak)
+        edges = [turned(q[1], (r, side * h)) for side in (-1, 1)]
+        at = np.stack([arm + tip, *edges])
+        rates = np.zeros((2, 3, 3))
+        rates[1, :, 0] = 1.0
+        for i, parts in enumerate(((arm, tip), (edges[0], 0 * tip), (edges[1], 0 * tip))):
+            for j, part in enumerate(parts):
+                rates[:, i, 1 + j] = -part[1], part[0]
+        return at[:, 0] - r0, rates
+
+    def dynamics(q, u):
+        (a, b), both = q[1:], m_bird * pivot * far
+        c, s = both * np.cos(a - b), both * np.sin(a - b)
+        la, lb = m_bird * pivot, m_bird * far
+        M = np.array([
+            [m_bird + m_sleeve, la * np.cos(a), lb * np.cos(b)],
+            [la * np.cos(a), j_sleeve + la * pivot, c],
+            [lb * np.cos(b), c, j_bird + lb * far],
+        ])  # fmt: skip
+        force = [
+            la * np.sin(a) * u[1] ** 2 + lb * np.sin(b) * u[2] ** 2 - (m_bird + m_sleeve) * G,
+            -k * (a - b) - la * G * np.cos(a) - s * u[2] ** 2,
+            -k * (b - a) - lb * G * np.cos(b) + s * u[1] ** 2,
+        ]
+        return M, np.array(force)
+
+    def stepped(q, u, end, step):
+        for _ in range(round(end / step)):
+            middle = q + 0.5 * step * u
+            gap, rows = contacts(middle)
+            M, force = dynamics(middle, u)
+            free, closed = u + np.linalg.solve(M, force) * step, np.flatnonzero(gap <= 0.0)
+            n, A = len(closed), np.concatenate([rows[0, closed], rows[1, closed]])
+            D, p = A @ np.linalg.solve(M, A.T), np.zeros(2 * len(closed))
+            for _ in range(200):
+                for i, one in enumerate(closed):
+                    p[i] = max(0.0, p[i] - (A[i] @ (free + e[one] * u) + D[i] @ p) / D[i, i])
+                    j = n + i
+                    p[j] = np.clip(p[j] - (A[j] @ free + D[j] @ p) / D[j, j], -mu * p[i], mu * p[i])
+            now = free + np.linalg.solve(M, A.T @ p)
+            q, u = middle + 0.5 * step * now, now
+        return q
+
+    start, rate, end = np.array([0.0, -0.05, -0.15]), -7.4583, 0.12
+    line, gaps = mg.Curve.line(point=(r0, 0, 0), direction=(0, -1, 0)), contacts(start)[0]
+    on = {"K1": (pivot + beak[0], beak[1], 0.0), "K2": (r, -h, 0.0), "K3": (r, h, 0.0)}
+    touch = [
+        mg.Pair(
+            name,
+            "Ps",
+            "pole",
+            "sleeve" if i else "bird",
+            on_a=mg.Marker((r0, at[1], 0), Z, -Y),
+            on_b=mg.Marker(at, Z, -Y),
+            closed="force",
+            curve=line,
+            restitution=e[i],
+            gap=gaps[i],
+        )
+        for i, (name, at) in enumerate(on.items())
+    ]
+    links = [
+        mg.Link("pole"),
+        mg.Link("slider"),
+        mg.Link("sleeve", m_sleeve, (0, 0, 0), j_sleeve * np.eye(3)),
+        mg.Link("bird", m_bird, (pivot + far, 0, 0), j_bird * np.eye(3)),
+    ]
+    pairs = [
+        mg.Pair("G", "P", "pole", "slider", point=(0, 0, 0), axis=Y),
+        mg.Pair("M", "R", "slider", "sleeve", point=(0, 0, 0), axis=Z),
+        mg.Pair("S", "R", "sleeve", "bird", point=(pivot, 0, 0), axis=Z),
+    ]
+    loads = [mg.Gravity((0, -G, 0)), mg.Spring(freedom="S", stiffness=k), *(mg.Friction(name, mu=mu) for name in on)]
+    m = mg.Mechanism("woodpecker", links, [*pairs, *touch], loads=loads, planar=True)
+    found = mg.respond(
+        m,
+        (0, end),
+        start={"M": start[1], "S": start[2] - start[1]},
+        rates={"G": 0.0, "M": 0.0, "S": rate},
+        rtol=1e-7,
+        atol=1e-9,
+    )
+    names = [str(one).split(" at ")[0] for one in found.events]
+    assert names[:6] == ["K2 lands", "K2 sticks", "K2 slips", "K2 opens", "K3 lands", "K1 lands"]
+    q = stepped(start, np.array([0.0, 0.0, rate]), end, 2e-5)
+    got = (
+        found["G"].position[-1, 0],
+        found["M"].position[-1, 0],
+        found["M"].position[-1, 0] + found["S"].position[-1, 0],
+    )
+    # the steps are of first order
+    np.testing.assert_allclose(got, q, atol=3e-3)
+    assert np.abs(found.energy.balance).max() < 1e-9

@@ -32,6 +32,7 @@ from mechgraph.force.reactions import (
     reaction_part,
     row_efforts,
     split_stress,
+    together,
 )
 from mechgraph.kinematics.rates import PassiveMotion, PassiveMotions, Rates, Velocities
 from mechgraph.kinematics.state import Configuration, FactoredClosure
@@ -392,7 +393,8 @@ def rubbed_in_motion(
 ) -> Rubbed:
     """Friction in a motion in the directions ``dq (F, T)`` whose accelerations it changes.
 
-    ``problem`` is that without friction; ``yields`` gives the inertia wrenches ``(6, N, T)`` with which the links yield to efforts.
+    ``problem`` is that without friction; ``yields`` gives the inertia wrenches ``(6, N, k, T)`` with which the links yield to efforts
+    ``(F, k, T)``.
     """
     here, f = problem.here, problem.solver
     task = ForceTask("loop_wrench", (), problem.driven, (), (here.T,), None, "nan")
@@ -427,23 +429,43 @@ class _FrictionProblem:
 
     def _answer_units(self) -> None:
         """Forces under a unit effort in every freedom of pairs through which friction would pass."""
-        self.unit: dict[int, dict[str, Array]] = {}
-        s, nothing = self.here.system, np.zeros_like(self.found.efforts)
-        still = self._answer(nothing) if self.found.locked is not None else None
-        for k in dict.fromkeys(k for load in self.dry for k in pairs_of(s.m, load)):
-            first = int(s.first_column[k])
-            for column in range(first, first + s.m.pairs[k].type.f):
-                efforts = nothing.copy()
-                efforts[column] = 1.0
-                one = self._answer(efforts)
-                self.unit[column] = one if still is None else {name: one[name] - still[name] for name in one}
+        s, still = self.here.system, None
+        pairs = dict.fromkeys(k for load in self.dry for k in pairs_of(s.m, load))
+        columns = [c for k in pairs for c in range(int(s.first_column[k]), int(s.first_column[k + 1]))]
+        efforts = np.zeros((s.n_freedoms, len(columns), self.here.T))
+        efforts[columns, np.arange(len(columns))] = 1.0
+        if self.yields is not None and self.f.complete and not self.lines:
+            self.unit = dict(zip(columns, self._answers(efforts, self.yields), strict=True))
+            return
+        if self.found.locked is not None:
+            still = self._answer(np.zeros_like(self.found.efforts))
+        self.unit = {}
+        for i, column in enumerate(columns):
+            one = self._answer(efforts[:, i])
+            self.unit[column] = one if still is None else {name: one[name] - still[name] for name in one}
+
+    def _answers(self, efforts: Array, yields: Callable[[Array], Array]) -> list[dict[str, Array]]:
+        """Forces in a motion under each of several given efforts ``(F, k, T)``, by the factors of the positions."""
+        reactions, through, multipliers = together(self.here, self.f, yields(efforts), efforts)
+        stress, out = self.found.stress, []
+        for i in range(efforts.shape[1]):
+            found = reactions[:, :, i], through[:, i], multipliers[:, i]
+            if stress.wrenches.shape[2]:
+                y = least_multiples(self.here, *found, stress)
+                states = stress.wrenches, stress.efforts, stress.multipliers
+                found = tuple(
+                    part + np.einsum("...st,st->...t", state, y) for part, state in zip(found, states, strict=True)
+                )
+            coupled = row_efforts(self.here, found[2][:, None])[:, 0]
+            out.append(dict(zip(("reactions", "efforts", "multipliers", "coupled"), (*found, coupled), strict=True)))
+        return out
 
     def _answer(self, efforts: Array) -> dict[str, Array]:
         """Forces under given efforts ``(F, T)`` alone."""
         here, none = self.here, np.zeros((6, len(self.here.system.m.links), self.here.T))
         held, _, _ = _held(here, self.task, self.f, none, efforts, 0.0)
         loads = none if held is None else held
-        loads = loads if self.yields is None else loads + self.yields(efforts)
+        loads = loads if self.yields is None else loads + self.yields(efforts[:, None])[:, :, 0]
         problem = ForceProblem(here, loads, efforts, self.task.driven, self.f)
         wrenches = pretensioned(here, METHODS[self.task.method](problem), self.f, part=0.0)
         one = self._least(wrenches, None if self.task.redundant == "elastic" else self.found.stress)

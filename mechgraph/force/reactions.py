@@ -202,6 +202,20 @@ def loop_wrench(problem: ForceProblem) -> Wrenches:
     return Wrenches(tree, here.pair_wrenches(null), -x[loops:, 0], -null[loops:])
 
 
+def together(here: Configuration, f: FactoredClosure, loads: Array, efforts: Array) -> tuple[Array, Array, Array]:
+    """The same of k loads ``(6, N, k, T)`` and given efforts ``(F, k, T)`` at every position: reactions ``(6, P, k, T)``, efforts ``(F, k,
+    T)`` and multipliers ``(n, k, T)``.
+    """
+    P, k, T = len(here.system.m.pairs), *efforts.shape[1:]
+    totals = here.system.tree.wrenches(loads.reshape(6, -1, k * T), P).reshape(6, P, k, T)
+    x = f.solve_transposed(efforts - (here.S[:, :, None] * totals[:, here.system.owners]).sum(axis=0))
+    totals += here.pair_wrenches(x)
+    through = (here.S[:, :, None] * totals[:, here.system.owners]).sum(axis=0)
+    through[here.system.gaps] = 0.0
+    own = here.pair_sums((here.E[:, :, None] * through).reshape(6, -1, k * T)).reshape(totals.shape)
+    return totals - own, through, -x[here.system.graph.loop_rows :]
+
+
 def pretension_conditions(here: Configuration) -> tuple[list[BeltDrive], Array, Array]:
     """Belts with a pretension T0, and what it says of the multipliers ``m (n, T)`` of the rows behind those of the loops, ``C m = c``:
     ``sum l T = T0 sum l`` over the spans of each, ``T = -m``. ``C (b, n, T)``, ``c (b, 1)``.

@@ -166,6 +166,11 @@ class LinkGraph:
         return scipy.sparse.csr_array((sign, (loop, pair)), shape=(self.n_loops, len(self.a)))
 
     @cached_property
+    def pairs_of_loops(self) -> scipy.sparse.csr_array:
+        """Its transpose, pairs x loops."""
+        return scipy.sparse.csr_array(self.sparse_loop_matrix.T)
+
+    @cached_property
     def loop_averages(self) -> scipy.sparse.csr_array:
         """Means over the pairs of every loop, loops x pairs."""
         loop, pair, _ = self.loop_steps

@@ -392,7 +392,7 @@ class Configuration:
         loops[:, span] = x[: s.graph.loop_rows].reshape(n, s.graph.width, *x.shape[1:])
         parts = loops.swapaxes(0, 1)
         parts[:3] += cross(self.middles[:, :, None], parts[3:])
-        flat = np.asarray(s.graph.sparse_loop_matrix.T @ loops.reshape(n, 6 * math.prod(x.shape[1:])))
+        flat = np.asarray(s.graph.pairs_of_loops @ loops.reshape(n, 6 * math.prod(x.shape[1:])))
         return np.moveaxis(flat.reshape(len(s.m.pairs), 6, *x.shape[1:]), 1, 0)
 
     def tree_efforts(self, wrenches: Array) -> Array:

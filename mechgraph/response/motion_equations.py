@@ -447,9 +447,16 @@ class Columns:
         return -_momenta(here, here.link_twists((self.Z * a).sum(axis=1))[:, :, None])[:, :, 0]
 
     def yields(self, efforts: Array) -> Array:
-        """Inertia wrenches ``(6, N, T)`` with which the links yield to efforts ``(F, T)`` in the freedoms."""
+        """Inertia wrenches ``(6, N, k, T)`` with which the links yield to efforts ``(F, k, T)`` in the freedoms."""
         nothing = np.zeros((6, len(self.here.system.m.links), self.here.T))
-        return self.inertia_of(self.accelerations(nothing, efforts)[0])
+        if self.n * len(self.here.system.m.links) >= SPARSE_FROM:
+            each = [self.accelerations(nothing, efforts[:, i])[0] for i in range(efforts.shape[1])]
+            a = np.stack(each, axis=1) if each else np.zeros((self.n, 0, self.here.T))
+        else:
+            forces = np.einsum("fnt,fkt->nkt", self.Z, efforts)
+            many = forces.reshape(self.n, forces.shape[1] * forces.shape[2])
+            a = accelerations(np.tile(self.mass, efforts.shape[1]), many)[0].reshape(forces.shape)
+        return -_momenta(self.here, link_twists(self.here, np.einsum("fnt,nkt->fkt", self.Z, a)))
 
     def largest(self, wrenches: Iterable[Array], efforts: Iterable[Array]) -> float:
         """The largest part that a component of wrenches or of efforts has in a generalized force."""
