@@ -251,3 +251,8 @@ def test_a_study_of_the_least_film() -> None:
         mg.study(m, {"shaft.mass": [1.0]}, "A.film.mim", motions=motion)
     with pytest.raises(mg.DeclarationError, match="is no quantity"):
         mg.study(rotor(), {"shaft.mass": [1.0]}, "A.film.min", motions=motion)
+
+
+def test_a_clearance_as_large_as_the_radius_is_none() -> None:
+    with pytest.raises(mg.DeclarationError, match=r"clearance = 0\.03: expected less than the radius"):
+        mg.Journal(radius=0.025, length=0.02, clearance=0.03, viscosity=0.01)

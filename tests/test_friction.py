@@ -543,3 +543,10 @@ def test_what_is_left_out_is_told() -> None:
         assert report.friction[0].startswith(f"friction of 'B' rests on {read} unique")
         assert report.friction[0] in " ".join(report.text(full=True).split())
     assert not mg.check(shaft()).friction
+
+
+def test_efforts_at_rest_are_told_to_be_without_friction() -> None:
+    m = shaft(force(0, -W, (0, 0, 0)))
+    told = [str(note) for note in mg.solve(m, {"A": mg.Motion([0.0, 0.1], velocity=[0.0, 1.0])}).warnings]
+    assert any("no direction at 1 of 2 positions" in text and "velocity=" in text for text in told)
+    assert not mg.solve(m, {"A": mg.Motion(0.0, velocity=1.0)}).warnings

@@ -72,6 +72,10 @@ class Journal(Described):
 
     def __post_init__(self) -> None:
         self.read_numbers()
+        if self.clearance >= self.radius:
+            raise DeclarationError(
+                "journal", [wrong(self.clearance, "clearance", f"less than the radius, {self.radius:g}")]
+            )
 
     @property
     def is_short(self) -> bool:

@@ -748,8 +748,8 @@ class Solution(Shown):
     @property
     def warnings(self) -> tuple[Doubt | PassedCrossing | Inaccurate | FrictionNote, ...]:
         """What makes reactions doubtful (``doubts``); crossings of branches that were passed, with place, miss and the other branches;
-        rates and forces that rounding spoils (see ``checks.accuracy``); moments that rub nothing, friction circles that differ from the
-        whole force by more than 5 %, belts that slip.
+        rates and forces that rounding spoils (see ``checks.accuracy``); friction at rest, moments that rub nothing, friction circles
+        that differ from the whole force by more than 5 %, belts that slip.
         """
         worst = [Inaccurate(*one) for one in _worst(self.checks.accuracy, PATH.inaccurate)]
         return (*self.doubts, *self._values.passed, *worst, *friction_notes(self._values))

@@ -510,8 +510,15 @@ class FrictionNote:
 
 
 def friction_notes(values: Trajectory) -> Iterator[FrictionNote]:
-    """Moments that rub nothing, coefficients at which the circle and the whole force differ, belts that slip."""
+    """Positions at rest, moments that rub nothing, coefficients at which the circle and the whole force differ, belts that slip."""
     m = values.whole
+    if values.rubbing:
+        rates = np.concatenate([values.coordinates(k, 1) for k in range(len(m.pairs))], axis=-1)
+        rests = int((rates == 0).all(axis=-1).sum())
+        if rests:
+            text = f"friction has no direction at {rests} of {rates[..., 0].size} positions, where nothing moves: efforts there are those "
+            text += "without it. Give velocity= for a motion; s[...].effort_range has the ends between which it holds"
+            yield FrictionNote(values.rubbing[0], text)
     for load in (load for load in values.loads if isinstance(load, Friction) and values.has_forces):
         if load.of in m.pair_index:
             yield from _notes_of_pair(values, load.with_numbers(values.number))
