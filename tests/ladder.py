@@ -90,3 +90,17 @@ LADDER: dict[str, Callable[[], Rung]] = {
         four_bar(), mg.poses("coupler", _rows(5, 3)), ["A.point", "B.point", "C.point", "D.point"], 12,
     ),
 }  # fmt: skip
+LARGE: dict[str, Callable[[], Rung]] = {
+    "S-S dyad, 7 poses": lambda: (
+        spatial("S-S", ("S", (0, 0, 0), None), ("S", (1, 0.3, 0.1), None)),
+        mg.poses("body", turned(7, 1.0)), ["O.point", "P.point"], 20,
+    ),
+    "four-bar path, 5 points, both pivots given": lambda: (
+        four_bar(), mg.path("coupler.tip", _rows(5, 2, (1.5, 1.2))), ["B.point", "C.point"], 36,
+    ),
+    "RSSR function, 7 pairs": lambda: (
+        spatial("RSSR", ("R", (0, 0, 0), ONE), ("S", (0.5, 0.4, 0.1), None), ("S", (1.6, 0.5, 0.9), None), ("R", (2, 0.2, 0.5), TWO)),
+        mg.function("O", "R", _rows(7, 2)), ["P.point", "Q.point"], 2,
+    ),
+}  # fmt: skip
+"""Rungs of minutes, without kept start sets: for ``benchmarks/make_task_starts.py``."""

@@ -1,6 +1,8 @@
 """Make the start sets of synthesis that come with the package: those of the ladder of tasks.
 
-    PYTHONPATH=tests python tests/benchmarks/make_task_starts.py [words ...]     adds rungs whose names have one of the words
+    PYTHONPATH=tests python tests/benchmarks/make_task_starts.py [words ...]
+
+With words it adds the rungs whose names have one of them, large ones too.
 
 Sets that the package or the user's folder has are taken over. Only sets of which a trace test says that they are all are taken in.
 """
@@ -12,7 +14,7 @@ import time
 from typing import Any
 
 import numpy as np
-from ladder import LADDER
+from ladder import LADDER, LARGE
 
 from mechgraph.synthesis.classes import TaskClass
 from mechgraph.synthesis.solve import PACKED, arrays, key_of, start_of
@@ -22,7 +24,7 @@ from mechgraph.synthesis.system import RowProblem
 def main(words: list[str]) -> None:
     """Work them out and write them."""
     found: dict[str, Any] = dict(np.load(PACKED)) if PACKED.exists() else {}
-    for name, rung in LADDER.items():
+    for name, rung in (LADDER | (LARGE if words else {})).items():
         if words and not any(word in name for word in words):
             continue
         m, task, unknown, total = rung()
