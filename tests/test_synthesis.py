@@ -179,3 +179,5 @@ def test_a_link_that_begins_elsewhere_than_at_the_identity_comes_back_by_markers
     body = mg.kinematics(one.replace(drives=one.freedom_names()), row).link("body")
     assert np.abs(body.pose - _planar(poses[2]) @ own).max() < 1e-9
     assert np.abs(moved.poses[0, 2, 2] - _planar(poses[2]) @ own).max() < 1e-9
+    with pytest.raises(mg.DeclarationError, match="a fit begins there"):
+        mg.synthesize(m, mg.poses("body", np.array([_planar(row) @ own for row in poses])), ["B.point"], fit="minimax")

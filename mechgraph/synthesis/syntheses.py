@@ -315,6 +315,12 @@ class FittedSynthesis:
 
     def __init__(self, m: Mechanism, tasks: Any, unknown: Sequence[str], bounds: Mapping[str, Any], over: Any) -> None:
         self.problem = RowProblem(m, tasks, unknown)
+        # exact ones come back in their own frames; the error of a place is that of the origin of its frame, which is another one here
+        if elsewhere := list(self.problem.first.poses):
+            first = f"the first pose of {', '.join(map(repr, elsewhere))} is not the identity"
+            raise DeclarationError(
+                self.problem.name, [f"{first}: a fit begins there; measure its poses from the first one"]
+            )
         self.fit, self.bounds, self.over = Fit(self.problem, tasks), bounds, over
         self.driver, self.output = driver_of(m, tasks)
 
@@ -322,7 +328,7 @@ class FittedSynthesis:
         """The mechanism of fitted rows, and its coordinates ``(rows, F)``."""
         p = self.problem
         q = p.system.coordinates_of(here.x).T[:, : len(p.m.freedom_names())]
-        m = p.first.back(p.unknowns.mechanism(p.outside(here.z[:, None])[:, 0]))
+        m = p.unknowns.mechanism(p.outside(here.z[:, None])[:, 0])
         return m.replace(start=dict(zip(m.freedom_names(), q[0].tolist(), strict=True))), q
 
     def measured(

@@ -206,7 +206,7 @@ def poses(link: str, poses: Any, *, at: Mapping[str, Any] | None = None) -> Pose
         The link.
     poses : (n, 4, 4) array
         Its poses; in a planar mechanism also ``(n, 3)``: x, y [length], angle [rad]. NaN asks for nothing. Where the first
-        one is not the identity, what is found comes back with the pairs of the link by markers.
+        one is not the identity, what is found comes back with the pairs of the link by markers (fits begin at the identity).
     at : mapping, optional
         Values of freedoms at the same positions (prescribed timing).
 
