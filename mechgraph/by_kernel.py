@@ -71,8 +71,9 @@ class KernelOutcome(Outcome):
         condition, reach = records["condition"]
         self.trajectory.estimate(np.arange(count), expected_error(ROUNDINGS * np.finfo(float).eps * reach, condition))
         if forces or line.options.method is None:
-            self.trajectory.take(records, forces, self._rubbing() if forces else ())
-            for places in in_blocks(self._left_open()) if forces else ():
+            rubbing = self._rubbing() if forces else ()
+            self.trajectory.take(records, forces, rubbing)
+            for places in in_blocks(self._left_open()) if rubbing else ():
                 self._put(*self._at(places))
         else:
             by_position = all(load.by_position for load in self.loads)
@@ -89,8 +90,6 @@ class KernelOutcome(Outcome):
 
     def _left_open(self) -> Index:
         """Positions at which the kernel does not say what friction does, or where there is none in motion."""
-        if "unsure" not in self.records:
-            return np.zeros(0, dtype=np.intp)
         return np.flatnonzero((self.records["unsure"] > 0) & ~self.contradicting)
 
     def _at(self, places: Index) -> tuple[BlockMotion, Any]:

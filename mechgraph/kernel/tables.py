@@ -49,8 +49,8 @@ PARTS = (
     "friction", "taken", "normals", "speeds", "unsure",
 )  # fmt: skip
 """Parts of a record, in order."""
-MAY_LACK = ("hold", *PARTS[-5:])
-"""Parts that a record without passive motions, or without friction, does not have."""
+OF_FRICTION = PARTS[-5:-1]
+"""What is said of friction where it is sure."""
 START = 4
 """Place of the start in the table of numbers."""
 ROWS_OF_KERNEL = 90
@@ -268,10 +268,12 @@ def _record(s: System, unknowns: int, passives: int) -> tuple[dict[str, slice], 
 
 
 def _places_of(shapes: dict[str, tuple[int, ...]]) -> dict[str, slice]:
-    """The places of the parts, without what there is none of."""
+    """The places of the parts."""
     ends = np.cumsum([0, *(int(np.prod(shapes[name])) for name in PARTS)]).tolist()
     places = {name: slice(i, j) for name, i, j in zip(PARTS, ends[:-1], ends[1:], strict=True)}
-    return {name: part for name, part in places.items() if shapes[name][:1] != (0,) or name not in MAY_LACK}
+    if not shapes["hold"][0]:
+        del places["hold"]
+    return places
 
 
 def tables(known: Layout, system: System, x: Array, loads: Sequence[Load] | None) -> tuple[Integers, Array] | None:

@@ -22,7 +22,7 @@ from mechgraph.force.block import BlockForces, hold_names, is_idle
 from mechgraph.force.elastic import displacement, seats_of, strains
 from mechgraph.force.loads import Site, inertia_wrenches, kinetic_energy, user_poses, user_twists
 from mechgraph.force.reactions import PairFrames, given_effort_loads, user_state, user_wrench
-from mechgraph.kernel.tables import Records
+from mechgraph.kernel.tables import OF_FRICTION, Records
 from mechgraph.kinematics.motion_path import Status, in_blocks
 from mechgraph.kinematics.rates import PassiveMotion, Rates, Velocities
 from mechgraph.kinematics.state import Configuration
@@ -174,7 +174,7 @@ class Trajectory:
     def take(self, records: Records, forces: bool, rubbing: tuple[str, ...] = ()) -> None:
         """Keep all positions from the records of a compiled solution, with the names of the places ``rubbing``."""
         self._solved[:], self.rubbing = True, rubbing
-        asked = (*MOVED, *(("points", *KEPT, "friction", "taken", "normals", "speeds") if forces else ()))
+        asked = (*MOVED, *(("points", *KEPT) if forces else ()), *(OF_FRICTION if rubbing else ()))
         self._kept |= {name: records[name] for name in asked if name in records}
         if rubbing:  # no teeth rub, and nothing is at rest where the kernel decides
             own = self._kept["efforts"] - self._kept["given"] - self._kept["coupled"]
