@@ -644,6 +644,7 @@ def test_what_hangs_loose_is_one_span(more, told):
 def test_an_unknown_output_names_the_couplings_too():
     m = drive(pretension=100.0)
     with pytest.raises(
-        mg.DeclarationError, match=r"there is no pair, link or coupling 'C\.tension' \(pairs: p, w; links: .*; couplings: B\)"
+        mg.DeclarationError,
+        match=r"there is no pair, link or coupling 'C\.tension' \(pairs: p, w; links: .*; couplings: B\)",
     ):
         mg.study(m, {"B.pretension": [1.0, 2.0]}, "C.tension.p-w", motions={"p": 0.0})
