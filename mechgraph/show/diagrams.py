@@ -807,16 +807,16 @@ def draw_side_by_side(m: Mechanism, drawn: Sequence[tuple[Mechanism, str]], none
 
 
 def draw_points(mechanisms: Sequence[Mechanism], names: Iterable[str], *, ax: Any = None) -> Any:
-    """Places of the pairs ``names`` of all mechanisms: those at the frame (center points) filled, the moving ones (circle points) as
-    rings. The axes.
+    """Places of the pairs to whose points the numbers ``names`` belong, of all mechanisms: those at the frame (center points) filled,
+    the moving ones (circle points) as rings. The axes.
 
     Raises
     ------
     DeclarationError
         where there is no mechanism, or no such pair.
     """
-    names = set(names)
-    pairs = [pair for m in mechanisms[:1] for pair in m.pairs if pair.name in names]
+    fields = {name.rpartition(".")[0] for name in names}
+    pairs = [pair for m in mechanisms[:1] for pair in m.pairs if f"{pair.name}.point" in fields]
     if not pairs:
         raise DeclarationError("picture of points", ["there is no mechanism to draw, or no point is sought"])
     m = mechanisms[0]

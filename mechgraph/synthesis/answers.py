@@ -464,9 +464,8 @@ class SynthesesOver(Shown, Sequence[Syntheses]):
         MissingExtraError
             Without matplotlib.
         """
-        fields = {name.rpartition(".")[0] for found in self for name in found.unknown}
-        names = [field.removesuffix(".point") for field in sorted(fields) if field.endswith(".point")]
-        return methods.call("draw_points", [m for found in self for m in found], names)
+        unknown = {name for found in self for name in found.unknown}
+        return methods.call("draw_points", [m for found in self for m in found], unknown)
 
     def document(self) -> Document:
         """How many mechanisms there are for every value."""
