@@ -53,14 +53,14 @@ from mechgraph.errors import (
 from mechgraph.files import plain
 from mechgraph.force.block import hold_names
 from mechgraph.force.reactions import MethodName
-from mechgraph.kinematics.assembly import CLOSED, assembled_at, closed_start, last_closed, named_columns
+from mechgraph.kinematics.assembly import assembled_at, closed_start, last_closed, named_columns
 from mechgraph.kinematics.motion_path import FARTHEST, DriverPath, Positions, Status, far_faults, requests
 from mechgraph.kinematics.passive_rest import unspun
 from mechgraph.kinematics.prescribed import Actuators, DriverMotion
 from mechgraph.kinematics.rates import PassiveMotion, PassiveMotions, are_alone, distance_to_dead_point
 from mechgraph.kinematics.reach import away_from_poles, follow
 from mechgraph.kinematics.solver import MotionEngineName, closure_solver, engine_for, solver_at_start
-from mechgraph.kinematics.state import ClosureSolver, Configuration
+from mechgraph.kinematics.state import CLOSED, ClosureSolver, Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import independent_rows
 from mechgraph.maths.newton import Nodes

@@ -13,12 +13,11 @@ from mechgraph.determinacy.finite_motion import branches
 from mechgraph.determinacy.mobility import stand_still
 from mechgraph.errors import DeclarationError
 from mechgraph.force.block import FORCE_OUTCOMES, BlockForces, ForceTask, forces_of_block
-from mechgraph.kinematics.assembly import CLOSED
 from mechgraph.kinematics.motion_path import BLOCK, DriverPath, Positions, Status, continued, in_blocks
 from mechgraph.kinematics.prescribed import DriverMotion
 from mechgraph.kinematics.rates import PassiveMotion, Rates, Velocities, accuracy, at_dead_points, disagreement, rates
 from mechgraph.kinematics.solver import closure_solver
-from mechgraph.kinematics.state import ClosureSolver, Configuration, FactoredClosure
+from mechgraph.kinematics.state import CLOSED, ClosureSolver, Configuration, FactoredClosure
 from mechgraph.kinematics.system import System
 from mechgraph.kinematics.touching import strayed
 from mechgraph.maths.se3 import Array, Index

@@ -14,8 +14,8 @@ from test_modes import FOUR, STEPHENSON, WATT, planar, platform
 
 import mechgraph as mg
 from mechgraph.graph.chains import least_order, least_orders
-from mechgraph.kinematics.assembly import close_all, closed_start, scaled_start
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.assembly import closed_start, scaled_start
+from mechgraph.kinematics.state import Configuration, close_all
 from mechgraph.maths.tolerances import ModeTolerances
 from mechgraph.modes import certificate as certificates
 from mechgraph.modes.assemblies import Question

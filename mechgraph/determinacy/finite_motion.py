@@ -36,11 +36,10 @@ from functools import cached_property
 
 import numpy as np
 
-from mechgraph.kinematics.assembly import CLOSED, CLOSURE_GOAL, close
 from mechgraph.kinematics.motion_path import DriverPath
 from mechgraph.kinematics.rates import PassiveMotion
 from mechgraph.kinematics.solver import ClosureRank, EngineName, closure_solver, engine_for, rank_of_rows
-from mechgraph.kinematics.state import ClosureRows, Configuration, ReducedRows
+from mechgraph.kinematics.state import CLOSED, CLOSURE_GOAL, ClosureRows, Configuration, ReducedRows, close
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import independent_rows
 from mechgraph.maths.newton import Paths, closest_zeros

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Iterable, Mapping, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,10 +18,17 @@ from mechgraph.errors import AssemblyError, DeclarationError, listed
 from mechgraph.kinematics.motion_path import FARTHEST, DriverPath, Request, Status, far_faults
 from mechgraph.kinematics.reach import BEYOND_END, beyond, follow
 from mechgraph.kinematics.solver import closure_rank, closure_solver, engine_for
-from mechgraph.kinematics.state import ClosureRows, Configuration, ReducedRows, lengths_of
+from mechgraph.kinematics.state import (
+    CLOSED,
+    CLOSURE_GOAL,
+    Configuration,
+    close,
+    close_all,
+    lengths_of,
+)
 from mechgraph.kinematics.system import System, indexed
 from mechgraph.maths.linear import compact, complement
-from mechgraph.maths.newton import Nodes, closest_zeros, least_norm_steps
+from mechgraph.maths.newton import Nodes
 from mechgraph.maths.se3 import Array, Index, rotate
 from mechgraph.maths.tolerances import PATH, RANKS
 from mechgraph.model.belts import BeltDrive
@@ -71,12 +77,6 @@ def _fault(here: Configuration) -> str:
         "that size, or the same point. Make small lengths larger or zero, or replace long links by slides (the end of a link so long "
         "moves along a line)"
     )
-
-
-CLOSED = 1e-10
-"""Closure error (angle, or length / L) up to which loops count as closed."""
-CLOSURE_GOAL = 1e-13
-"""Closure error that Newton aims at."""
 
 
 def scaled_system(m: Mechanism, q: Array, system: System | None = None) -> System:
@@ -135,42 +135,6 @@ def at_position(m: Mechanism, system: System, x: Array) -> Mechanism:
     if np.abs(q - given).max(initial=0.0) <= CLOSED:
         return m
     return m.replace(start=dict(zip(m.freedom_names(), q.tolist(), strict=True)))
-
-
-def close(
-    system: System, x: Array, fixed: Index, iterations: int = 60, patience: int = 8, tol: float = 0.0
-) -> tuple[Array, float]:
-    """Close the loops from state ``x (nx,)`` with the coordinates in ``fixed`` kept; smallest change of the others."""
-    closed, error = close_all(system, x[:, None], fixed, iterations, patience, tol)
-    return closed[:, 0], float(error[0])
-
-
-def close_all(
-    system: System, x: Array, fixed: Index, iterations: int = 60, patience: int = 8, tol: float = 0.0
-) -> tuple[Array, Array]:
-    """``close`` for states ``(nx, T)``; also the closure errors ``(T,)``. Rows that depend on others to ``tol`` are left alone."""
-    free = complement(fixed, system.n_freedoms)
-
-    def least(here: Configuration) -> Array:
-        # closure rows from which on loops are closed by sparse normal equations
-        if here.T == 1 and system.n_rows >= 300 and not tol:
-            return ReducedRows(ClosureRows.at(here), fixed).correction(here.residual[:, 0])[:, None]
-        dq = np.zeros((system.n_freedoms, here.T), dtype=here.x.dtype)
-        # relative singular value below which a direction is left alone while closing
-        dq[free] = least_norm_steps(here.J[:, free], here.residual, max(1e-9, tol))
-        return dq
-
-    goal = CLOSURE_GOAL
-    x, _ = closest_zeros(
-        partial(Configuration, system),
-        least,
-        system.advance,
-        x,
-        tolerance=goal,
-        iterations=iterations,
-        patience=patience,
-    )
-    return x, Configuration(system, x).closure
 
 
 def last_closed(system: System, nodes: Nodes, columns: Index) -> Nodes:

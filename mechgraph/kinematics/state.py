@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -28,11 +28,18 @@ import scipy
 from mechgraph.graph.linkgraph import LinkGraph
 from mechgraph.kinematics.layout import ScrewTable, entries_of, run_sums
 from mechgraph.kinematics.system import System
-from mechgraph.maths.linear import LeastNorm
+from mechgraph.maths.linear import LeastNorm, complement
+from mechgraph.maths.newton import closest_zeros, least_norm_steps
 from mechgraph.maths.se3 import Array, Index, Mask, compose, cross, cross_twist, finite_twist, move_twist, multiplied
 from mechgraph.maths.tolerances import PATH, RANKS
 from mechgraph.model.gears import moving_lines
 from mechgraph.pairs import pair_type as evaluation
+
+CLOSED = 1e-10
+"""Closure error (angle, or length / L) up to which loops count as closed."""
+
+CLOSURE_GOAL = 1e-13
+"""Closure error that Newton aims at."""
 
 ROUNDINGS = 20
 """Roundings of a position that add up in a closure residual."""
@@ -742,3 +749,38 @@ class ReducedRows:
         unit = self.unit_wrenches()[:, :, some]
         order = (np.arange(self.width)[:, None] + self.kept[some]) % self.width
         return some, np.take_along_axis(unit, order[None], axis=1)
+
+
+def close(
+    system: System, x: Array, fixed: Index, iterations: int = 60, patience: int = 8, tol: float = 0.0
+) -> tuple[Array, float]:
+    """Close the loops from state ``x (nx,)`` with the coordinates in ``fixed`` kept; smallest change of the others."""
+    closed, error = close_all(system, x[:, None], fixed, iterations, patience, tol)
+    return closed[:, 0], float(error[0])
+
+
+def close_all(
+    system: System, x: Array, fixed: Index, iterations: int = 60, patience: int = 8, tol: float = 0.0
+) -> tuple[Array, Array]:
+    """``close`` for states ``(nx, T)``; also the closure errors ``(T,)``. Rows that depend on others to ``tol`` are left alone."""
+    free = complement(fixed, system.n_freedoms)
+
+    def least(here: Configuration) -> Array:
+        # closure rows from which on loops are closed by sparse normal equations
+        if here.T == 1 and system.n_rows >= 300 and not tol:
+            return ReducedRows(ClosureRows.at(here), fixed).correction(here.residual[:, 0])[:, None]
+        dq = np.zeros((system.n_freedoms, here.T), dtype=here.x.dtype)
+        # relative singular value below which a direction is left alone while closing
+        dq[free] = least_norm_steps(here.J[:, free], here.residual, max(1e-9, tol))
+        return dq
+
+    x, _ = closest_zeros(
+        partial(Configuration, system),
+        least,
+        system.advance,
+        x,
+        tolerance=CLOSURE_GOAL,
+        iterations=iterations,
+        patience=patience,
+    )
+    return x, Configuration(system, x).closure

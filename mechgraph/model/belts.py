@@ -172,6 +172,11 @@ class BeltDrive(LineCoupling):
     angles: ClassVar[tuple[float, ...]] = ()
     """Angles of their marks against the span at the start."""
 
+    @property
+    def part_of(self) -> str:
+        """The belt."""
+        return self.belt
+
     def __post_init__(self) -> None:
         self.read_numbers()
         for name in ("over", "backs"):

@@ -64,6 +64,11 @@ class BaseCoupling(Described, ABC):
     """Whether it stands for itself, so that it may be left out and its numbers varied without others."""
 
     @property
+    def part_of(self) -> str:
+        """Name of what it is a part of, as a span is of its belt; empty where it stands for itself."""
+        return ""
+
+    @property
     def freedoms(self) -> tuple[str, ...]:
         """Names of the freedoms, in order."""
         return tuple(freedom for freedom, _ in self.terms) if _is_terms(self.terms) else ()

@@ -9,7 +9,7 @@ from __future__ import annotations
 import operator
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import repeat
 from types import MappingProxyType
@@ -37,7 +37,6 @@ from mechgraph.maths.inertia import physical
 from mechgraph.maths.se3 import IN_PLANE, IN_SPACE, Array
 from mechgraph.maths.tolerances import SHAPES
 from mechgraph.memo import Once, of_graph
-from mechgraph.model.belts import BeltDrive
 from mechgraph.model.couplings import BaseCoupling, SpurGears, fitting_of
 from mechgraph.model.friction import LOADS
 from mechgraph.model.gears import GEARS
@@ -49,13 +48,80 @@ from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.model.synthesis_setup import SynthesisSetup
 from mechgraph.pairs.contact_types import travels
 from mechgraph.pairs.pair_type import PairType
-from mechgraph.quantities import BASE_UNITS, LENGTH, PURE, column, is_numeric, shown, unknown, without_units, wrong
+from mechgraph.quantities import (
+    BASE_UNITS,
+    LENGTH,
+    PURE,
+    column,
+    is_numeric,
+    items_of,
+    shown,
+    unknown,
+    without_units,
+    wrong,
+)
 
 START = {
     "type": "object",
     "additionalProperties": {"anyOf": [{"type": "number"}, {"type": "array", "items": {"type": "number"}}]},
 }
 """JSON Schema of start values."""
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Links, pairs, couplings and loads for ``Mechanism(parts=[...])``; parts are added with ``+``.
+
+    Parameters
+    ----------
+    links : tuple of Link
+        Links that the part brings; it may name others.
+    pairs : tuple of Pair
+        Its pairs.
+    gears : tuple of gear
+        Its gears and pulleys.
+    couplings : tuple of Coupling
+        Its couplings.
+    loads : tuple of load
+        Its loads.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> part = mg.parts.Parts(pairs=(mg.Pair("A", "R", "frame", "arm", point=(0, 0, 0), axis=(0, 0, 1)),))
+    >>> mg.Mechanism("pendulum", parts=[part]).link_names()
+    ('frame', 'arm')
+    """
+
+    links: tuple[Link, ...] = ()
+    pairs: tuple[Pair, ...] = ()
+    gears: tuple[Any, ...] = ()
+    couplings: tuple[BaseCoupling, ...] = ()
+    loads: tuple[Load, ...] = ()
+
+    def __add__(self, other: Parts) -> Parts:
+        if not isinstance(other, Parts):
+            return NotImplemented
+        return Parts(*((*getattr(self, f.name), *getattr(other, f.name)) for f in fields(Parts)))
+
+    @classmethod
+    def joined(cls, given: Any, faults: list[str]) -> Parts:
+        """All parts of a list as one; what is none of them is told in ``faults``."""
+        out = cls()
+        for one in items_of(given, "parts", faults):
+            if isinstance(one, Parts):
+                out += one
+            else:
+                faults.append(wrong(one, "parts", "a list of what mg.parts makes, such as mg.parts.rod(...)"))
+        return out
+
+    def links_with(self, pairs: Iterable[Any]) -> tuple[Any, ...]:
+        """The links that pairs name, each once, in order: its own, massless ones for the others; then the rest of its own."""
+        known = {link.name: link for link in self.links if isinstance(link, Link) and isinstance(link.name, str)}
+        ends = (end for p in pairs if isinstance(p, Pair) for end in (p.a, p.b))
+        named = {end: known.get(end) or Link(end) for end in ends if isinstance(end, str)}
+        used = set(map(id, named.values()))
+        return (*named.values(), *(link for link in self.links if id(link) not in used))
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -183,7 +249,7 @@ class DeclaredParts(Formatted, Once):
 
     def coupling(self, name: str) -> BaseCoupling:
         """The coupling of that name."""
-        belts = dict.fromkeys(c.belt for c in self.couplings if isinstance(c, BeltDrive))
+        belts = dict.fromkeys(c.part_of for c in self.couplings if c.part_of)
         return self.couplings[self._index(name, _places(c.name for c in self.couplings), "coupling", belts)]
 
     def place_of_link(self, name: str) -> int:

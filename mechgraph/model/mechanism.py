@@ -27,12 +27,18 @@ from mechgraph.maths.se3 import Array, identity, inverse
 from mechgraph.maths.tolerances import Tolerances
 from mechgraph.memo import carried, under
 from mechgraph.model.couplings import BaseCoupling
-from mechgraph.model.declaration import DeclaredParts, declaration_faults, flat_start, item_faults, mapping_faults
+from mechgraph.model.declaration import (
+    DeclaredParts,
+    Parts,
+    declaration_faults,
+    flat_start,
+    item_faults,
+    mapping_faults,
+)
 from mechgraph.model.loads import Gravity, Load
 from mechgraph.model.meshes import gear_doubts
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Pair
-from mechgraph.model.parts import Parts
 from mechgraph.model.plane import in_space, is_flat, pair_in_plane, pair_in_space, spatial_row
 from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.model.synthesis_setup import SynthesisSetup

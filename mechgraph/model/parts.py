@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Sequence
+from dataclasses import fields, replace
 from functools import partial
 from typing import Any, ParamSpec
 
@@ -21,7 +21,8 @@ from mechgraph.fields import second_direction
 from mechgraph.maths import inertia
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import SHAPES
-from mechgraph.model.couplings import BaseCoupling, Rack, SpurGears
+from mechgraph.model.couplings import Rack, SpurGears
+from mechgraph.model.declaration import Parts as Parts
 from mechgraph.model.gears import Gear, planet_places
 from mechgraph.model.loads import Effort, Load, Spring
 from mechgraph.model.meshes import Mesh
@@ -33,7 +34,6 @@ from mechgraph.quantities import (
     has_quantity,
     is_numeric,
     is_quantity,
-    items_of,
     real_array,
     shown,
     wrong,
@@ -43,62 +43,6 @@ P = ParamSpec("P")
 
 PLANE_NORMAL = (0.0, 0.0, 1.0)
 """Axis of all pairs of planar parts."""
-
-
-@dataclass(frozen=True)
-class Parts:
-    """Links, pairs, couplings and loads for ``Mechanism(parts=[...])``; parts are added with ``+``.
-
-    Parameters
-    ----------
-    links : tuple of Link
-        Links that the part brings; it may name others.
-    pairs : tuple of Pair
-        Its pairs.
-    gears : tuple of gear
-        Its gears and pulleys.
-    couplings : tuple of Coupling
-        Its couplings.
-    loads : tuple of load
-        Its loads.
-
-    Examples
-    --------
-    >>> import mechgraph as mg
-    >>> part = mg.parts.Parts(pairs=(mg.Pair("A", "R", "frame", "arm", point=(0, 0, 0), axis=(0, 0, 1)),))
-    >>> mg.Mechanism("pendulum", parts=[part]).link_names()
-    ('frame', 'arm')
-    """
-
-    links: tuple[Link, ...] = ()
-    pairs: tuple[Pair, ...] = ()
-    gears: tuple[Any, ...] = ()
-    couplings: tuple[BaseCoupling, ...] = ()
-    loads: tuple[Load, ...] = ()
-
-    def __add__(self, other: Parts) -> Parts:
-        if not isinstance(other, Parts):
-            return NotImplemented
-        return Parts(*((*getattr(self, f.name), *getattr(other, f.name)) for f in fields(Parts)))
-
-    @classmethod
-    def joined(cls, given: Any, faults: list[str]) -> Parts:
-        """All parts of a list as one; what is none of them is told in ``faults``."""
-        out = cls()
-        for one in items_of(given, "parts", faults):
-            if isinstance(one, Parts):
-                out += one
-            else:
-                faults.append(wrong(one, "parts", "a list of what mg.parts makes, such as mg.parts.rod(...)"))
-        return out
-
-    def links_with(self, pairs: Iterable[Any]) -> tuple[Any, ...]:
-        """The links that pairs name, each once, in order: its own, massless ones for the others; then the rest of its own."""
-        known = {link.name: link for link in self.links if isinstance(link, Link) and isinstance(link.name, str)}
-        ends = (end for p in pairs if isinstance(p, Pair) for end in (p.a, p.b))
-        named = {end: known.get(end) or Link(end) for end in ends if isinstance(end, str)}
-        used = set(map(id, named.values()))
-        return (*named.values(), *(link for link in self.links if id(link) not in used))
 
 
 class _Given:

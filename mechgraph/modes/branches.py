@@ -20,11 +20,11 @@ from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, counted
 from mechgraph.files import plain
 from mechgraph.graph.linkgraph import components_of_edges, members
-from mechgraph.kinematics.assembly import CLOSED, close, led
+from mechgraph.kinematics.assembly import led
 from mechgraph.kinematics.motion_path import DriverPath, Positions, Request, Status
 from mechgraph.kinematics.reach import follow
 from mechgraph.kinematics.solver import closure_solver, engine_for
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.state import CLOSED, Configuration, close
 from mechgraph.maths.se3 import Index
 from mechgraph.maths.singular_point import passed
 from mechgraph.maths.tolerances import MODES

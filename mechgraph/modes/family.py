@@ -45,10 +45,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.graph.chains import least_order, ranked
-from mechgraph.kinematics.assembly import CLOSED, close_all
 from mechgraph.kinematics.reach import BEYOND_END, beyond
 from mechgraph.kinematics.solver import closure_rank
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.state import CLOSED, Configuration, close_all
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Index, compose, cross_twist, finite_twist, inverse, move_twist, multiplied, pose_exp

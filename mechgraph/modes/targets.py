@@ -25,8 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechgraph.graph.linkgraph import components_of_edges
-from mechgraph.kinematics.assembly import CLOSED, close_all
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.state import CLOSED, Configuration, close_all
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Index, compose, identity

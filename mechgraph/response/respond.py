@@ -25,12 +25,12 @@ from mechgraph.document import Bullets, Document, Heading, Paragraph, Shown
 from mechgraph.errors import AssemblyError, DeclarationError, FrictionError, MechgraphWarning, ResponseError
 from mechgraph.files import plain
 from mechgraph.force.loads import Site
-from mechgraph.kinematics.assembly import CLOSED, assembled_at, named_columns
+from mechgraph.kinematics.assembly import assembled_at, named_columns
 from mechgraph.kinematics.motion_path import in_blocks
 from mechgraph.kinematics.rates import Velocities
 from mechgraph.kinematics.reach import BEYOND_END, beyond
 from mechgraph.kinematics.solver import MotionEngineName, closure_rank, engine_for
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.state import CLOSED, Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import Array, Index

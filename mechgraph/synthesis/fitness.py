@@ -22,11 +22,10 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from mechgraph.errors import DeadPointError, DeclarationError, IndeterminateError, MechgraphWarning
-from mechgraph.kinematics.assembly import CLOSED, close
 from mechgraph.kinematics.motion_path import DriverPath, Positions, Request
 from mechgraph.kinematics.reach import follow
 from mechgraph.kinematics.solver import closure_solver, engine_for
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.state import CLOSED, Configuration, close
 from mechgraph.kinetostatics import kinematics, solve, transmission
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import MODES

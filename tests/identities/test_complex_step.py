@@ -14,8 +14,8 @@ from numpy.testing import assert_allclose
 
 import mechgraph as mg
 from mechgraph.kinematics import layout
-from mechgraph.kinematics.assembly import close, scaled_system
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.assembly import scaled_system
+from mechgraph.kinematics.state import Configuration, close
 from mechgraph.kinematics.system import System, indexed
 from mechgraph.maths import se3
 from mechgraph.model.toml import library_names, library_path

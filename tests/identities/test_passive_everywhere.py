@@ -16,9 +16,9 @@ import mechgraph as mg
 from mechgraph.determinacy import mobility
 from mechgraph.determinacy.finite_motion import finite_motion
 from mechgraph.determinacy.mobility import free_motion
-from mechgraph.kinematics.assembly import close, closed_start
+from mechgraph.kinematics.assembly import closed_start
 from mechgraph.kinematics.rates import PassiveMotions, are_alone
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.state import Configuration, close
 from mechgraph.kinematics.system import System
 
 ENGINES = ("dense", "sparse")

@@ -14,7 +14,7 @@ from mechgraph.determinacy.findings import component_words
 from mechgraph.determinacy.report import DeterminacyReport, check
 from mechgraph.determinacy.uniqueness import SelfStress
 from mechgraph.document import plain
-from mechgraph.kinematics.assembly import CLOSED, close
+from mechgraph.kinematics.state import CLOSED, close
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import MOTIONS
 from mechgraph.model.mechanism import Mechanism
