@@ -71,7 +71,7 @@ def evaluated(task: Task, t: Array, x: Array, dq: Array) -> tuple[Moved, Configu
 
 
 @dataclass(frozen=True)
-class Cone:
+class FrictionCone:
     """Friction of a closed limit in an impact: its place among those that are closed, the freedoms along it, the coefficient."""
 
     limit: int
@@ -103,7 +103,7 @@ def _phase(D: Array, w: Array, least: Array, cones: Sequence[tuple[int, Index, f
     raise Stopped("an impact with friction has no impulses that agree with themselves", OUTCOMES[2])
 
 
-class FreeMotion:
+class FreeEquations:
     """The equations of motion at a state, nothing held: what closed limits do."""
 
     def __init__(self, task: Task, t: float, x: Array, dq: Array, closed: tuple[Limit, ...]) -> None:
@@ -156,7 +156,7 @@ class FreeMotion:
         np.add.at(efforts, self.columns, self.sign * p)
         return self._after(self.impulse_to_rate @ p, efforts)
 
-    def struck_rough(self, e: Array, cones: Sequence[Cone]) -> tuple[Array, float, Array]:
+    def struck_rough(self, e: Array, cones: Sequence[FrictionCone]) -> tuple[Array, float, Array]:
         """The same where some of what is closed rubs: by Poisson's law, compression and then expansion (see ``_phase``)."""
         columns = np.concatenate([self.columns, *(one.columns for one in cones)]).astype(np.intp)
         sign = np.append(self.sign, np.ones(len(columns) - len(self.sign)))

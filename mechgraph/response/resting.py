@@ -35,7 +35,7 @@ from mechgraph.pairs.contact_types import pressing
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.quantities import items_of, wrong
 from mechgraph.response.charts import Prescribed, Task, no_force
-from mechgraph.response.impact import Cone, FreeMotion, Limit, evaluated
+from mechgraph.response.impact import FrictionCone, FreeEquations, Limit, evaluated
 from mechgraph.response.integration import LOOKS_IN_STEP, Occurrence, first_root, with_turns
 from mechgraph.response.motion_equations import Moved, Stopped
 from mechgraph.response.rough import Rough, rough_freedoms
@@ -387,15 +387,15 @@ class Rests:
         pressing: tuple[Limit, ...] = ()
         if closed:
             task = _Holding(ways=self._ways(dq)).task(self.task)
-            before = FreeMotion(task, t, x, dq, closed)
+            before = FreeEquations(task, t, x, dq, closed)
             e = np.array([limit.stop.restitution for limit in closed])
             cones = self._cones(closed)
             strike = (lambda e: before.struck_rough(e, cones)) if cones and before.hit.any() else before.struck
             after, lost, p = strike(e)
-            free = FreeMotion(task, t, x, after, closed)
+            free = FreeEquations(task, t, x, after, closed)
             if (free.still & (free.w > 0.0)).any():
                 after, lost, p = strike(np.where(free.still, 0.0, e))
-                free = FreeMotion(task, t, x, after, closed)
+                free = FreeEquations(task, t, x, after, closed)
             which, w_rate = free.pressing()
             pressing = tuple(closed[i] for i in which)
             resting = tuple(closed[i] for i in np.flatnonzero(free.still & free.moves))
@@ -416,12 +416,14 @@ class Rests:
         found += [one.occurrence(t, False) for one in was.limits if one not in now]
         return after, np.array([spent, 0.0, -lost]), first, [*found, *self._rubbing(t, was)]
 
-    def _cones(self, closed: Sequence[Limit]) -> list[Cone]:
+    def _cones(self, closed: Sequence[Limit]) -> list[FrictionCone]:
         """The friction of what is closed."""
         by_name = {one.name: one.columns for one in self.rough}
         mu = {load.of: load.mu for load in self.task.loads.dry}
         return [
-            Cone(i, by_name[one.contact], mu[one.contact]) for i, one in enumerate(closed) if one.contact in by_name
+            FrictionCone(i, by_name[one.contact], mu[one.contact])
+            for i, one in enumerate(closed)
+            if one.contact in by_name
         ]
 
     def _ways(self, dq: Array) -> Array | None:
@@ -473,7 +475,7 @@ class Rests:
         # what is at rest is so exactly
         still = self._independent(_Holding(ways=ways), Z, sets)
         dq = evaluated(still.task(self.task), np.array([t]), x[:, None], dq[:, None])[0].rates.dq[:, 0]
-        at, why = _At(Z, sets, resting, size, np.array([t]), x[:, None], dq[:, None]), 0
+        at, why = _Instant(Z, sets, resting, size, np.array([t]), x[:, None], dq[:, None]), 0
         # states that are tried one after the other: 3^4, with as many stops
         few = len(sets) <= 4 and len(resting) <= 6
         options = map(self._options, sets)
@@ -499,7 +501,7 @@ class Rests:
         self._painleve(_Holding(resting, (), ways), resting, t, x, dq, agrees=False)
         raise no_force(self.task, OUTCOMES[why or OUTCOMES.index("no finite force")], t)
 
-    def _tried(self, ways: Array, state: _State, at: _At) -> tuple[_Holding, Moved]:
+    def _tried(self, ways: Array, state: _State, at: _Instant) -> tuple[_Holding, Moved]:
         """A state, with the ways of what moves already, and the accelerations in it."""
         limits = tuple(one for one, holds in zip(at.resting, state.holds, strict=True) if holds)
         sticks = [one for one, way in zip(at.sets, state.ways, strict=True) if not way]
@@ -519,7 +521,7 @@ class Rests:
             holding.ways[:] = self._begun(holding, begin, at)
         return holding, at.moved(holding.task(self.task))
 
-    def _begun(self, holding: _Holding, begin: Sequence[_Stuck], at: _At) -> Array:
+    def _begun(self, holding: _Holding, begin: Sequence[_Stuck], at: _Instant) -> Array:
         """The ways with those in which something slips in several freedoms from rest: along the accelerations that they lead to."""
         free = [column for one in begin for column in one.free]
         ends = np.cumsum([0, *(len(one.free) for one in begin)])
@@ -543,7 +545,7 @@ class Rests:
         found = scipy.optimize.root(off, along(np.zeros(len(free))), tol=1e-13)
         return put(along(np.asarray(found.x)))
 
-    def _amiss(self, state: _State, holding: _Holding, found: Moved, at: _At) -> _State | None:
+    def _amiss(self, state: _State, holding: _Holding, found: Moved, at: _Instant) -> _State | None:
         """None where what slips goes on, what presses does so, what is free leaves, and what sticks would not slip; otherwise the state
         with all of that changed that is amiss.
         """
@@ -683,7 +685,7 @@ class _State:
 
 
 @dataclass(frozen=True)
-class _At:
+class _Instant:
     """Where a state is looked for: the motions ``Z (F, n)`` with nothing held, what is at rest, limits that are rested on, the size of
     accelerations, time ``(1,)``, state ``(nx, 1)`` and rates ``(F, 1)``.
     """

@@ -33,7 +33,7 @@ WHERE = "synthesis of chains"
 
 
 @dataclass(frozen=True)
-class Structure:
+class AskedMechanism:
     """A mechanism with a random geometry, and the numbers of it that are sought."""
 
     mechanism: Mechanism
@@ -86,7 +86,7 @@ class Roles:
 
 
 @dataclass(frozen=True)
-class Choice:
+class MarkedChain:
     """A chain on its ``frame``, with a link for every name of ``roles``."""
 
     chain: Chain
@@ -147,7 +147,7 @@ def _walk(chain: Chain, frame: int, first: int) -> Iterator[tuple[int, int, int]
     yield from along(frame)
 
 
-def choices(chain: Chain, roles: Roles) -> Iterator[Choice]:
+def choices(chain: Chain, roles: Roles) -> Iterator[MarkedChain]:
     """Every choice of frame and links for roles, up to the numbers of links."""
     seen = set[Any]()
     for frame, *_ in chain.inversions:
@@ -159,10 +159,10 @@ def choices(chain: Chain, roles: Roles) -> Iterator[Choice]:
                 code = chain.marked_code({frame: 1} | {link: k for k, link in enumerate(links.values(), 2)})
                 if code not in seen:
                     seen.add(code)
-                    yield Choice(chain, frame, links, roles)
+                    yield MarkedChain(chain, frame, links, roles)
 
 
-def structures(chains: Iterable[Chain], tasks: Any, exact: bool, seed: int) -> tuple[list[Structure], list[str]]:
+def structures(chains: Iterable[Chain], tasks: Any, exact: bool, seed: int) -> tuple[list[AskedMechanism], list[str]]:
     """The mechanisms of all choices with the numbers that are sought, and in words how many these are and which were left out.
 
     Exact tasks determine as many numbers as they have conditions; the others keep random values of ``seed``. Those are sought, of the
@@ -183,7 +183,7 @@ def structures(chains: Iterable[Chain], tasks: Any, exact: bool, seed: int) -> t
     faults += [] if every else ["m: no chain is given"]
     if faults:
         raise DeclarationError(WHERE, faults)
-    found, idle, refused = list[Structure](), 0, list[str]()
+    found, idle, refused = list[AskedMechanism](), 0, list[str]()
     rng = np.random.default_rng(seed)
     for i, one in enumerate(every, 1):
         for k, choice in enumerate(choices(one, roles), 1):
@@ -192,13 +192,13 @@ def structures(chains: Iterable[Chain], tasks: Any, exact: bool, seed: int) -> t
                 continue
             m, candidates = _placed(choice, f"{one.links}-link chain {i}", k, tasks, rng)
             if not exact:
-                found.append(Structure(m, tuple(candidates)))
+                found.append(AskedMechanism(m, tuple(candidates)))
                 continue
             sought = _determined(m, tasks, candidates, rng)
             if isinstance(sought, str):
                 refused.append(f"{m.name}: {sought}")
             else:
-                found.append(Structure(m, sought))
+                found.append(AskedMechanism(m, sought))
     told = [
         f"{counted(len(every), 'chain')}: {counted(len(found), 'mechanism')} by choice of frame, input and output link"
     ]
@@ -212,7 +212,9 @@ def _points(roles: Roles) -> list[str]:
     return [f"{body}.{point}" for body, points in roles.bodies.items() for point in points]
 
 
-def _placed(choice: Choice, name: str, k: int, tasks: Any, rng: np.random.Generator) -> tuple[Mechanism, list[str]]:
+def _placed(
+    choice: MarkedChain, name: str, k: int, tasks: Any, rng: np.random.Generator
+) -> tuple[Mechanism, list[str]]:
     """The mechanism of the ``k``-th choice, about the places that are asked, and all its numbers that may be sought."""
     roles, faults = choice.roles, list[str]()
     unit = np.array([[-1.0, -1.0], [1.0, 1.0]])
