@@ -37,6 +37,7 @@ def functions() -> dict[str, Callable]:
         for k, v in vars(module).items()
         if getattr(v, "__module__", "") == module.__name__ and callable(v) and k[0] != "_"
     }
+    found["parts.Parts"] = mg.parts.Parts
     found |= {f"show.{name}": getattr(show, name) for name in show.__all__}
     for name in ("Curve", "Surface", "Motion"):
         own = vars(found[name]).items()

@@ -512,11 +512,13 @@ class FrictionNote:
 def friction_notes(values: Trajectory) -> Iterator[FrictionNote]:
     """Positions at rest, moments that rub nothing, coefficients at which the circle and the whole force differ, belts that slip."""
     m = values.whole
-    if values.rubbing:
-        rates = np.concatenate([values.coordinates(k, 1) for k in range(len(m.pairs))], axis=-1)
-        rests = int((rates == 0).all(axis=-1).sum())
-        if rests:
-            text = f"friction has no direction at {rests} of {rates[..., 0].size} positions, where nothing moves: efforts there are those "
+    if values.rubbing and values.has_forces:
+        # what sticks in a motion under loads has its friction: there efforts have no ends
+        known = [(values.effort_range(k), PairResult(values, k).effort) for k in range(len(m.pairs))]
+        between = [(ends[..., 0] < ends[..., 1]) | (np.isnan(ends).any(-1) & ~np.isnan(at)) for ends, at in known]
+        held = np.concatenate(between, axis=-1).any(axis=-1)
+        if rests := int(held.sum()):
+            text = f"friction has no direction at {rests} of {held.size} positions, where nothing moves: efforts there are those "
             text += "without it. Give velocity= for a motion; s[...].effort_range has the ends between which it holds"
             yield FrictionNote(values.rubbing[0], text)
     for load in (load for load in values.loads if isinstance(load, Friction) and values.has_forces):

@@ -177,50 +177,6 @@ class Syntheses(Shown, Sequence[Mechanism]):
         """The mechanism from which each one comes."""
         return self.sources or (self.mechanism,) * len(self)
 
-    @staticmethod
-    def joined(found: Sequence[Syntheses], told: Sequence[str]) -> Syntheses:
-        """Answers of several mechanisms in one order, with what is told of the whole."""
-        unknown = tuple(dict.fromkeys(name for s in found for name in s.unknown))
-        first = np.cumsum([0, *map(len, found)]).tolist()
-
-        def padded(arrays: Sequence[Array]) -> Array:
-            shape = np.max([a.shape[1:] for a in arrays], axis=0)
-            ends = [[(0, 0), *((0, int(n)) for n in shape - a.shape[1:])] for a in arrays]
-            return np.concatenate([np.pad(a, end, constant_values=np.nan) for a, end in zip(arrays, ends, strict=True)])
-
-        def by_name(s: Syntheses, values: Array) -> Array:
-            out = np.full((len(values), len(unknown)), np.nan, dtype=values.dtype)
-            out[:, [unknown.index(name) for name in s.unknown[: values.shape[1]]]] = values
-            return out
-
-        def whole(name: str) -> int | None:
-            counts = [getattr(s, name) for s in found]
-            return None if None in counts else sum(counts)
-
-        out = Syntheses(
-            found[0].mechanism,
-            tuple(m for s in found for m in s),
-            unknown,
-            np.concatenate([by_name(s, s.values) for s in found]),
-            padded([s.poses for s in found]),
-            padded([s.coordinates for s in found]),
-            np.concatenate([s.residual for s in found]),
-            ComplexSyntheses(np.concatenate([by_name(s, s.complex.values) for s in found])),
-            whole("total"),
-            tuple(replace(one, text=f"{s.mechanism.name}: {one.text}") for s in found for one in s.degenerate),
-            sum(s.infinite for s in found),
-            weakest(s.completeness for s in found),
-            (*told, *(f"{s.mechanism.name}: {text}" for s in found for text in s.evidence)),
-            np.concatenate([s.condition for s in found]),
-            Fitnesses([partial(s.fitness.__getitem__, k) for s in found for k in range(len(s))]),
-            whole("classes"),
-            tuple(one for s in found for one in s.symmetries),
-            tuple(tuple(n + k for k in mine) for n, s in zip(first, found, strict=False) for mine in s.copies),
-            tuple(one for s in found for one in s.rejected),
-            tuple(s.mechanism for s in found for _ in s),
-        )
-        return out._sorted
-
     @property
     def _sorted(self) -> Syntheses:
         """Good ones first, then by worst transmission, then by size."""
@@ -479,6 +435,50 @@ class SynthesesOver(Shown, Sequence[Syntheses]):
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain data."""
         return {"sweep": plain(dict(self.sweep)), "positions": [s.to_dict() for s in self.positions]}
+
+
+def joined_answers(found: Sequence[Syntheses], told: Sequence[str]) -> Syntheses:
+    """Answers of several mechanisms in one order, with what is told of the whole."""
+    unknown = tuple(dict.fromkeys(name for s in found for name in s.unknown))
+    first = np.cumsum([0, *map(len, found)]).tolist()
+
+    def padded(arrays: Sequence[Array]) -> Array:
+        shape = np.max([a.shape[1:] for a in arrays], axis=0)
+        ends = [[(0, 0), *((0, int(n)) for n in shape - a.shape[1:])] for a in arrays]
+        return np.concatenate([np.pad(a, end, constant_values=np.nan) for a, end in zip(arrays, ends, strict=True)])
+
+    def by_name(s: Syntheses, values: Array) -> Array:
+        out = np.full((len(values), len(unknown)), np.nan, dtype=values.dtype)
+        out[:, [unknown.index(name) for name in s.unknown[: values.shape[1]]]] = values
+        return out
+
+    def whole(name: str) -> int | None:
+        counts = [getattr(s, name) for s in found]
+        return None if None in counts else sum(counts)
+
+    out = Syntheses(
+        found[0].mechanism,
+        tuple(m for s in found for m in s),
+        unknown,
+        np.concatenate([by_name(s, s.values) for s in found]),
+        padded([s.poses for s in found]),
+        padded([s.coordinates for s in found]),
+        np.concatenate([s.residual for s in found]),
+        ComplexSyntheses(np.concatenate([by_name(s, s.complex.values) for s in found])),
+        whole("total"),
+        tuple(replace(one, text=f"{s.mechanism.name}: {one.text}") for s in found for one in s.degenerate),
+        sum(s.infinite for s in found),
+        weakest(s.completeness for s in found),
+        (*told, *(f"{s.mechanism.name}: {text}" for s in found for text in s.evidence)),
+        np.concatenate([s.condition for s in found]),
+        Fitnesses([partial(s.fitness.__getitem__, k) for s in found for k in range(len(s))]),
+        whole("classes"),
+        tuple(one for s in found for one in s.symmetries),
+        tuple(tuple(n + k for k in mine) for n, s in zip(first, found, strict=False) for mine in s.copies),
+        tuple(one for s in found for one in s.rejected),
+        tuple(s.mechanism for s in found for _ in s),
+    )
+    return out._sorted
 
 
 def _degrees(angle: float) -> str:

@@ -19,7 +19,14 @@ from mechgraph.model.synthesis_setup import DefectName, FitName, SynthesisSetup
 from mechgraph.modes.homotopy import Mask
 from mechgraph.quantities import Count, door, items_of, real_array, wrong
 from mechgraph.quantities import Index as Seed
-from mechgraph.synthesis.answers import ComplexSyntheses, Degenerate, Fitnesses, Syntheses, SynthesesOver
+from mechgraph.synthesis.answers import (
+    ComplexSyntheses,
+    Degenerate,
+    Fitnesses,
+    Syntheses,
+    SynthesesOver,
+    joined_answers,
+)
 from mechgraph.synthesis.classes import ClassMember, NoClass, TaskClass
 from mechgraph.synthesis.fitness import Fitness, Measure, fitness, limits_of
 from mechgraph.synthesis.fits import Fit, FitPoint, Fitted, fitted
@@ -523,7 +530,7 @@ def _of_chains(
             refused += [f"{one.mechanism.name}: {fault}" for fault in error.faults]
     if not found:
         raise DeclarationError(WHERE, [*told, *refused])
-    return Syntheses.joined(found, [f"{text}." for text in [*told, *refused]])
+    return joined_answers(found, [f"{text}." for text in [*told, *refused]])
 
 
 def _said_of(name: str, progress: Callable[[str], None], text: str) -> None:
