@@ -6,6 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from mechgraph import errors  # noqa: F401  # isort: skip  # before all that takes time to load
+import mechgraph.kinematics  # noqa: F401  # see below
 from mechgraph import methods
 from mechgraph.errors import (
     AssemblyError,
@@ -25,15 +26,13 @@ from mechgraph.errors import (
 )
 from mechgraph.exchange.files import load, save
 from mechgraph.fields import Formatted
-from mechgraph.graph.chains import Chain
-from mechgraph.kinetostatics import Transmission, assemble, kinematics, least_preload, solve, transmission
 from mechgraph.maths import inertia
 from mechgraph.maths.tolerances import Tolerances
+from mechgraph.memo import once_written
 from mechgraph.model import parts
 from mechgraph.model.belts import BeltDrive
 from mechgraph.model.couplings import Belt, BevelGears, Coupling, Rack, SpurGears, WormGear
 from mechgraph.model.friction import Friction
-from mechgraph.model.gear_facts import mesh_facts
 from mechgraph.model.gears import BevelGear, Gear, GearRack, Pulley, Worm, WormWheel, planet_places
 from mechgraph.model.loads import Damper, Effort, ForceLaw, ForceTable, Gravity, Spring, TorsionSpring, Wrench
 from mechgraph.model.mechanism import Mechanism, chain
@@ -44,16 +43,13 @@ from mechgraph.model.response_setup import Event, ResponseSetup, Stop
 from mechgraph.model.synthesis_setup import SynthesisSetup
 from mechgraph.model.toml import library_names as library
 from mechgraph.pairs.cam_laws import CamLaw, Segment, cam_laws
-from mechgraph.pairs.cams import least_base_radius
 from mechgraph.pairs.contact_types import Hertz
 from mechgraph.pairs.curves import Curve
 from mechgraph.pairs.factors import Bookkeeping, Component, Freedom
 from mechgraph.pairs.journal import Journal
 from mechgraph.pairs.pair_type import PairType, pair_types
 from mechgraph.pairs.surfaces import Surface
-from mechgraph.pairs.travelling import cutter_path  # noqa: F401  # by methods
 from mechgraph.quantities import with_clear_calls
-from mechgraph.result.solution import Solution
 
 if TYPE_CHECKING:
     from mechgraph.compiled.compiled import Compiled, compile
@@ -73,12 +69,17 @@ if TYPE_CHECKING:
         save_chains,
         system_groups,
     )
+    from mechgraph.graph.chains import Chain
+    from mechgraph.kinetostatics import Transmission, assemble, kinematics, least_preload, solve, transmission
+    from mechgraph.model.gear_facts import mesh_facts
     from mechgraph.modes.assemblies import Assemblies, AssembliesOver, assemblies
     from mechgraph.modes.branches import Branches, branches
+    from mechgraph.pairs.cams import least_base_radius
     from mechgraph.response.equilibrium import equilibrium, linearize
     from mechgraph.response.respond import Response, respond
     from mechgraph.result.free_body import FreeBody, free_body
     from mechgraph.result.over_time import OverTime, over_time
+    from mechgraph.result.solution import Solution
     from mechgraph.show.page.write import write_report
     from mechgraph.synthesis.answers import Syntheses, SynthesesOver
     from mechgraph.synthesis.syntheses import synthesize
@@ -111,8 +112,10 @@ def _with_subclasses(kind: type[Any]) -> Iterator[type[Any]]:
 
 
 for _declared in (*_with_subclasses(Formatted), Tolerances, PairType, Freedom, Component, Bookkeeping):
-    if "__init__" in vars(_declared):
-        with_clear_calls(_declared)
+    once_written(_declared, with_clear_calls)
+
+
+globals().pop("kinematics")  # a room and a function have this name; a user means the function, which __getattr__ finds
 
 
 def __dir__() -> list[str]:
@@ -186,6 +189,18 @@ def __getattr__(name: str) -> Any:
             from mechgraph.synthesis import tasks as home
         case "Study" | "study":
             from mechgraph.variants import study as home
+        case "Chain":
+            from mechgraph.graph import chains as home
+        case "Transmission" | "assemble" | "kinematics" | "least_preload" | "solve" | "transmission":
+            from mechgraph import kinetostatics as home
+        case "mesh_facts":
+            from mechgraph.model import gear_facts as home
+        case "least_base_radius":
+            from mechgraph.pairs import cams as home
+        case "Solution":
+            from mechgraph.result import solution as home
+        case "cutter_path":
+            from mechgraph.pairs import travelling as home
         case _:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}", name=name, obj=sys.modules[__name__])
     return globals().setdefault(name, getattr(home, name))

@@ -7,7 +7,7 @@ numpy, with all that it says of such positions.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from operator import is_not
 from typing import Any, Literal, Protocol
@@ -22,6 +22,7 @@ from mechgraph.kinematics.state import ROUNDINGS, ClosureSolver, Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.newton import Work
 from mechgraph.maths.se3 import Array, Index
+from mechgraph.memo import dataclass
 from mechgraph.model.friction import Friction, places_in
 from mechgraph.model.loads import Load
 from mechgraph.outcome import Call, Outcome, Starts, system_at

@@ -23,12 +23,11 @@ import textwrap
 import unicodedata
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import ClassVar, assert_never
 
 from mechgraph.errors import visible
-from mechgraph.memo import Remembers
+from mechgraph.memo import Remembers, dataclass
 from mechgraph.quantities import with_doors, with_memory
 
 LISTED, NAMED = 20, 8
@@ -46,7 +45,7 @@ def _strings(values: Sequence[str], what: str) -> tuple[str, ...]:
     return tuple(values)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Heading:
     """A heading; `level` 1 is the first below the title, `DEEPEST_HEADING` the last (else ValueError)."""
 
@@ -60,14 +59,14 @@ class Heading:
             raise ValueError(f"heading {self.text!r}: level must be 1 to {deepest_heading}, got {self.level}")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Paragraph:
     """Running text, wrapped where the rendering has a width."""
 
     text: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Bullets:
     """A list of strings; a sequence of strings among them is nested below the string before it.
 
@@ -99,7 +98,7 @@ class Bullets:
         return groups
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Table:
     """A table of strings.
 
@@ -145,7 +144,7 @@ class Table:
         return [tuple(plain(cell) for cell in line) for line in lines]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Equation:
     r"""A displayed equation: `text` (may have several lines), `latex`, valid inside ``\[ \]``, and `mathml`, the content of a ``math``.
 
@@ -158,7 +157,7 @@ class Equation:
     mathml: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Legend:
     """What symbols mean: entries ``(equation, meaning)``, a bullet each, ``A0_k = P_k x A_k: the moment of ...``."""
 
@@ -173,7 +172,7 @@ class Legend:
         return Bullets([f"{equation.text}: {meaning}" for equation, meaning in self.entries])
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Code:
     """Preformatted text, kept line by line and never wrapped; blank lines at its ends are dropped."""
 
@@ -184,7 +183,7 @@ Block = Heading | Paragraph | Bullets | Table | Equation | Legend | Code
 """What a document is made of."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Document:
     """A title (may be empty) and the blocks below it."""
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import MISSING, Field, dataclass, field, fields
+from dataclasses import MISSING, Field, field, fields
 from functools import lru_cache, partial
 from types import MappingProxyType
 from typing import Any, ClassVar, Self
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from mechgraph.errors import DeclarationError, ShapeError
 from mechgraph.maths.se3 import Array
+from mechgraph.memo import class_cached, dataclass
 from mechgraph.quantities import (
     LENGTH,
     PURE,
@@ -256,7 +257,7 @@ class _Signature:
     """The signature of a class with fields as ``help`` shows it: what they hold stands in the docstring."""
 
     def __get__(self, instance: object, cls: type) -> inspect.Signature:
-        every = list(inspect.signature(inspect.getattr_static(cls, "__init__")).parameters.values())[1:]
+        every = list(inspect.signature(cls.__init__).parameters.values())[1:]  # type: ignore[misc]
         return inspect.Signature([one.replace(annotation=inspect.Parameter.empty) for one in every])
 
 
@@ -273,26 +274,10 @@ class Formatted:
     def __init_subclass__(cls) -> None:
         if cls.__repr__ is Formatted.__repr__:
             cls.__repr__ = Formatted.__repr__  # type: ignore[method-assign]  # dataclass leaves alone what stands in the class itself
-        hints = inspect.get_annotations(cls, eval_str=True)
-        own = {name: getattr(hint, "__metadata__", (None,))[0] for name, hint in hints.items()}
-        cls._own = {name: about for name, about in own.items() if isinstance(about, FieldFormat)}
-        bases = (vars(base).get("_own", {}) for base in reversed(cls.__mro__))
-        cls.formats = {name: about for own in bases for name, about in own.items()}
-        cls._numeric = tuple(name for name, about in cls.formats.items() if about.kind.numeric)
-        given = (getattr(cls, name, NEEDED) for name in cls.formats)
-        cls._defaults = tuple(
-            (NEEDED if one.default is MISSING else one.default) if isinstance(one, Field) else one for one in given
-        )
-        if cls.__doc__ and cls.formats and "Parameters\n" not in cls.__doc__:
-            told = [
-                line
-                for (name, about), usual in zip(cls.formats.items(), cls._defaults, strict=True)
-                for line in about.told(name, usual)
-            ]
-            words, heading, examples = cls.__doc__.rstrip().partition("\n\n    Examples\n")
-            cls.__doc__ = (
-                "\n".join([words, "", "    Parameters", "    ----------", *told]) + heading + examples + "\n    "
-            )
+        for name, make in (("_own", _own), ("formats", _formats), ("_numeric", _numeric), ("_defaults", _defaults)):
+            setattr(cls, name, class_cached(make, name, cls))
+        if words := cls.__doc__:
+            cls.__doc__ = class_cached(partial(_described, words), "__doc__", cls)  # type: ignore[assignment]
 
     def __repr__(self) -> str:
         """The fields that differ from what they are where they are left out."""
@@ -303,6 +288,38 @@ class Formatted:
             if not is_default(type(self), name, value)
         ]
         return f"{type(self).__name__}({', '.join(told)})"
+
+
+def _own(cls: type[Formatted]) -> Mapping[str, FieldFormat]:
+    hints = inspect.get_annotations(cls, eval_str=True)
+    own = {name: getattr(hint, "__metadata__", (None,))[0] for name, hint in hints.items()}
+    return {name: about for name, about in own.items() if isinstance(about, FieldFormat)}
+
+
+def _formats(cls: type[Formatted]) -> Mapping[str, FieldFormat]:
+    bases = [base for base in reversed(cls.__mro__) if issubclass(base, Formatted)]
+    return {name: about for base in bases for name, about in base._own.items()}
+
+
+def _numeric(cls: type[Formatted]) -> tuple[str, ...]:
+    return tuple(name for name, about in cls.formats.items() if about.kind.numeric)
+
+
+def _defaults(cls: type[Formatted]) -> tuple[Any, ...]:
+    given = (getattr(cls, name, NEEDED) for name in cls.formats)
+    return tuple(
+        (NEEDED if one.default is MISSING else one.default) if isinstance(one, Field) else one for one in given
+    )
+
+
+def _described(text: str, cls: type[Formatted]) -> str:
+    """The docstring of a class with its fields as parameters."""
+    if not cls.formats or "Parameters\n" in text:
+        return text
+    usual = zip(cls.formats.items(), cls._defaults, strict=True)
+    told = [line for (name, about), default in usual for line in about.told(name, default)]
+    words, heading, examples = text.rstrip().partition("\n\n    Examples\n")
+    return "\n".join([words, "", "    Parameters", "    ----------", *told]) + heading + examples + "\n    "
 
 
 def is_default(cls: type, name: str, value: Any) -> bool:

@@ -21,11 +21,12 @@ import types
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import astuple, dataclass, fields, is_dataclass
+from dataclasses import astuple, fields, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from mechgraph.errors import DeclarationError, FileError, MissingExtraError, visible
+from mechgraph.memo import dataclass
 from mechgraph.quantities import DEEPEST, shown
 
 Json = dict[str, Any]

@@ -20,7 +20,7 @@ from __future__ import annotations
 import dataclasses
 import warnings
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -66,6 +66,7 @@ from mechgraph.maths.linear import independent_rows
 from mechgraph.maths.newton import Nodes
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import MOTIONS, PATH, Tolerances
+from mechgraph.memo import dataclass
 from mechgraph.model.loads import Effort, Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import declared

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import partial
 from typing import Any, Literal, Protocol
 
@@ -23,6 +23,7 @@ from mechgraph.kinematics.touching import strayed
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.singular_point import passed
 from mechgraph.maths.tracker import Follower
+from mechgraph.memo import dataclass
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.result.trajectory import BlockMotion, Trajectory

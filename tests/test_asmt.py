@@ -13,7 +13,7 @@ from program import invoke
 import mechgraph as mg
 from mechgraph.document import to_text
 from mechgraph.exchange.asmt import JOINTS, REFUSED
-from mechgraph.exchange.files import compare
+from mechgraph.exchange.asmt_mechanism import compare
 from mechgraph.exchange.syntax import FUNCTIONS, FormulaFault, evaluated
 
 Z = (0, 0, 1)

@@ -53,12 +53,10 @@ def methods() -> Iterator[tuple[str, Callable[..., Any]]]:
     """Methods of the results, and of the mechanism, that have a section of parameters, results or examples."""
     for name, thing in public():
         for own in dir(thing) if inspect.isclass(thing) else ():
+            if own.startswith("_") and own != "__call__":
+                continue
             method = inspect.unwrap(getattr(inspect.getattr_static(thing, own), "__func__", getattr(thing, own)))
-            if (
-                inspect.isfunction(method)
-                and (own == "__call__" or not own.startswith("_"))
-                and SECTION.search(method.__doc__ or "")
-            ):
+            if inspect.isfunction(method) and SECTION.search(method.__doc__ or ""):
                 yield f"{name}.{own}", method
 
 

@@ -1,14 +1,18 @@
 """Tolerances asked for by name: they change the verdict, they show themselves, and two sets are never mixed."""
 
+import dataclasses
+import inspect
 import pickle
+import sys
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 import pytest
 
 import mechgraph as mg
 from mechgraph.maths import tolerances as inside
-from mechgraph.memo import ASKED
+from mechgraph.memo import ASKED, dataclass
 
 COARSE = mg.Tolerances(rank={"loop": 1e-4, "position": 1e-4})
 SHORT = mg.Tolerances(path={"longest": 0.02, "first": 0.01, "shortest_quick": 1e-4})
@@ -157,3 +161,75 @@ def test_wrong_numbers_are_all_named() -> None:
     assert len(caught.value.faults) == 5
     with pytest.raises(mg.DeclarationError, match="expected Tolerances"):
         mg.check(mg.load("four-bar"), tolerances=1e-6)
+
+
+# --- dataclasses of which the methods are written late ---------------------------------------------------------------------
+
+
+def classes(decorate: Any) -> tuple[type, type]:
+    """A dataclass and one above it."""
+
+    @decorate(frozen=True, repr=False)
+    class Placed:
+        """A place."""
+
+        x: float
+        y: float = dataclasses.field(default=2.0, kw_only=True)
+        names: list[str] = dataclasses.field(default_factory=list, compare=False)
+
+        def __post_init__(self) -> None:
+            object.__setattr__(self, "x", float(self.x))
+
+    @decorate(frozen=True)
+    class Turned(Placed):
+        angle: float = 0.5
+
+    return Placed, Turned
+
+
+def behavior(decorate: Any) -> list[Any]:
+    """All that a dataclass is seen to do."""
+    placed, turned = classes(decorate)
+    out = [inspect.signature(turned), [f.name for f in dataclasses.fields(placed)], placed.__doc__, placed.__qualname__]
+    one = turned(1, angle=3.0, y=4.0)
+    out += [repr(one), one == dataclasses.replace(one), one == turned(1), placed(1) == turned(1), hash(one)]
+    out += [turned.__match_args__, turned.__init__.__qualname__, dataclasses.asdict(one), turned.y]
+    for wrong in (lambda: setattr(one, "x", 2.0), lambda: delattr(one, "z"), turned, lambda: turned(1, 2, 3, 4)):
+        with pytest.raises((TypeError, AttributeError)) as error:
+            wrong()
+        out.append(str(error.value))
+    return list(map(str, out))
+
+
+def test_a_dataclass_written_late_is_that_of_the_standard_library() -> None:
+    assert behavior(dataclass) == behavior(dataclasses.dataclass)
+
+
+def test_threads_that_make_the_first_objects_at_once_make_whole_ones() -> None:
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(8) as pool:
+            for _ in range(5):
+                _, turned = classes(dataclass)
+                assert list(pool.map(lambda x, kind=turned: kind(x).x, range(16))) == list(range(16))
+    finally:
+        sys.setswitchinterval(before)
+
+
+@dataclass(frozen=True)
+class Early:
+    x: float
+
+
+@dataclass(frozen=True)
+class Later:
+    x: float
+
+
+def test_the_first_object_may_come_out_of_a_pickle() -> None:
+    out = pickle.loads(pickle.dumps(Early(1.0)).replace(b"Early", b"Later"))
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        out.x = 2.0
+    assert repr(out) == "Later(x=1.0)"
+    assert out == Later(1.0)

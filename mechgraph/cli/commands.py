@@ -6,7 +6,6 @@ import re
 import warnings
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -24,6 +23,7 @@ from mechgraph.equations.formulation import FORMATS as WRITINGS
 from mechgraph.errors import counted
 from mechgraph.exchange.files import WRITERS
 from mechgraph.files import PAGES, formats_text
+from mechgraph.memo import dataclass
 from mechgraph.result.free_body import FORMATS as LOAD_FILES
 from mechgraph.result.solution import FORMATS
 from mechgraph.show.skeleton import FORMATS as FILMS

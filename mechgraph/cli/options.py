@@ -31,7 +31,8 @@ from rich.text import Text
 import mechgraph as mg
 from mechgraph.document import Document, to_text
 from mechgraph.errors import INTERRUPTED, MechgraphError, MechgraphWarning, did_you_mean, near_names, shortened, visible
-from mechgraph.exchange.files import READERS, compare
+from mechgraph.exchange.asmt_mechanism import compare
+from mechgraph.exchange.files import READERS
 from mechgraph.fields import TEXT
 from mechgraph.files import Format, format_of, formats_text, writable
 from mechgraph.kinematics.prescribed import coordinate

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 import mechgraph as mg
@@ -15,6 +14,7 @@ from mechgraph.determinacy.report import KEYS, AdviceData, schemas
 from mechgraph.equations.terms import written
 from mechgraph.files import VERSION, Json, json_text, object_schema, patch, plain, read_off, schema_of
 from mechgraph.kinetostatics import TransmissionData
+from mechgraph.memo import dataclass
 from mechgraph.model.toml import to_data
 from mechgraph.modes.assemblies import AssembliesData, BranchesData
 from mechgraph.response.respond import ResponseData

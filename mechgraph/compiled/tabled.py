@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -33,6 +33,7 @@ from mechgraph.kinematics.prescribed import DriverMotion
 from mechgraph.kinematics.system import System
 from mechgraph.kinetostatics import Pipeline
 from mechgraph.maths.se3 import Array, homogeneous
+from mechgraph.memo import dataclass
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Declared, declared

@@ -34,7 +34,6 @@ others is a matter of the declaration, not of the motion. Source: Marghitu, Fund
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -46,6 +45,7 @@ from mechgraph.document import Block, Document, Paragraph, Shown, Table
 from mechgraph.graph.atlas import MultipleJoint
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import MOTIONS, RANKS
+from mechgraph.memo import dataclass
 
 
 @dataclass(frozen=True, eq=False)

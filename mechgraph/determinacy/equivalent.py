@@ -15,7 +15,7 @@ Source: Marghitu, Fundamentals, section 2.15; Hall, Kinematics and Linkage Desig
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
@@ -30,6 +30,7 @@ from mechgraph.kinematics.assembly import assembled, assembled_at, at_position
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.touching import ContactLines
 from mechgraph.maths.se3 import Array
+from mechgraph.memo import dataclass
 from mechgraph.model.couplings import Contact
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Marker, Pair

@@ -6,7 +6,6 @@ Also which drivers move a mechanism, and which freedoms would complete them: pur
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -40,6 +39,7 @@ from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import independent_rows
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import RANKS
+from mechgraph.memo import dataclass
 from mechgraph.model.friction import rests_on, rubbing_loads
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import wrong

@@ -28,7 +28,7 @@ Source: Marghitu, Fundamentals, equations 2.1 and 2.4; for several families Anto
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
@@ -40,6 +40,7 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import Array, Index, skew
 from mechgraph.maths.tolerances import MOTIONS, RANKS
+from mechgraph.memo import dataclass
 from mechgraph.model.parameters import Parameters
 
 

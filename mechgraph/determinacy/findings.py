@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from decimal import Decimal
 from typing import Any
 
@@ -41,6 +41,7 @@ from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import independent_rows, rank_of, singular_values
 from mechgraph.maths.se3 import Array, Index, rotation_exp
 from mechgraph.maths.tolerances import MOTIONS
+from mechgraph.memo import dataclass
 from mechgraph.model.friction import Friction
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair

@@ -31,7 +31,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
@@ -46,6 +46,7 @@ from mechgraph.maths.newton import Paths, closest_zeros
 from mechgraph.maths.se3 import Array, Index, null_space
 from mechgraph.maths.tolerances import RANKS
 from mechgraph.maths.tracker import Follower
+from mechgraph.memo import dataclass
 
 BRANCHING_MOTIONS = 24
 """Motions up to which branches are sought: of more, far more branches than are told apart meet, or all of a continuum."""

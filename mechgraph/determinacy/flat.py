@@ -7,7 +7,7 @@ drives and starts, keep their values. A pair of another type takes over what the
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from mechgraph.force.loads import user_poses
 from mechgraph.kinematics.assembly import assembled
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Array
+from mechgraph.memo import dataclass
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import SEATS, Marker, Pair, Stiffness

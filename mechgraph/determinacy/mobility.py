@@ -18,7 +18,7 @@ the mechanism reaches by moving (``lasting``).
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from itertools import combinations, pairwise
 
@@ -42,6 +42,7 @@ from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import complement, independent_rows, rank_of, singular_values
 from mechgraph.maths.se3 import Array, Index, compose, null_space, pose_exp, rotation_exp
 from mechgraph.maths.tolerances import MOTIONS, PATH, RANKS
+from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.pairs import pair_type as evaluation
 from mechgraph.pairs.pair_type import PairType

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import islice, product
 
 import numpy as np
@@ -33,6 +33,7 @@ from mechgraph.kinematics.assembly import assembled, at_position, named_columns
 from mechgraph.kinematics.solver import PROBES, EngineName
 from mechgraph.maths.se3 import Array, Index, null_space
 from mechgraph.maths.tolerances import MOTIONS, STRESSES
+from mechgraph.memo import dataclass
 from mechgraph.model.couplings import motion_of
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.meshes import Mesh

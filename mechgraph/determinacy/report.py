@@ -9,7 +9,7 @@ The structure as the textbooks tell it: chain, mobility table, families, counts,
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any, NamedTuple
 
@@ -41,6 +41,7 @@ from mechgraph.kernel import build
 from mechgraph.kinematics.assembly import assembled, assembled_at, named_columns
 from mechgraph.kinematics.solver import MotionEngineName
 from mechgraph.maths.tolerances import RANKS, Tolerances
+from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.pairs.pair_type import TABLE
 from mechgraph.quantities import Limit, door, wrong

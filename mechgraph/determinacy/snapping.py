@@ -21,7 +21,7 @@ where the second leaves a choice: a planar four-bar is nearest to spherical ones
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
 from itertools import pairwise
 from typing import Any, TypeAlias
@@ -38,6 +38,7 @@ from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import singular_values
 from mechgraph.maths.se3 import Array, Index, compose, cross, inverse, rotation_exp, rotation_log
 from mechgraph.maths.tolerances import COMPLEX_STEP
+from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.parameters import Declared

@@ -18,7 +18,6 @@ and named. Pairs of one type with the same components in doubt are decomposed to
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -32,6 +31,7 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.touching import ContactLines
 from mechgraph.maths.se3 import Array, Index, null_space
 from mechgraph.maths.tolerances import STRESSES
+from mechgraph.memo import dataclass
 from mechgraph.model.belts import pretensions
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair

@@ -6,7 +6,7 @@ In a response the accelerations of all freedoms are unknowns beside the reaction
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Literal
 
 from mechgraph.equations.formulation import ACCELERATION, Formulation, MotionWords, has_inertia
@@ -28,6 +28,7 @@ from mechgraph.equations.terms import (
     names_of,
     summed,
 )
+from mechgraph.memo import dataclass
 from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 from mechgraph.document import Block as Piece
@@ -55,6 +55,7 @@ from mechgraph.equations.terms import (
 from mechgraph.errors import counted
 from mechgraph.files import Format, format_of, write_whole
 from mechgraph.graph.linkgraph import LinkGraph, link_graph
+from mechgraph.memo import dataclass
 from mechgraph.model.gears import moving_lines
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Pair

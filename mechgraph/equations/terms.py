@@ -10,7 +10,7 @@ import html
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import chain
 
@@ -23,6 +23,7 @@ from mechgraph.errors import DeclarationError, counted
 from mechgraph.files import cell, csv_of
 from mechgraph.maths.linear import unique_solution
 from mechgraph.maths.se3 import Array
+from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.pairs.factors import Component, Freedom
 from mechgraph.quantities import place_among, wrong

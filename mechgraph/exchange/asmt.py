@@ -21,15 +21,18 @@ from __future__ import annotations
 import functools
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, FileError, listed
 from mechgraph.exchange.syntax import Node, is_name, numbers_of, tree_of
+from mechgraph.files import text_of
 from mechgraph.maths.se3 import Array, compose, inverse, rotation_exp, rotation_log
+from mechgraph.memo import dataclass
 from mechgraph.model.toml import LONGEST_SWEEP
 from mechgraph.pairs.factors import Freedom
 from mechgraph.pairs.pair_type import PairType
@@ -575,3 +578,74 @@ class Standing:
         points = np.array([self.pose(path)[:, 3] for path in a.markers] + centers or [np.zeros(3)])
         radius = float(np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=1).mean()))
         return radius if radius > UNMENTIONED * max(1.0, float(np.abs(points).max())) else 1.0
+
+
+def assembly_of(path: Path) -> Assembly:
+    """A FreeCAD assembly as its file holds it."""
+    return AsmtReader(path, text_of(path, "FreeCAD assembly")).read()
+
+
+AGREES = 1e-4
+"""Differences up to here count as agreement: FreeCAD's solver closes to 1e-6 and differentiates twice."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """The largest difference of a quantity over the stored times, and the size to which it is relative.
+
+    ``missing``: the number of values that are not unique, so that the file has one of many.
+    """
+
+    of: str
+    quantity: str
+    largest: float
+    size: float
+    missing: int = 0
+
+    @property
+    def relative(self) -> float:
+        """The difference relative to the size; the difference itself where that is 0."""
+        return self.largest / self.size if self.size else self.largest
+
+    def cells(self) -> tuple[str, ...]:
+        """The cells of the table."""
+        remark = "not unique: the file has one of many" if self.missing else ""
+        shown = ("", "") if np.isnan(self.largest) else (f"{self.largest:.3g}", f"{self.relative:.2g}")
+        return self.of, self.quantity, f"{self.size:.4g}" if self.size else "", *shown, remark
+
+
+@dataclass(frozen=True, repr=False)
+class Comparison(Shown):
+    """All differences between a file's results and mechgraph's."""
+
+    name: str
+    times: int
+    differences: tuple[Difference, ...]
+
+    @property
+    def agrees(self) -> bool:
+        """Whether everything that is unique agrees to ``AGREES``."""
+        return all(np.isnan(d.largest) or d.relative <= AGREES for d in self.differences)
+
+    def document(self) -> Document:
+        """The verdict and a table."""
+        off = [d for d in self.differences if d.relative > AGREES]
+        worst = max(off, key=lambda d: d.relative, default=None)
+        verdict = f"All that is unique agrees to {AGREES:g}"
+        if worst is not None:
+            count = f"Quantities off by more than {AGREES:g}: {len(off)} of {len(self.differences)}"
+            verdict = f"{count}, {worst.quantity} of {worst.of} the most"
+        head = ("of", "quantity", "greatest in the file", "difference", "relative", "")
+        rows = tuple(d.cells() for d in self.differences)
+        return Document(
+            f"{self.name}: FreeCAD's stored results beside mechgraph's",
+            (Paragraph(f"{verdict}, at {self.times} times."), Table(head, rows, "llrrrl")),
+        )
+
+
+def difference(of: str, quantity: str, ours: Array, theirs: Array, size: float | None = None) -> Difference:
+    """The largest difference of vectors ``(T, 3)``; NaN where none of ours is unique."""
+    off = np.abs(ours - theirs)
+    known = ~np.isnan(off)
+    largest = float(off[known].max()) if known.any() else np.nan
+    return Difference(of, quantity, largest, float(np.abs(theirs).max()) if size is None else size, int((~known).sum()))

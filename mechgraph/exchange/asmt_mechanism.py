@@ -35,17 +35,26 @@ Names, placements and the zeros of joint coordinates are FreeCAD's. CAD writes a
 markers that fit to ``FITS`` are made to fit exactly where the parts stand: first axes that are parallel or perpendicular to that accuracy,
 and lines that are one, are made so, then each marker J is moved to the place that its joint gives it. What was moved is said. Markers that
 fit less are left as they are, and the loops are closed from there.
+
+Results that FreeCAD stored with an assembly beside those of mechgraph: placements of parts, forces of joints, efforts of motions.
+
+FreeCAD's solver stores for each part the place of its origin and its Bryant angles, ``R = Rx Ry Rz``; for each joint and motion the force
+and moment that it exerts on the part of marker I, in the directions of the assembly, about the origin of marker I (OndselSolver,
+ASMTConstraintSet). Where reactions are not unique it sets redundant conditions aside and stores one of many solutions.
 """
 
 from __future__ import annotations
 
+import dataclasses
+import os
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import scipy
 
-from mechgraph.errors import DeclarationError, listed
+from mechgraph.errors import ContentError, DeclarationError, FileError, MechgraphWarning, listed
 from mechgraph.exchange.asmt import (
     FITS,
     HALF_TURNS,
@@ -55,26 +64,35 @@ from mechgraph.exchange.asmt import (
     UNMENTIONED,
     AsmtPart,
     Assembly,
+    Comparison,
     Connection,
+    Difference,
     Directions,
     JointRow,
+    Results,
     Snapping,
     Standing,
+    assembly_of,
     ball_type,
+    difference,
     free,
     motion_type,
+    results_of,
     turns_in,
 )
 from mechgraph.exchange.syntax import FormulaFault, evaluated, law
 from mechgraph.fields import second_direction
+from mechgraph.kinetostatics import solve
 from mechgraph.maths.inertia import physical_faults
 from mechgraph.maths.se3 import Array, compose, inverse
+from mechgraph.memo import dataclass
 from mechgraph.model.couplings import Coupling
 from mechgraph.model.loads import ForceLaw, Gravity, Spring
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.quantities import shown
+from mechgraph.result.solution import Solution
 
 BALL, HINGE, SLEEVE = ("S", False), ("R", False), ("C", True)
 RODS = {
@@ -655,3 +673,115 @@ class Builder(Standing):
 def mechanism_of(assembly: Assembly) -> tuple[Mechanism, tuple[str, ...]]:
     """The mechanism of an assembly, and what was taken otherwise than it stands in the file."""
     return Builder(assembly).build()
+
+
+FORCES = ("FXonI", "FYonI", "FZonI")
+TORQUES = ("TXonI", "TYonI", "TZonI")
+FREEDOM_OF = {"RotationalMotion": "Rz", "TranslationalMotion": "Tz"}
+
+
+def _rows(rows: Mapping[str, Array], labels: tuple[str, ...]) -> Array | None:
+    return np.stack([rows[label] for label in labels], axis=-1) if set(labels) <= set(rows) else None
+
+
+@dataclass(frozen=True)
+class _Compared:
+    """The solution at the stored times, and what it is compared with."""
+
+    assembly: Assembly
+    results: Results
+    s: Solution
+
+    def place(self, marker: str) -> tuple[Array, Array]:
+        """Origin ``(T, 3)`` and z axis ``(T, 3)`` of a marker."""
+        found = self.assembly.markers[marker]
+        X = self.s.link(found.part).pose
+        at = self.assembly.ground.pose if found.part == self.assembly.name else np.eye(3, 4)
+        p, z = at[:, :3] @ found.pose[:, 3] + at[:, 3], at[:, :3] @ found.pose[:, 2]
+        return X[:, :3, :3] @ p + X[:, :3, 3], X[:, :3, :3] @ z
+
+    def parts(self) -> Iterator[Difference]:
+        """Places, relative to the largest coordinate of all, and turns of the parts."""
+        paths = {part.path: part.name for part in self.assembly.parts.values()}
+        known = set(self.s.mechanism.link_names())
+        stored = {
+            paths[path]: rows for (kind, path), rows in self.results.series.items() if kind == "Part" and path in paths
+        }
+        stored = {name: rows for name, rows in stored.items() if name in known}
+        size = max(
+            (float(np.abs(p).max()) for rows in stored.values() if (p := _rows(rows, ("X", "Y", "Z"))) is not None),
+            default=1.0,
+        )
+        for name, rows in stored.items():
+            place, angles = _rows(rows, ("X", "Y", "Z")), _rows(rows, ("Bryantx", "Bryanty", "Bryantz"))
+            X = self.s.link(name).pose
+            if place is not None:
+                yield difference(name, "place", X[:, :3, 3], place, size)
+            if angles is not None:
+                rotation = scipy.spatial.transform.Rotation
+                turn = rotation.from_matrix(X[:, :3, :3]).inv() * rotation.from_euler("XYZ", angles)
+                yield difference(name, "turn [rad]", turn.as_rotvec(), np.zeros((len(X), 3)), 0.0)
+
+    def wrenches(self) -> Iterator[tuple[str, Array, Array, Array, Array]]:
+        """Name, force and moment on I of ours and theirs, for each joint and each motion of a single joint."""
+        root = f"/{self.assembly.name}/"
+        for found in [*self.assembly.joints, *self.assembly.motions]:
+            rows = self.results.series.get((found.kind, root + found.name))
+            stored = rows and (_rows(rows, FORCES), _rows(rows, TORQUES))
+            ours = self.on_i(found) if stored and stored[0] is not None and stored[1] is not None else None
+            if ours is not None:
+                yield found.name, *ours, *stored  # type: ignore[misc]
+
+    def on_i(self, found: Connection) -> tuple[Array, Array] | None:
+        """Force and moment of a joint or motion on the part of I, about marker I; None where there is no pair of it."""
+        names = {pair.name for pair in self.s.mechanism.pairs}
+        if found.kind not in FREEDOM_OF:
+            if found.name not in names:
+                return None
+            origin, _ = self.place(found.i)
+            moment, force = -self.s[found.name].reaction[..., :3], -self.s[found.name].reaction[..., 3:]
+            return force, moment - np.cross(origin, force)
+        joint = next((j for j in self.assembly.joints if found.joint.endswith(f"/{j.name}") or found.i == j.i), found)
+        pair = self.s.mechanism.pair(joint.name) if joint.name in names and found.i in ("", joint.i) else None
+        place = [f.name for f in pair.type.freedoms].index(FREEDOM_OF[found.kind]) if pair else 0
+        if pair is None:
+            return None
+        (origin, z), (other, _) = self.place(joint.i), self.place(joint.j)
+        along = -self.s[joint.name].effort[:, place, None] * z
+        if pair.type.freedoms[place].turns:
+            return np.zeros_like(along), along
+        return along, np.cross(other - origin, along)
+
+    def all(self) -> Iterator[Difference]:
+        """All differences; forces relative to the greatest force of all, moments to the greatest moment."""
+        yield from self.parts()
+        found = list(self.wrenches())
+        largest = [max((float(np.abs(row[k]).max()) for row in found), default=0.0) for k in (3, 4)]
+        for name, force, moment, stored_force, stored_moment in found:
+            yield difference(name, "force", force, stored_force, largest[0])
+            yield difference(name, "moment", moment, stored_moment, largest[1])
+
+
+def compare(path: str | os.PathLike[str]) -> Comparison:
+    """FreeCAD's stored results beside those of mechgraph for the same motions at the same times.
+
+    Raises
+    ------
+    FileError
+        where the file holds no results, or no motions that prescribe the movement.
+    """
+    path = Path(path)
+    assembly = assembly_of(path)
+    results = results_of(assembly, path)
+    if not assembly.motions:
+        raise FileError(
+            path, "has no motions: its results are a free movement, which cannot be computed from positions alone"
+        )
+    try:
+        m, _ = mechanism_of(dataclasses.replace(assembly, times=results.times))
+    except DeclarationError as error:
+        raise ContentError(path, error) from None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MechgraphWarning)
+        s = solve(m, on_reach="flag")
+    return Comparison(assembly.name, results.times.size, tuple(_Compared(assembly, results, s).all()))

@@ -21,7 +21,7 @@ import os
 import re
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,7 @@ from mechgraph.files import write_whole
 from mechgraph.kinetostatics import assemble
 from mechgraph.maths.inertia import physical_faults, shifted
 from mechgraph.maths.se3 import Array, compose, inverse, matrix_quaternion, move_twist, quaternion_matrix
+from mechgraph.memo import dataclass
 from mechgraph.model.couplings import Coupling
 from mechgraph.model.loads import Gravity
 from mechgraph.model.mechanism import Mechanism

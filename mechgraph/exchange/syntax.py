@@ -17,7 +17,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 from xml.parsers import expat
@@ -27,6 +27,7 @@ import numpy as np
 from mechgraph.errors import FileError
 from mechgraph.files import text_of
 from mechgraph.maths.se3 import Array
+from mechgraph.memo import dataclass
 from mechgraph.quantities import LARGEST, shown
 
 

@@ -7,7 +7,7 @@ urdf/XML (link, joint).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from mechgraph.errors import DeclarationError, listed
 from mechgraph.exchange.syntax import XmlElement, read_xml
 from mechgraph.maths.inertia import physical_faults
 from mechgraph.maths.se3 import Array, compose
+from mechgraph.memo import dataclass
 from mechgraph.model.couplings import Coupling
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Marker, Pair, second_direction

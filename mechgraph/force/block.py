@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy
@@ -40,6 +40,7 @@ from mechgraph.kinematics.touching import ContactLines
 from mechgraph.maths.linear import add_at
 from mechgraph.maths.se3 import Array, Index, Mask, cross, rotate_back
 from mechgraph.maths.tolerances import MOTIONS, STRESSES
+from mechgraph.memo import dataclass
 from mechgraph.model.belts import pretensions
 from mechgraph.model.friction import Friction, pairs_of, rubbing_loads
 from mechgraph.model.loads import Load

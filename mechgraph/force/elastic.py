@@ -17,7 +17,6 @@ Source: S. Timoshenko, Strength of Materials II, 1956; C. L. Lawson and R. J. Ha
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -36,6 +35,7 @@ from mechgraph.kinematics.system import System
 from mechgraph.kinematics.touching import ContactLines
 from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.tolerances import STRESSES
+from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 
 LIFTS_OFF = Status.LIFTS_OFF.value

@@ -15,7 +15,7 @@ Mathematical Programming 58, 1993; F. Pfeiffer and Ch. Glocker, Multibody Dynami
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 from typing import Any
 
@@ -26,6 +26,7 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.touching import ContactLines
 from mechgraph.maths.se3 import Array, Index, cross, skew
 from mechgraph.maths.tolerances import MOTIONS, STRESSES
+from mechgraph.memo import dataclass
 from mechgraph.model.friction import Friction, Rubs, places_in
 from mechgraph.model.gear_facts import mean_sliding
 

@@ -13,7 +13,6 @@ Source: Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23 (LSI
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from types import SimpleNamespace
@@ -33,6 +32,7 @@ from mechgraph.kinematics.touching import ContactLines
 from mechgraph.maths.linear import Choice, ChosenSystem, add_at, choose, least_solution
 from mechgraph.maths.se3 import Array, Index, batch_last, cross, shift_wrench
 from mechgraph.maths.tolerances import STRESSES
+from mechgraph.memo import dataclass
 from mechgraph.model.belts import BeltDrive, pretensions
 from mechgraph.model.gears import moving_lines
 from mechgraph.model.parameters import Parameters

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import product
 from os import PathLike
@@ -22,6 +22,7 @@ from typing import Annotated
 from mechgraph.errors import DeclarationError, FileError, counted
 from mechgraph.files import text_of, write_whole
 from mechgraph.graph.chains import Chain, ChainKind, chains, data_faults, family_faults
+from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.pairs.pair_type import TABLE
 from mechgraph.quantities import Count, Index, at_least, door, items_of, wrong

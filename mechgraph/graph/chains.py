@@ -25,7 +25,6 @@ winner, Annals of Discrete Mathematics 2, 1978 (orderly choice among symmetric o
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import combinations, combinations_with_replacement, pairwise, product
 from types import MappingProxyType
@@ -35,6 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.errors import counted
+from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Pair
 from mechgraph.pairs.pair_type import TABLE, PairType

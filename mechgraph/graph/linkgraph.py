@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain, pairwise
 from typing import TYPE_CHECKING
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 
 from mechgraph.errors import counted
 from mechgraph.maths.se3 import IN_PLANE, IN_SPACE
-from mechgraph.memo import of_graph
+from mechgraph.memo import dataclass, of_graph
 from mechgraph.model.mechanism import Mechanism
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import IntEnum
 from typing import Any
 
@@ -21,7 +21,7 @@ from mechgraph.kinematics.rates import PassiveMotion
 from mechgraph.kinematics.system import CouplingRows, System
 from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Array, Index, compose, identity, inverse, rotate
-from mechgraph.memo import carried
+from mechgraph.memo import carried, dataclass
 from mechgraph.model.friction import Friction, places_in
 from mechgraph.model.gears import moving_lines
 from mechgraph.model.loads import (

@@ -17,7 +17,7 @@ Source: Jaja, An Introduction to Parallel Algorithms, 1992, section 2.2 (pointer
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from mechgraph.graph.linkgraph import LinkGraph
 from mechgraph.maths.linear import Place, add_at, compact, scattered_sum
 from mechgraph.maths.se3 import Array, Index, compose, cross, homogeneous, identity, inverse, multiplied
-from mechgraph.memo import graph_cached, of_graph, unit_cached
+from mechgraph.memo import dataclass, graph_cached, of_graph, unit_cached
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Parameters
 from mechgraph.pairs import pair_type as evaluation

@@ -10,7 +10,7 @@ start -> first -> second ...
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from enum import Enum
 from typing import Any
 
@@ -24,6 +24,7 @@ from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.singular_point import WINDOW, Crossing, followed, passed
 from mechgraph.maths.tolerances import PATH
 from mechgraph.maths.tracker import End, Follower, Tracks
+from mechgraph.memo import dataclass
 
 FARTHEST = 1e6
 """Longest way of a driver from its start (radians, or lengths / L)."""

@@ -10,7 +10,7 @@ integrated by itself: the states of the whole mechanism are.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from mechgraph.maths.se3 import Array, Index, Mask, cross, rotate, rotate_back
 from mechgraph.maths.singular_point import WINDOW
 from mechgraph.maths.tolerances import PATH
 from mechgraph.maths.tracker import Follower
+from mechgraph.memo import dataclass
 
 
 def unspun(path: DriverPath, found: Positions, passive: tuple[PassiveMotion, ...]) -> Positions:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from itertools import combinations, product
 from typing import Any, NamedTuple
@@ -20,6 +19,7 @@ import numpy as np
 from mechgraph.errors import DeclarationError
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Array, homogeneous, rotation_log
+from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Marker, Pair

@@ -11,7 +11,6 @@ enters, and a body that is symmetric about its line needs no effort to be held s
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +21,7 @@ from mechgraph.graph.linkgraph import labels_of_bipartite, members
 from mechgraph.kinematics.state import ClosureSolver, Configuration, FactoredClosure
 from mechgraph.maths.se3 import Array, Index, cross, cross_twist
 from mechgraph.maths.tolerances import MOTIONS, PATH
+from mechgraph.memo import dataclass
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ Where that does not hold (a screw that advances), the whole way is followed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -38,6 +38,7 @@ from mechgraph.maths.se3 import Array, Index, compose, inverse, matrix_quaternio
 from mechgraph.maths.singular_point import followed
 from mechgraph.maths.tolerances import PATH
 from mechgraph.maths.tracker import End, Follower
+from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.pairs import pair_type as evaluation

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, Literal, Protocol
 
@@ -45,6 +45,7 @@ from mechgraph.maths.linear import (
 )
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import PATH, RANKS
+from mechgraph.memo import dataclass
 
 
 @dataclass(frozen=True)

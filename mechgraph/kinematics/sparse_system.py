@@ -30,7 +30,6 @@ Methods for Bifurcations of Dynamical Equilibria, 2000, chapter 3 (bordered syst
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
@@ -42,6 +41,7 @@ from mechgraph.kinematics.state import ClosureRows, Configuration, ReducedRows
 from mechgraph.maths.linear import BlockFactor, BlockTriangular, Factors, Pattern, SparseFactor, SparseFactors
 from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.tolerances import MOTIONS, RANKS
+from mechgraph.memo import dataclass
 
 
 @dataclass(frozen=True)

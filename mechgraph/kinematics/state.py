@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any, Protocol
 
@@ -32,6 +32,7 @@ from mechgraph.maths.linear import LeastNorm, complement
 from mechgraph.maths.newton import closest_zeros, least_norm_steps
 from mechgraph.maths.se3 import Array, Index, Mask, compose, cross, cross_twist, finite_twist, move_twist, multiplied
 from mechgraph.maths.tolerances import PATH, RANKS
+from mechgraph.memo import dataclass
 from mechgraph.model.gears import moving_lines
 from mechgraph.pairs import pair_type as evaluation
 

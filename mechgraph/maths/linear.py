@@ -26,7 +26,6 @@ matrix definite where rows of K depend on each other. Source: Bjorck, Numerical 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import pairwise
 from typing import Any, Literal
@@ -37,6 +36,7 @@ from numpy.typing import NDArray
 
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import RANKS
+from mechgraph.memo import dataclass
 
 Place = slice | Index
 """Places along an axis; a slice takes no copy."""

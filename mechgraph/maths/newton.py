@@ -10,7 +10,7 @@ Source: Stoer and Bulirsch, Introduction to Numerical Analysis, 2002, section 2.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from functools import cache, cached_property
 from typing import Any, Protocol
 
@@ -18,6 +18,7 @@ import numpy as np
 
 from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.tolerances import PATH
+from mechgraph.memo import dataclass
 
 LONGEST = 0.5
 """Longest step (largest increment) that is taken at once."""

@@ -23,7 +23,7 @@ led over a crossing from right before it, where rounding decides which branch it
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -32,6 +32,7 @@ from mechgraph.maths.newton import BENT, Nodes, Paths, Problem, largest, through
 from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.tolerances import PATH
 from mechgraph.maths.tracker import LEAD, End, Follower, Tracks
+from mechgraph.memo import dataclass
 
 WINDOW = 5e-3
 """Distance from a crossing below which states and rates are interpolated: accelerations lose rounding over its cube."""

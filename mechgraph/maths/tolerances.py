@@ -7,11 +7,12 @@ never when a module is loaded.
 
 # annotations are read at run time here: they hold the reasons
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
+from functools import partial
 from typing import Annotated, Any, ClassVar, cast, get_type_hints
 
 from mechgraph.errors import DeclarationError
-from mechgraph.memo import ASKED
+from mechgraph.memo import ASKED, class_cached, dataclass
 from mechgraph.quantities import is_numeric, wrong
 
 
@@ -470,13 +471,13 @@ def _reasons(part: type) -> dict[str, str]:
     return {f.name: hints[f.name].__metadata__[0] for f in fields(part)}
 
 
-def _listed() -> str:
-    """All fields with default and reason, as help shows them."""
-    lines = []
+def _listed(text: str, cls: type) -> str:
+    """The docstring with all fields, their defaults and reasons."""
+    lines = [f"{text}\n    All of them, with their default values:"]
     for name, part in PARTS.items():
         lines.append(f"\n    {name}: {(part.__doc__ or '').strip()}")
         lines += [f"        {f} = {getattr(part(), f):g} : {why}" for f, why in _reasons(part).items()]
-    return "\n".join(lines)
+    return "\n".join(lines) + "\n"
 
 
 @dataclass(frozen=True, repr=False)
@@ -526,7 +527,7 @@ class Tolerances:
     @property
     def asked(self) -> "Tolerances | None":
         """What calls go by: None where these are the default ones."""
-        return None if self == DEFAULT else self
+        return None if self == Tolerances() else self
 
     @property
     def changed(self) -> str:
@@ -545,8 +546,7 @@ class Tolerances:
                 yield f"{name}.{f} = {value:g}{f' (default {default:g})' if other else ''}", other, why
 
 
-Tolerances.__doc__ = f"{Tolerances.__doc__}\n    All of them, with their default values:\n{_listed()}\n"
-DEFAULT = Tolerances()
+Tolerances.__doc__ = class_cached(partial(_listed, Tolerances.__doc__ or ""), "__doc__", Tolerances)  # type: ignore[assignment]
 
 
 def _part(name: str, part: type, given: Mapping[str, Any], faults: list[str]) -> Any:
@@ -570,7 +570,8 @@ class _Asked:
         self._part = part
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(getattr(ASKED.get() or DEFAULT, self._part), name)
+        asked = ASKED.get()
+        return getattr(PARTS[self._part] if asked is None else getattr(asked, self._part), name)
 
 
 RANKS = cast(RankTolerances, _Asked("rank"))

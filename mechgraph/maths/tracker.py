@@ -15,7 +15,7 @@ Bifurcations of Dynamical Equilibria, 2000, chapter 3.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum
 
 import numpy as np
@@ -23,6 +23,7 @@ import numpy as np
 from mechgraph.maths.newton import Newton, Nodes, Paths, Problem, Work, cubic, through
 from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.tolerances import PATH
+from mechgraph.memo import dataclass
 
 
 def between(problem: Problem, a: Nodes, b: Nodes, part: Array | float, drive: Array) -> Array:

@@ -20,7 +20,6 @@ Source: Shigley and Mischke, Mechanical Engineering Design, 1989, chapter 17 (le
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from itertools import combinations, product
 from math import gcd
@@ -37,6 +36,7 @@ from mechgraph.fields import (
     TEXT,
 )
 from mechgraph.maths.se3 import Array, cross, identity
+from mechgraph.memo import dataclass
 from mechgraph.model.couplings import OF_BELTS, MeshStep, are_placed, fitting_of, meeting, motion_of, way
 from mechgraph.model.gears import (
     LineCoupling,

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -38,6 +37,7 @@ from mechgraph.fields import (
 )
 from mechgraph.maths.se3 import Array, cross
 from mechgraph.maths.tolerances import SHAPES
+from mechgraph.memo import dataclass
 from mechgraph.model.pair import Marker, Nameable, Pair
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.quantities import LENGTH, PURE, is_numeric, shown, without_units, wrong

@@ -9,7 +9,7 @@ from __future__ import annotations
 import operator
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import cached_property
 from itertools import repeat
 from types import MappingProxyType
@@ -36,7 +36,7 @@ from mechgraph.fields import (
 from mechgraph.maths.inertia import physical
 from mechgraph.maths.se3 import IN_PLANE, IN_SPACE, Array
 from mechgraph.maths.tolerances import SHAPES
-from mechgraph.memo import Once, of_graph
+from mechgraph.memo import Once, dataclass, of_graph
 from mechgraph.model.couplings import BaseCoupling, SpurGears, fitting_of
 from mechgraph.model.friction import LOADS
 from mechgraph.model.gears import GEARS

@@ -9,7 +9,7 @@ import inspect
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 from urllib.parse import quote
 
@@ -56,46 +56,62 @@ DEGREES = "_deg"
 """Ending of the name of an angle that is given in degrees."""
 
 
-@dataclass(frozen=True)
 class FileTable:
     """One table of the format: ``make`` builds its object, ``fields`` by their names in files, ``needed`` must be there.
 
-    ``attributes`` are the names of the fields in the object, ``defaults`` what a field left out counts as, ``rules`` more of its schema.
+    The fields are those that only the file has (``first``), those that the class describes, and ``more``. ``attributes`` are the names of
+    the fields in the object, ``defaults`` what a field left out counts as, ``rules`` more of its schema.
     """
 
-    make: Any
-    words: str
-    fields: Mapping[str, FieldFormat]
-    needed: tuple[str, ...]
-    attributes: Mapping[str, str]
-    defaults: Mapping[str, Any]
-    rules: Schema = field(default_factory=dict)
+    def __init__(
+        self,
+        make: Any,
+        first: Mapping[str, FieldFormat] | None = None,
+        *,
+        words: str = "",
+        needed: Sequence[str] | None = None,
+        rules: Schema | None = None,
+        **more: FieldFormat,
+    ) -> None:
+        self.make, self.rules = make, rules or {}
+        self._first, self._more, self._words, self._needed = first or {}, more, words, needed
+
+    @property
+    def words(self) -> str:
+        """What it is, in a sentence."""
+        return self._words or (self.make.__doc__ or "").partition("\n")[0].replace("``", "")
+
+    @cached_property
+    def _own(self) -> Mapping[str, FieldFormat]:
+        return self.make.formats if inspect.isclass(self.make) and issubclass(self.make, Formatted) else {}
+
+    @cached_property
+    def attributes(self) -> Mapping[str, str]:
+        """Names of fields in files -> in the object."""
+        return {about.key or name: name for name, about in self._own.items()}
+
+    @cached_property
+    def fields(self) -> Mapping[str, FieldFormat]:
+        """What each field holds, by its name in files."""
+        return {**self._first, **{key: self._own[name] for key, name in self.attributes.items()}, **self._more}
+
+    @cached_property
+    def defaults(self) -> Mapping[str, Any]:
+        """What a field that is left out counts as."""
+        taken = inspect.signature(self.make).parameters if self.make is not None else {}
+        names = {key: self.attributes.get(key, key) for key in self.fields}
+        return {key: taken[name].default for key, name in names.items() if name in taken}
+
+    @cached_property
+    def needed(self) -> tuple[str, ...]:
+        """Fields that must be there."""
+        empty = [key for key, value in self.defaults.items() if value is inspect.Parameter.empty]
+        return tuple(empty if self._needed is None else self._needed)
 
     @property
     def in_degrees(self) -> Mapping[str, str]:
         """Names of angles given in degrees -> names of the fields."""
         return {name + DEGREES: name for name, about in self.fields.items() if about.degrees}
-
-
-def _table(
-    make: Any,
-    first: Mapping[str, FieldFormat] | None = None,
-    *,
-    words: str = "",
-    needed: Sequence[str] | None = None,
-    rules: Schema | None = None,
-    **more: FieldFormat,
-) -> FileTable:
-    """The table of a class (or function): fields that only the file has, those that the class describes, and ``more``."""
-    own = make.formats if inspect.isclass(make) and issubclass(make, Formatted) else {}
-    attributes = {about.key or name: name for name, about in own.items()}
-    fields = {**(first or {}), **{key: own[name] for key, name in attributes.items()}, **more}
-    taken = inspect.signature(make).parameters if make is not None else {}
-    defaults = {key: taken[attributes.get(key, key)].default for key in fields if attributes.get(key, key) in taken}
-    if needed is None:
-        needed = [key for key, value in defaults.items() if value is inspect.Parameter.empty]
-    summary = words or (make.__doc__ or "").partition("\n")[0].replace("``", "")
-    return FileTable(make, summary, fields, tuple(needed), attributes, defaults, rules or {})
 
 
 def _one_of(how: str, *names: str) -> Schema:
@@ -125,33 +141,33 @@ _FILE = {
 _PER_PITCH = SIX("part multiplied by the pitch of the pair", default="0")
 
 TABLES_OF_FILE: dict[str, FileTable] = {
-    "file": _table(
+    "file": FileTable(
         Mechanism,
         _FILE,
         needed=("schema", "name"),
         words="A mechanism file of mechgraph (TOML), schema number 1. Described field by field in README.md beside this file.",
         rules={"not": {"required": ["chain", "pair"]}},
     ),
-    "units": _table(
+    "units": FileTable(
         None,
         words="Names of the units in which the numbers of the file are given; a consistent set.",
         first={name: TEXT(f"name of the unit of {name}") for name in BASE_UNITS},
         needed=(),
     ),
-    "link": _table(Link),
-    "pair": _table(Pair, words="A kinematic pair from link a to link b."),
-    "marker": _table(Marker, words="A marker frame in a link's own frame."),
-    "hertz": _table(Hertz, words="What the pressure in a contact takes: materials and shapes of its elements."),
-    "stiffness": _table(Stiffness, words="Stiffness of a pair by its reaction components."),
-    "misfit": _table(Misfit, words="Misfit of the seat of a pair by its reaction components."),
-    "film": _table(Journal, words="The oil film of a journal bearing."),
-    "cam_law": _table(CamLaw),
-    "segment": _table(Segment, needed=("law",)),
-    **{f"curve {kind}": _table(curve) for kind, curve in WRITABLE.items()},
-    **{f"surface {kind}": _table(surface) for kind, surface in WRITABLE_SURFACES.items()},
-    **{f"coupling {kind}": _table(coupling) for kind, coupling in EVERY_COUPLING.items()},
-    **{f"gear {kind}": _table(gear) for kind, gear in GEARS.items()},
-    "chain": _table(
+    "link": FileTable(Link),
+    "pair": FileTable(Pair, words="A kinematic pair from link a to link b."),
+    "marker": FileTable(Marker, words="A marker frame in a link's own frame."),
+    "hertz": FileTable(Hertz, words="What the pressure in a contact takes: materials and shapes of its elements."),
+    "stiffness": FileTable(Stiffness, words="Stiffness of a pair by its reaction components."),
+    "misfit": FileTable(Misfit, words="Misfit of the seat of a pair by its reaction components."),
+    "film": FileTable(Journal, words="The oil film of a journal bearing."),
+    "cam_law": FileTable(CamLaw),
+    "segment": FileTable(Segment, needed=("law",)),
+    **{f"curve {kind}": FileTable(curve) for kind, curve in WRITABLE.items()},
+    **{f"surface {kind}": FileTable(surface) for kind, surface in WRITABLE_SURFACES.items()},
+    **{f"coupling {kind}": FileTable(coupling) for kind, coupling in EVERY_COUPLING.items()},
+    **{f"gear {kind}": FileTable(gear) for kind, gear in GEARS.items()},
+    "chain": FileTable(
         None,
         words="A single closed loop: prod_k D_k(q_k) Tz(offset_k) Tx(length_k) Rx(twist_k) = 1.",
         needed=("pairs",),
@@ -161,24 +177,26 @@ TABLES_OF_FILE: dict[str, FileTable] = {
         offset=NUMBERS("along the axis of pair k", LENGTH, default="0"),
         pitch=OTHER("of the helical pairs, in order or by name", LENGTH, rules=_PITCHES),
     ),
-    "drive": _table(Drive),
-    "motion": _table(
+    "drive": FileTable(Drive),
+    "motion": FileTable(
         Motion,
         words="Motion of a drive, one value a position.",
         needed=(),
         rules=_one_of("oneOf", "position", f"position{DEGREES}", "sweep", f"sweep{DEGREES}"),
         sweep=_SWEEP,
     ),
-    "response": _table(ResponseSetup),
-    "synthesis": _table(SynthesisSetup),
-    "synthesis_task": _table(
+    "response": FileTable(ResponseSetup),
+    "synthesis": FileTable(SynthesisSetup),
+    "synthesis_task": FileTable(
         SynthesisTask, words="What is asked at every position: a function, a path, poses, or positions."
     ),
-    "event": _table(Event, words="A time at which the coordinate of a freedom, or one of its rates, passes a value."),
-    "stop": _table(Stop, words="Limits of a freedom, which it strikes."),
-    "law": _table(ForceTable, needed=("force",), rules=_one_of("anyOf", "x", "v", f"x{DEGREES}", f"v{DEGREES}")),
-    **{f"load {kind}": _table(load) for kind, load in LOADS.items()},
-    "pair_type": _table(
+    "event": FileTable(
+        Event, words="A time at which the coordinate of a freedom, or one of its rates, passes a value."
+    ),
+    "stop": FileTable(Stop, words="Limits of a freedom, which it strikes."),
+    "law": FileTable(ForceTable, needed=("force",), rules=_one_of("anyOf", "x", "v", f"x{DEGREES}", f"v{DEGREES}")),
+    **{f"load {kind}": FileTable(load) for kind, load in LOADS.items()},
+    "pair_type": FileTable(
         PairType,
         words="A row of the pair table of the user's own.",
         symbol=TEXT("what `type` of a pair names; letters and digits", rules={"pattern": "^[A-Za-z_][A-Za-z0-9_]*$"}),
@@ -199,14 +217,14 @@ TABLES_OF_FILE: dict[str, FileTable] = {
         directed=FLAG("whether it has an axis"),
         square_second=FLAG("whether `second` must be perpendicular as given"),
     ),
-    "freedom": _table(
+    "freedom": FileTable(
         Freedom,
         words="One elementary freedom: a constant unit twist in the frame left by the freedoms before it.",
         name=TEXT("name within the pair, e.g. Rz"),
         twist=SIX("a unit twist, angular part first"),
         per_pitch=_PER_PITCH,
     ),
-    "component": _table(
+    "component": FileTable(
         Component,
         words="A constant wrench: a reaction component or an effort.",
         name=TEXT("name, e.g. Fx"),
@@ -215,7 +233,7 @@ TABLES_OF_FILE: dict[str, FileTable] = {
         per_pitch=_PER_PITCH,
         at_b=FLAG("whether the origin is that of marker B rather than of the frame"),
     ),
-    "bookkeeping": _table(
+    "bookkeeping": FileTable(
         Bookkeeping,
         words="How a count in Lee's manner writes the pair: a free dual force and parts along the axis, under conditions.",
         needed=(),
@@ -223,10 +241,10 @@ TABLES_OF_FILE: dict[str, FileTable] = {
         along=TABLES("components that the pair transmits along its axis", table="component"),
     ),
 }
-TABLES_OF_FILE["load wrench"] = _table(LOADS["wrench"], rules=_one_of("anyOf", "force", "moment"))
+TABLES_OF_FILE["load wrench"] = FileTable(LOADS["wrench"], rules=_one_of("anyOf", "force", "moment"))
 for _kind in ("damper", "force_law"):
     _places = {"oneOf": [{"required": ["freedom"]}, {"required": ["a", "b", "p", "q"]}]}
-    TABLES_OF_FILE[f"load {_kind}"] = _table(LOADS[_kind], rules=_places)
+    TABLES_OF_FILE[f"load {_kind}"] = FileTable(LOADS[_kind], rules=_places)
 
 
 def _array(count: int) -> dict[str, Any]:

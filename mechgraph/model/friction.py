@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import NUMBER, POSITIVE, TEXT
 from mechgraph.maths.se3 import Array
+from mechgraph.memo import dataclass
 from mechgraph.model.loads import BASIC_LOADS, Load, LoadSite
 from mechgraph.pairs.factors import UNIT_TWISTS
 from mechgraph.pairs.pair_type import PairType

@@ -6,7 +6,6 @@ Source: ISO 21771:2007, Cylindrical involute gears and gear pairs; G. Niemann an
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 from math import acos, atan, cos, pi, sin, sqrt, tan
 from typing import TYPE_CHECKING, Any
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mechgraph.errors import DeclarationError
+from mechgraph.memo import dataclass
 from mechgraph.model.couplings import Axes, BaseCoupling, BevelGears, Rack, SpurGears
 from mechgraph.model.gears import Gear, GearRack, involute, tip_radius
 from mechgraph.model.meshes import Bevels, Mesh, Parallel, WithRack

@@ -26,7 +26,7 @@ gear pairs.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property, partial
 from math import atan, cos, pi, tan
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self
@@ -47,6 +47,7 @@ from mechgraph.fields import (
     second_direction,
 )
 from mechgraph.maths.se3 import Array, compose, cross, identity, inverse
+from mechgraph.memo import dataclass
 from mechgraph.model.couplings import (
     FULL,
     PRESSURE,

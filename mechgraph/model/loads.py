@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Protocol, Self
 
@@ -36,6 +36,7 @@ from mechgraph.fields import (
     same_fields,
 )
 from mechgraph.maths.se3 import Array, rotate
+from mechgraph.memo import dataclass
 from mechgraph.model.pair import Nameable
 from mechgraph.quantities import (
     ACCELERATION,

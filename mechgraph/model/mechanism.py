@@ -11,7 +11,6 @@ import itertools
 import math
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -25,7 +24,7 @@ from mechgraph.errors import DeclarationError, MechgraphWarning, counted
 from mechgraph.fields import Described, plain, same_fields
 from mechgraph.maths.se3 import Array, identity, inverse
 from mechgraph.maths.tolerances import Tolerances
-from mechgraph.memo import carried, under
+from mechgraph.memo import carried, dataclass, under
 from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.declaration import (
     DeclaredParts,

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import combinations
 from math import atan, cos, pi, sin, tan
 from typing import Annotated, Any, ClassVar, Self
@@ -19,6 +18,7 @@ from mechgraph.fields import (
     TEXT,
 )
 from mechgraph.maths.se3 import Array, cross, identity
+from mechgraph.memo import dataclass
 from mechgraph.model.couplings import (
     OF_TEETH,
     Axes,

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Protocol
 
 import numpy as np
@@ -22,6 +21,7 @@ from numpy.typing import ArrayLike
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import FREEDOM_NAME, SERIES, TABLE, Described, between
 from mechgraph.maths.se3 import Array
+from mechgraph.memo import dataclass
 from mechgraph.pairs.cam_laws import RISES, SCCA, Segment
 from mechgraph.quantities import LENGTH, PURE, TIME, has_quantity, real_array, shown, wrong
 

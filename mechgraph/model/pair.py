@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, field
 from functools import partial
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Protocol
@@ -31,6 +31,7 @@ from mechgraph.fields import second_direction as second_direction
 from mechgraph.maths.inertia import physical_faults
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import SHAPES
+from mechgraph.memo import dataclass
 from mechgraph.pairs.contact_types import (
     ROWS,
     Hertz,

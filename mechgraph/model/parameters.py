@@ -8,7 +8,7 @@ stands and whatever its units: internal position = (R_b offset_b + p_b - center)
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import accumulate, chain, pairwise
 from operator import attrgetter
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.maths.se3 import Array, cross
+from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 
 Index = NDArray[np.intp]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, Self, get_args
 
@@ -25,6 +25,7 @@ from mechgraph.fields import (
     same_fields,
 )
 from mechgraph.maths.se3 import Array
+from mechgraph.memo import dataclass
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Nameable
 from mechgraph.quantities import (

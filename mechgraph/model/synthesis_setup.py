@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 
 from mechgraph.fields import FACTS, INTEGER, NAMES, OTHER, TABLES, TEXT, Described, Schema, plain, same_fields
+from mechgraph.memo import dataclass
 from mechgraph.quantities import is_numeric, items_of, real_array, wrong
 
 TaskName = Literal["function", "path", "poses", "positions"]

@@ -6,7 +6,6 @@ All assemblies as they are returned, and their records.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property, cmp_to_key
 from math import prod
 from typing import Annotated, Any
@@ -27,6 +26,7 @@ from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import Index
 from mechgraph.maths.tolerances import MODES, Tolerances
+from mechgraph.memo import dataclass
 from mechgraph.model.gears import moving_lines
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.certificate import TINY, Certificate, certificate, told_apart

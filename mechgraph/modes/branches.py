@@ -10,7 +10,7 @@ that pass the same crossing meet in it. Pieces that arrive, one after the other,
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Annotated, Any
 
 import numpy as np
@@ -29,6 +29,7 @@ from mechgraph.maths.se3 import Index
 from mechgraph.maths.singular_point import passed
 from mechgraph.maths.tolerances import MODES
 from mechgraph.maths.tracker import End
+from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.assemblies import (
     Bifurcation,

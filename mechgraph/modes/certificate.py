@@ -32,7 +32,7 @@ Equations in Several Variables, 1970, section 12.6; Rump, Acta Numerica 19, 2010
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -40,6 +40,7 @@ import numpy as np
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Index, cross, rotate
 from mechgraph.maths.tolerances import MODES
+from mechgraph.memo import dataclass
 from mechgraph.modes.family import Array, Family
 from mechgraph.modes.form import RodSystem
 from mechgraph.pairs.factors import ConstantScrew, Rotation, screw_terms

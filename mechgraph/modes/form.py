@@ -19,7 +19,7 @@ go that of their two ways that is nearest to the start: ways of rods are no asse
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, cached_property
 from itertools import count
 from operator import itemgetter
@@ -46,6 +46,7 @@ from mechgraph.maths.se3 import (
     rotate,
 )
 from mechgraph.maths.tolerances import MODES, RANKS
+from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Pair
 from mechgraph.model.parameters import Parameters

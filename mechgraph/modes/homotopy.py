@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -22,6 +22,7 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Index, finite_twist, homogeneous, move_twist, multiplied, quaternion_product
 from mechgraph.maths.tolerances import MODES
+from mechgraph.memo import dataclass
 from mechgraph.modes.family import Array, Family, Member
 from mechgraph.pairs.factors import screw_terms, screw_values
 

@@ -48,7 +48,6 @@ from __future__ import annotations
 import zipfile
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +60,7 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import compose, pose_exp
 from mechgraph.maths.tolerances import MODES
+from mechgraph.memo import dataclass
 from mechgraph.modes.family import Array, Family, Labelling, Member, common, span
 from mechgraph.modes.form import RodFamily, is_one_group
 from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, Equated, Equations, Leg, Linear, follow

@@ -20,7 +20,7 @@ Sources: Assur's groups, see ``structure.groups``; Sommese and Wampler, The Nume
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -30,6 +30,7 @@ from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Index, compose, identity
 from mechgraph.maths.tolerances import MODES
+from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Pair
 from mechgraph.modes.family import Array, Family, Member, Nearby, irregular, least_value

@@ -16,7 +16,6 @@ import math
 import os
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, Self
@@ -38,7 +37,7 @@ from mechgraph.fields import (
 )
 from mechgraph.files import text_of
 from mechgraph.maths.se3 import Array
-from mechgraph.memo import Once
+from mechgraph.memo import Once, dataclass
 from mechgraph.pairs.curves import ORDERS, derivatives
 from mechgraph.quantities import factor_of, has_quantity, items_of, real_array, wrong
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Self
 
@@ -22,6 +21,7 @@ from numpy.typing import NDArray
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import FLAG, NUMBER, POSITIVE, SAMPLES, TABLE, TEXT
 from mechgraph.maths.se3 import Array, cross
+from mechgraph.memo import dataclass
 from mechgraph.pairs.cam_laws import CamLaw, LawPieces
 from mechgraph.pairs.curves import INTERVALS, ORDERS, Centred, Pieces, parted
 from mechgraph.quantities import LENGTH, wrong

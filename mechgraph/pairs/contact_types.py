@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import count
 from typing import Annotated, Any, NamedTuple
 
@@ -22,6 +22,7 @@ from mechgraph.errors import ShapeError
 from mechgraph.fields import POSITIVE, TWO, TWO_POSITIVE, Described
 from mechgraph.maths.se3 import Array, cross
 from mechgraph.maths.tolerances import SHAPES
+from mechgraph.memo import dataclass
 from mechgraph.pairs import pair_type as evaluation
 from mechgraph.pairs.curves import Curve, Line, Travel, outside, point_text, roller_faults, shape_faults
 from mechgraph.pairs.factors import Touching

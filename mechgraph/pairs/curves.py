@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import cached_property, partial
 from typing import Annotated, Any, ClassVar, Literal, cast
 
@@ -43,7 +43,7 @@ from mechgraph.fields import (
 )
 from mechgraph.maths.se3 import Array, cross
 from mechgraph.maths.tolerances import COMPLEX_STEP, SHAPES
-from mechgraph.memo import Once
+from mechgraph.memo import Once, dataclass
 from mechgraph.quantities import LENGTH, shown
 
 

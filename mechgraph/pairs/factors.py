@@ -14,13 +14,14 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.maths.se3 import Array, homogeneous, inverse, quaternion_matrix, skew
+from mechgraph.memo import dataclass
 from mechgraph.quantities import is_numeric, items_of, shown, wrong
 
 Six = tuple[float, float, float, float, float, float]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any
 
@@ -13,6 +12,7 @@ import scipy
 from mechgraph.fields import BESIDE, BREAKS, FLAG, FUNCTION, INTERVAL, POINT_LIST, asked, between, slope_faults
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import SHAPES
+from mechgraph.memo import dataclass
 from mechgraph.pairs.cams import ArmCam, Barrel, Cam, Globoid
 from mechgraph.pairs.curves import (
     INTERVALS,

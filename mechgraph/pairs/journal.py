@@ -15,7 +15,6 @@ method of solution, J. Basic Engineering 87, 1965; The table of the journal-bear
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -23,6 +22,7 @@ import numpy as np
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import POSITIVE, Described
 from mechgraph.maths.se3 import Array
+from mechgraph.memo import dataclass
 from mechgraph.pairs.factors import UNIT_TWISTS
 from mechgraph.quantities import LENGTH, PRESSURE_TIME, is_numeric, real_array, shown, wrong
 

@@ -13,9 +13,10 @@ All functions take ``n`` pairs of one type at ``T`` positions: state numbers ``x
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
-from dataclasses import KW_ONLY, dataclass, field, replace
+from dataclasses import KW_ONLY, field, replace
 from functools import cached_property
 from itertools import accumulate, pairwise, starmap
 from typing import Any
@@ -284,7 +285,7 @@ def _factors(given: Sequence[object], faults: list[str]) -> tuple[Factor, ...]:
     return tuple(out)
 
 
-@dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True)  # at once: rows of the table are made without ``__init__``
 class PairType:
     """Declare a row of the pair table: freedoms, reaction components, efforts.
 

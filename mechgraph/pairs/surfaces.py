@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, ClassVar
 
@@ -33,6 +32,7 @@ from mechgraph.fields import (
 )
 from mechgraph.fields import TABLE as NESTED
 from mechgraph.maths.se3 import Array, cross
+from mechgraph.memo import dataclass
 from mechgraph.pairs.curves import Circle, Curve, Line, far_from, parallel_faults, remade_from
 from mechgraph.quantities import LENGTH, PURE, shown, wrong
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Hashable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -14,6 +14,7 @@ import numpy as np
 from mechgraph.errors import DeclarationError, ShapeError
 from mechgraph.maths.se3 import Array, cross
 from mechgraph.maths.tolerances import COMPLEX_STEP, SHAPES
+from mechgraph.memo import dataclass
 from mechgraph.pairs.curves import (
     ORDERS,
     Curve,

@@ -35,7 +35,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -54,6 +54,7 @@ from mechgraph.maths.se3 import Array, Index, cross, rotate
 from mechgraph.maths.singular_point import WINDOW, Crossing, leapt, passed
 from mechgraph.maths.tolerances import PATH, RESPONSE
 from mechgraph.maths.tracker import End, Follower
+from mechgraph.memo import dataclass
 from mechgraph.model.loads import Load
 from mechgraph.response.charts import Task
 from mechgraph.response.motion_equations import ClosedChart, KernelPath, Loads, Stopped, along_one

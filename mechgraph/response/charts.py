@@ -14,7 +14,7 @@ falls with it: there steps of an integration had better end.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from typing import Any, Literal
@@ -35,6 +35,7 @@ from mechgraph.kinematics.system import System
 from mechgraph.kinematics.touching import strayed
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import RESPONSE
+from mechgraph.memo import dataclass
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion

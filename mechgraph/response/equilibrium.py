@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any, Literal
 
@@ -31,6 +30,7 @@ from mechgraph.kinematics.rates import Velocities
 from mechgraph.kinematics.solver import EngineName, engine_for
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import RESPONSE
+from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import door, unit_of
 from mechgraph.response.charts import OVER_POSITIONS, Prescribed, Task, trajectory_of

@@ -16,7 +16,6 @@ rates at its end. Source: Pfeiffer and Glocker, Multibody Dynamics with Unilater
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -30,6 +29,7 @@ from mechgraph.force.reactions import ForceProblem, user_wrench
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Array, Index, cross
 from mechgraph.maths.tolerances import RESPONSE
+from mechgraph.memo import dataclass
 from mechgraph.model.response_setup import Event, Stop
 from mechgraph.response.charts import Task
 from mechgraph.response.integration import Occurrence

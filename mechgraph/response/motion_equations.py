@@ -38,7 +38,6 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cached_property, partial
 from types import SimpleNamespace
 from typing import Any, Literal
@@ -62,6 +61,7 @@ from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import Factors
 from mechgraph.maths.se3 import Array, Index, cross, rotate, rotate_back
 from mechgraph.maths.tolerances import PATH, RESPONSE
+from mechgraph.memo import dataclass
 from mechgraph.model.friction import rubbing_loads
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism

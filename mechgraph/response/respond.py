@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
 from types import SimpleNamespace
 from typing import Annotated, Any, Literal, Protocol, get_args
@@ -35,6 +35,7 @@ from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import MOTIONS, RESPONSE, Tolerances
+from mechgraph.memo import dataclass
 from mechgraph.model.declaration import mapping_faults
 from mechgraph.model.gear_facts import with_play
 from mechgraph.model.loads import Law, Load

@@ -14,7 +14,7 @@ Source: Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts, 1996,
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from itertools import combinations, product
 from typing import Any, Protocol
@@ -28,6 +28,7 @@ from mechgraph.kinematics.prescribed import with_pairs_at
 from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import MOTIONS, RESPONSE
+from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.response_setup import Event, Stop

@@ -7,11 +7,10 @@ zero it holds, up to its greatest size.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from mechgraph.kinematics.system import System
+from mechgraph.memo import dataclass
 from mechgraph.model.friction import (
     Friction,
     coupling_of,

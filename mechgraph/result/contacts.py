@@ -13,7 +13,6 @@ neither. Where the radius is not declared it counts as zero.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -23,6 +22,7 @@ from mechgraph.document import Block, Document, Paragraph, Shown
 from mechgraph.errors import DeclarationError
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import SHAPES
+from mechgraph.memo import dataclass
 from mechgraph.model.belts import BeltDrive
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.meshes import Mesh

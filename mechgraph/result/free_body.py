@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import textwrap
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
@@ -17,6 +17,7 @@ from mechgraph.errors import DeclarationError
 from mechgraph.fields import NAMED_POINT
 from mechgraph.files import Format, cell, csv_of, format_of, write_whole
 from mechgraph.maths.se3 import IN_PLANE, IN_SPACE, Array
+from mechgraph.memo import dataclass
 from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.loads import Gravity, Load
 from mechgraph.model.mechanism import Mechanism

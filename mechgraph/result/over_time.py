@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
@@ -22,6 +21,7 @@ from mechgraph.errors import DeclarationError, MechgraphWarning
 from mechgraph.fields import vector_fault
 from mechgraph.files import read_off
 from mechgraph.maths.se3 import Array
+from mechgraph.memo import dataclass
 from mechgraph.model.pair import Pair
 from mechgraph.pairs.factors import WRENCHES
 from mechgraph.pairs.journal import ACROSS, TURN, Journal, film_faults

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any
 
@@ -14,6 +13,7 @@ from mechgraph.determinacy.uniqueness import labels_of
 from mechgraph.document import LISTED, Block, Bullets, Document, Heading, Paragraph, Table
 from mechgraph.errors import counted
 from mechgraph.maths.se3 import Array, Index
+from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import FORCE, POWER, PRESSURE, force_hint, unit_of
 from mechgraph.result.contacts import LiftOff, Overlap, contacts_of, lift_offs, overlaps

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import copy
-from dataclasses import dataclass
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -32,6 +31,7 @@ from mechgraph.maths.linear import EVERY, Place
 from mechgraph.maths.newton import Work
 from mechgraph.maths.se3 import Array, Index, cross, rotate, rotate_back, shift_wrench
 from mechgraph.maths.tolerances import MOTIONS, PATH, STRESSES
+from mechgraph.memo import dataclass
 from mechgraph.model.friction import Friction
 from mechgraph.model.gears import moving_lines
 from mechgraph.model.loads import Law, Load

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -13,6 +12,7 @@ from mechgraph.document import Document, Shown, Table
 from mechgraph.errors import MechgraphError
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import CHECKS, PATH, STRESSES
+from mechgraph.memo import dataclass
 from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism

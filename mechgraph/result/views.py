@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -13,6 +12,7 @@ from mechgraph.document import Block, Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import vector_fault
 from mechgraph.maths.se3 import Array
+from mechgraph.memo import dataclass
 from mechgraph.model.belts import BeltCourse, BeltDrive
 from mechgraph.model.couplings import Belt
 from mechgraph.model.friction import WAYS, Friction, coupling_of

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import matplotlib.patheffects as effects
@@ -15,6 +15,7 @@ from matplotlib.transforms import IdentityTransform
 
 from mechgraph.errors import visible
 from mechgraph.maths.se3 import Array
+from mechgraph.memo import dataclass
 from mechgraph.show.canvas import MUTED
 
 

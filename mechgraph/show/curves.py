@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import indexed
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import RANKS
+from mechgraph.memo import dataclass
 from mechgraph.pairs import cams
 from mechgraph.pairs.cam_laws import CamLaw
 from mechgraph.pairs.journal import Journal

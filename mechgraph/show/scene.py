@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -17,6 +17,7 @@ from mechgraph.kinematics.assembly import assembled
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Array
+from mechgraph.memo import dataclass
 from mechgraph.model.friction import Friction
 from mechgraph.model.gear_facts import without_play
 from mechgraph.model.loads import Effort, Law, Wrench

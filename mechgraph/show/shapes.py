@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import groupby, pairwise
 from typing import Any, Literal
 
@@ -11,6 +11,7 @@ import numpy as np
 import scipy
 
 from mechgraph.maths.se3 import Array
+from mechgraph.memo import dataclass
 from mechgraph.pairs.factors import Freedom
 from mechgraph.pairs.pair_type import PairType
 

@@ -9,13 +9,14 @@ Source: Litvin and Fuentes, Gear Geometry and Applied Theory, 2004, chapter 10.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from mechgraph.maths.se3 import Array
+from mechgraph.memo import dataclass
 from mechgraph.model.belts import BeltDrive, course
 from mechgraph.model.couplings import Axes, Belt, BevelGears, Contact, Rack, SpurGears, WormGear
 from mechgraph.model.gears import Gear, GearRack, Pulley, place_of

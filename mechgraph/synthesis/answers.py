@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,6 +14,7 @@ from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Sho
 from mechgraph.errors import DeclarationError, counted
 from mechgraph.files import optional, plain
 from mechgraph.maths.se3 import Array
+from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.assemblies import weakest
 from mechgraph.quantities import items_of, place_among, real_array, wrong

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from copy import copy
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -25,6 +24,7 @@ from mechgraph.maths.linear import complement, rank_of, singular_values
 from mechgraph.maths.newton import least_norm_steps
 from mechgraph.maths.se3 import Index, cross, finite_twist, pose_exp, rotation_exp
 from mechgraph.maths.tolerances import MODES
+from mechgraph.memo import dataclass
 from mechgraph.modes.family import Array, Family, common, generated
 from mechgraph.modes.homotopy import ENDLESS_STATE, Equations, Mask, rounding, solved
 from mechgraph.synthesis.system import ArrowRows, RowNumbers, RowProblem

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import combinations
 from typing import Annotated, Any, Literal
@@ -30,6 +30,7 @@ from mechgraph.kinetostatics import kinematics, solve, transmission
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import MODES
 from mechgraph.maths.tracker import End
+from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.assemblies import Question
 from mechgraph.modes.branches import in_order

@@ -12,7 +12,6 @@ sign at a row is refused, and of what is found the path follower of ``solve`` ha
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -26,6 +25,7 @@ from mechgraph.kinematics.solver import closure_solver, engine_for
 from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.tolerances import MODES
+from mechgraph.memo import dataclass
 from mechgraph.synthesis.fitness import keeps
 from mechgraph.synthesis.system import ArrowRows, RowProblem
 from mechgraph.synthesis.tasks import FunctionTask

@@ -14,7 +14,6 @@ import hashlib
 import json
 import zipfile
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ import numpy as np
 from mechgraph.errors import MechgraphError, counted
 from mechgraph.files import cache_folder, whole_file
 from mechgraph.maths.tolerances import MODES
+from mechgraph.memo import dataclass
 from mechgraph.modes.family import Array
 from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, follow
 from mechgraph.modes.start_sets import (

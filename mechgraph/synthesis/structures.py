@@ -9,7 +9,6 @@ it: such a choice is that of a smaller chain.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import chain as joined
 from itertools import combinations, permutations
 from typing import Any
@@ -22,6 +21,7 @@ from mechgraph.graph.chains import Chain
 from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import MODES
+from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Pair
 from mechgraph.quantities import shown

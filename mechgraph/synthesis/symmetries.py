@@ -8,13 +8,13 @@ exchange makes another one: the same mechanism with other names.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import permutations
 from typing import Any
 
 import numpy as np
 
 from mechgraph.maths.se3 import Index
+from mechgraph.memo import dataclass
 from mechgraph.modes.family import Array
 from mechgraph.modes.start_sets import distinct
 from mechgraph.synthesis.system import RowProblem

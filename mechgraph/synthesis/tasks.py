@@ -7,13 +7,14 @@ Every task is short for numbers by name, one a position: values of freedoms, coo
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any, Literal
 
 import numpy as np
 
 from mechgraph.kinematics.prescribed import Target, coordinate, parts_of, target_of
 from mechgraph.maths.se3 import Array
+from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import door, items_of, real_array, shown, wrong
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 import dataclasses
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,7 @@ from mechgraph.errors import DeclarationError, did_you_mean, near_names
 from mechgraph.fields import POINT, XYZ, Described, FieldFormat, PerCase
 from mechgraph.maths.inertia import physical
 from mechgraph.maths.se3 import Array
+from mechgraph.memo import dataclass
 from mechgraph.model.belts import BeltDrive
 from mechgraph.model.friction import Friction
 from mechgraph.model.gears import LineCoupling

@@ -7,7 +7,6 @@ import os
 import pickle
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal
@@ -26,7 +25,7 @@ from mechgraph.kinematics.solver import MotionEngineName
 from mechgraph.kinetostatics import RedundantName
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import Tolerances
-from mechgraph.memo import ASKED, under
+from mechgraph.memo import ASKED, dataclass, under
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.quantities import Count, Index, door, has_quantity, is_numeric, real_array, shown, wrong

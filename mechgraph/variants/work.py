@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import Any
 
@@ -33,6 +32,7 @@ from mechgraph.kinetostatics import Pipeline, RedundantName, solve_quietly
 from mechgraph.maths.newton import Paths
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tracker import End, Follower, Tracks
+from mechgraph.memo import dataclass
 from mechgraph.model.belts import BeltDrive
 from mechgraph.model.friction import Friction
 from mechgraph.model.mechanism import Mechanism

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from mechgraph.document import plain
 from mechgraph.kinematics.state import CLOSED, close
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import MOTIONS
+from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.pairs.factors import Component
