@@ -13,7 +13,7 @@ import typer.main
 
 import mechgraph as mg
 from mechgraph import show
-from mechgraph.cli import app
+from mechgraph.cli.commands import app
 
 ROOT = Path(__file__).resolve().parents[1]
 PARTS = (

@@ -44,7 +44,7 @@ def run_command(line: str) -> str:
     """A command as it is typed, and what it prints."""
     from typer.testing import CliRunner
 
-    from mechgraph.cli import app
+    from mechgraph.cli.commands import app
 
     program, *arguments = shlex.split(line.removeprefix("$ "))
     assert program == "mechgraph", line

@@ -13,7 +13,7 @@ NEEDED = ("typer", "rich")
 def main() -> None:
     """Run the command line; exit status 2 where its packages are missing, 130 where it is interrupted."""
     try:
-        from mechgraph.cli import app
+        from mechgraph.cli.commands import app
     except ImportError as error:
         missing = (error.name or "").partition(".")[0]
         if missing not in NEEDED:

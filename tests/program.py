@@ -10,7 +10,7 @@ from typing import Any
 
 from typer.testing import CliRunner, Result
 
-from mechgraph.cli import app
+from mechgraph.cli.commands import app
 
 ROOT = Path(__file__).resolve().parents[1]
 

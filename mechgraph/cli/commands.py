@@ -752,3 +752,23 @@ def _tell_found(command: str, found: Any, figure: Any, out: Path | None, json: b
     opt.show(found.document())
     if drawn is not None:
         opt.write(f"\nWrote {drawn}.\n")
+
+
+app = opt.app
+app.command("list")(list_library)
+for command in (
+    check,
+    structure,
+    equations,
+    solve,
+    respond,
+    save,
+    plot,
+    loads,
+    report,
+    assemblies,
+    branches,
+    synthesize,
+):
+    app.command(command.__name__)(opt.in_plane(command))
+app.command("compile")(opt.in_plane(compile_))

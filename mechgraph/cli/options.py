@@ -27,6 +27,7 @@ import typer
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.text import Text
+from typer.core import TyperGroup
 
 import mechgraph as mg
 from mechgraph.document import Document, to_text
@@ -543,3 +544,45 @@ def show_compared(mechanism: str) -> None:
         refuse(f"--compare {mechanism!r}", "is not a FreeCAD assembly (.asmt)")
     write("\n")
     show(compare(mechanism).document())
+
+
+class Program(TyperGroup):
+    """The command line, all of which comes to an outcome: options and help as well as commands."""
+
+    def main(self, *arguments: Any, **options: Any) -> Any:
+        """Run it, with streams that show what they cannot encode; a stream may have been closed."""
+        for stream in (sys.stdout, sys.stderr):
+            if stream is not None and hasattr(stream, "reconfigure"):
+                stream.reconfigure(errors="backslashreplace")
+        with outcome():
+            return super().main(*arguments, **options)
+
+    def invoke(self, context: Any) -> Any:
+        """Run a command, before the errors that are left are taken for those of the command line itself."""
+
+        def options() -> list[str]:
+            command = self.commands.get(context.invoked_subcommand or "")
+            return [one.name or "" for one in command.params] if command else []
+
+        with outcome(options), warned():
+            return super().invoke(context)
+
+
+app = typer.Typer(
+    name="mechgraph",
+    cls=Program,
+    help="Analyze spatial mechanisms: determinacy, equations, motion, driver efforts and reactions.\n\n" + EXIT_STATUS,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+@app.callback(invoke_without_command=True)
+def _main(
+    context: typer.Context, version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False
+) -> None:
+    if version:
+        write(f"mechgraph {mg.__version__}\n")
+        raise typer.Exit(DONE)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Hashable, Iterator, Sequence
 from contextlib import contextmanager
@@ -26,8 +27,7 @@ from mechgraph.pairs.curves import (
     turned,
 )
 from mechgraph.pairs.factors import UNIT_TWISTS, Factor, Freedom, PoseStack, Stack, entries
-from mechgraph.pairs.surfaces import Surface
-from mechgraph.quantities import is_numeric, wrong
+from mechgraph.quantities import LENGTH, is_numeric, wrong
 
 
 class Travelling(Factor):
@@ -384,132 +384,60 @@ def cutter_path(curve: Curve, radius: float) -> Curve:
     return Beside(base=curve, distance=side * distance)
 
 
-@dataclass(frozen=True)
-class OnSurface(Travelling):
-    """A frame that lies on a surface: z its normal, x along u; coordinates are lengths along u and v where they are zero.
+def extent(shape: Any, x: Array) -> float:
+    """The greatest length among those declared of a curve or surface and the coordinates of its point ``x (3,)``."""
+    named = [getattr(shape, name) for name, of in shape.formats.items() if of.slide == LENGTH]
+    return max(float(np.abs(values).max()) for values in (x, *(v for v in named if v is not None)))
 
-    D(q) = F(home)^-1 F(home + q / sizes), ``sizes`` being ``|x_u|`` and ``|x_v|`` at home; ``turned`` has the normal the other way round;
-    ``pair`` is the name for messages.
-    Without a surface it is a place for one: it can be counted, not evaluated.
-    """
 
-    surface: Surface | None = None
-    home: tuple[float, float] = (0.0, 0.0)
-    turned: bool = False
-    unit: float = 1.0
-    pair: str = field(default="", compare=False)
+def rounded(at: float, size: float) -> float:
+    """A place to ``SHAPES.place`` of the ``size`` of the numbers behind it; steps are powers of two: sizes near by have the same."""
+    step = math.ldexp(1.0, math.frexp(SHAPES.place * size)[1])
+    return step * round(at / step)
 
-    @property
-    def freedoms(self) -> tuple[Freedom, ...]:
-        """Slides along both parameters."""
-        return Freedom("Tu", UNIT_TWISTS["Tx"]), Freedom("Tv", UNIT_TWISTS["Ty"])
 
-    @cached_property
-    def sizes(self) -> Array:
-        """Lengths per parameter at home."""
-        assert self.surface is not None
-        return np.linalg.norm(self.surface.at(*np.array(self.home)[:, None])[1:3, :, 0], axis=1)
+def across(curve: Curve, place: AlongCurve, z: Sequence[float] | Array | None) -> Curve:
+    """The curve; a straight one, which lies in many planes, in that at right angles to ``z`` where the frame has one."""
+    travel: Travel = curve.once(Travel)
+    if place.tangent != X or z is None or not travel.is_straight or curve.guide is not None:
+        return curve
+    here = travel.at(np.zeros(1))
+    # digits to which the direction of a plane is rounded, for the same reason
+    along = [
+        round(v / float(np.linalg.norm(z)), 12) for v in (here.k[:, 0] @ np.asarray(z), here.y[:, 0] @ np.asarray(z))
+    ]
+    if along[1] == 0:
+        return curve
+    return curve.replace(frame="guided", guide=along[0] * here.k[:, 0] + along[1] * here.y[:, 0])
 
-    @property
-    def ranges(self) -> tuple[tuple[float, float], ...]:
-        """The ends of the surface."""
-        assert self.surface is not None
-        parts = zip(self.surface.ends, self.home, self.sizes / self.unit, strict=True)
-        return tuple(((low - at) * size, (high - at) * size) for (low, high), at, size in parts)
 
-    @property
-    def periods(self) -> tuple[float, ...]:
-        """Lengths after which the surface returns into itself."""
-        assert self.surface is not None
-        return tuple((np.array(self.surface.periods) * self.sizes / self.unit).tolist())
+def center_path(curve: Curve, roller: float | None, point: Sequence[float] | None) -> Curve:
+    """The curve itself, or that of the center of a roller, on the side of the point, or outside."""
+    return Beside(base=curve, distance=side_of(curve, point) * roller) if roller else curve
 
-    @property
-    def outline(self) -> tuple[Array, ...]:
-        """Lines of the surface about the frame at coordinates zero, on both sides of it as far as it goes, at most its size at home."""
-        if self.surface is None:
-            return ()
-        ranges = [(max(low, -size), min(high, size)) for (low, high), size in zip(self.ranges, self.sizes, strict=True)]
-        # lines each way by which a surface is drawn
-        u, v = (np.linspace(*ends, 9) for ends in ranges)
-        x = np.stack(np.meshgrid(u, v))
-        p = self.here(x)[0] - self.start[:, 3].reshape(3, 1, 1)
-        grid = np.tensordot(p, self.start[:, :3], (0, 0)) / self.unit
-        return (*grid, *grid.swapaxes(0, 1))
 
-    def curvatures(self, x: Array) -> Array:
-        """Principal curvatures ``(2, ...)`` towards z of the frame at coordinates ``(2, ...)``."""
-        assert self.surface is not None
-        found = self.surface.curvatures(*self._parameters(x))
-        return -found[::-1] if self.turned else found
+def side_of(curve: Curve, point: Sequence[float] | None) -> float:
+    """1 where the point lies towards y of the frame, or that is outside; else -1."""
+    travel: Travel = curve.once(Travel)
+    if point is None:
+        return outside(curve) if curve.is_closed else 1.0
+    s, _ = travel.nearest(np.asarray(point))
+    here = travel.at(np.array(s))
+    return 1.0 if (np.asarray(point) - here.x) @ here.y > 0 else -1.0
 
-    @cached_property
-    def bend(self) -> float:
-        """Where the surface is looked at, and at coordinates zero."""
-        assert self.surface is not None
-        with self.named():
-            here = np.abs(self.surface.curvatures(*np.array(self.home)[:, None])).max()
-            return self.unit * max(self.surface.bend, float(here))
 
-    def _parameters(self, x: Array) -> Array:
-        """Parameters ``(2, ...)`` at coordinates ``(2, ...)``."""
-        return np.stack([at + self.unit / size * q for at, size, q in zip(self.home, self.sizes, x, strict=True)])
+def placed_on(place: AlongCurve, curve: Curve, point: Sequence[float] | Array | None) -> AlongCurve:
+    """The factor on a curve, at home in the place nearest to the point."""
+    travel: Travel = curve.once(Travel)
+    ends = np.isfinite(travel.begin)
+    home = (travel.begin if ends else 0.0) if point is None else travel.nearest(np.asarray(point))[0]
+    size = max(extent(curve, travel.at(np.array(home)).x), travel.length if ends else 0.0)
+    again = (
+        travel.is_closed and travel.length - home < SHAPES.place * size
+    )  # the end of a closed curve is where it begins
+    return replace(place, curve=curve, home=0.0 if again else rounded(home, size))
 
-    def points(self, x: Array) -> Array:
-        """Points ``(3, ...)`` at coordinates ``(2, ...)``, in the frame of the link."""
-        return self.here(x)[0]
 
-    def from_pole(self, x: Array) -> Array:
-        """Ways ``(2, ...)`` from a pole of the parameters at coordinates ``(2, ...)``, over the radius."""
-        assert self.surface is not None
-        return self.surface.from_pole(*self._parameters(x))
-
-    def coordinates_at(self, p: Array) -> Array:
-        """Coordinates ``(2,)`` of the point of the surface that is nearest to ``p (3,)``."""
-        assert self.surface is not None
-        return (np.array(self.surface.nearest(p)) - self.home) * self.sizes / self.unit
-
-    def place_of(self, x: Array) -> tuple[Array, Array, Array]:
-        """Position, axes ``(3, 3, ...)`` and twists about the point ``(6, 2, ...)``, in the frame of the link."""
-        assert self.surface is not None
-        su, sv = self.sizes
-        u, v = self._parameters(x)
-        J, sense = self.surface.at(u, v), self.surface.sense(u, v)
-        x_, xu, xv = J[0], J[1] / su, J[2] / sv
-        second = self.unit * np.stack([J[3] / su**2, J[4] / (su * sv), J[5] / sv**2])
-        lu, N = sense * np.sqrt((xu * xu).sum(axis=0)), cross(xu, xv)
-        ln, up = sense * np.sqrt((N * N).sum(axis=0)), -1.0 if self.turned else 1.0
-        e1, n = xu / lu, up * N / ln
-        axes = (e1, cross(n, e1), n)
-        twists = []
-        for xa, xua, xva in ((xu, second[0], second[1]), (xv, second[1], second[2])):
-            # but for parts along e1 and n, in which lengths change: in w they meet themselves, c e1 x e1 and c e2 x e2
-            de1, dn = xua / lu, up * (cross(xua, xv) + cross(xu, xva)) / ln
-            rates = (de1, cross(dn, e1) + cross(n, de1), dn)
-            w = 0.5 * sum(cross(e, de) for e, de in zip(axes, rates, strict=True))
-            twists.append(np.concatenate([w, xa]))
-        return x_, np.stack(axes, axis=1), np.stack(twists, axis=1)
-
-    @cached_property
-    def start(self) -> Array:
-        """The frame at coordinates zero on its link ``(3, 4)``."""
-        x, R, _ = self.here(np.zeros((2, 1)))
-        return np.concatenate([R, x[:, None]], axis=1)[..., 0]
-
-    def pose_at(self, here: tuple[Array, Array, Array]) -> Array:
-        """Value of the motion."""
-        p, R, _ = here
-        return self._pose_seen(R, p)
-
-    def twists_at(self, here: tuple[Array, Array, Array]) -> Array:
-        """``(w, x_a + w x (p - x))`` for both parameters."""
-        p, _, S = here
-        return np.stack([self._screw_seen(p, S[:3, a], S[3:, a]) for a in range(2)], axis=1)
-
-    def twist_rates_at(self, here: tuple[Array, Array, Array], x: Array, dq: Array) -> Array:
-        """The derivative of ``sum_j S_j q'_j`` along ``q'``, by a complex step: exact."""
-        ahead: Array = x.real + 1j * COMPLEX_STEP * dq.real
-        return np.asarray((self.twists_at(self.here(ahead)) * dq).sum(axis=1).imag / COMPLEX_STEP)
-
-    def scaled(self, L: float) -> Factor:
-        """With lengths over ``L``."""
-        return self if self.surface is None else replace(self, unit=self.unit * L)
+def missed_by(factor: AlongCurve, point: Sequence[float] | Array | None) -> float:
+    """How far the frame at home is from the point."""
+    return 0.0 if point is None else float(np.linalg.norm(factor.start[:, 3] - point))

@@ -22,8 +22,7 @@ from mechgraph.model.friction import (
 )
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
-from mechgraph.pairs.contact_types import takes_curves
-from mechgraph.pairs.travelling import OnSurface
+from mechgraph.pairs.contact_types import OnSurface, takes_curves
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from test_surfaces import INSIDE, SAMPLE
 import mechgraph as mg
 from mechgraph.maths import se3
 from mechgraph.pairs import pair_type as evaluation
-from mechgraph.pairs.travelling import OnSurface
+from mechgraph.pairs.contact_types import OnSurface
 
 PITCH = 0.37
 USER_ROWS = {
