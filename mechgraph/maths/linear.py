@@ -481,7 +481,7 @@ def least_solution(A: scipy.sparse.csc_array, b: Array) -> Array:
 
 
 WHOLE = 400
-"""Unknowns up to which a singular value decomposition is a matter of a tenth of a second."""
+"""Unknowns, rows or columns up to which a singular value decomposition of the whole matrix is a matter of a tenth of a second."""
 OPEN = 1e-7
 """Part that an unknown has in the solutions without a right side, above which it is not unique; relative residual of a contradiction."""
 
@@ -698,9 +698,6 @@ def _levels(before: Index, after: Index, count: int) -> Index:
     return level
 
 
-"""Rows or columns up to which singular values are those of the whole matrix (a tenth of a second at most)."""
-
-
 class LeastNorm:
     """The normal equations of ``K (m, n)``, full or sparse, factored once."""
 
@@ -747,8 +744,7 @@ def _largest(apply: Callable[[Array], Array], v: Array) -> float:
     alpha: list[float] = []
     beta: list[float] = []
     value = 0.0
-    # Lanczos steps for the smallest singular value of a larger one
-    # relative change at which the steps end
+    # relative change at which the Lanczos steps end
     lanczos_settled = 1e-3
     for _ in range(24):
         w = apply(basis[-1])

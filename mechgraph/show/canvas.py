@@ -7,15 +7,17 @@ import importlib
 import io
 from collections.abc import Callable, Iterable, Sequence
 from itertools import combinations
-from typing import Annotated, Any, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
-import networkx as nx
 import numpy as np
 
 from mechgraph.errors import MissingExtraError, visible
 from mechgraph.maths.se3 import Array
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import Wanted, is_numeric
+
+if TYPE_CHECKING:
+    import networkx as nx
 
 MOST_DPI, MOST_INCHES, PNG_DPI = 10_000, 400, 110
 MOST_PATHS = 800
@@ -322,6 +324,8 @@ def inside(ax: Any) -> Array:
 
 def places(names: Iterable[str], edges: Iterable[tuple[str, str]]) -> dict[str, Array]:
     """Where the nodes of a graph are drawn, neighbors at a distance of about one; the same each time."""
+    import networkx as nx
+
     number = {name: i for i, name in enumerate(names)}
     graph: nx.Graph[int] = nx.Graph()  # of numbers: sets of texts have another order each time
     graph.add_nodes_from(number.values())
@@ -340,6 +344,8 @@ def places(names: Iterable[str], edges: Iterable[tuple[str, str]]) -> dict[str, 
 
 def _clearest(graph: nx.Graph[int]) -> dict[int, Any]:
     """Of several layouts that give distances their due, the one in which the fewest lines cross each other or run over nodes."""
+    import networkx as nx
+
     # nodes from which on one layout is taken, unseen; from four times as many on that of springs, which is faster
     large = 40
     if len(graph) > large:
@@ -380,6 +386,8 @@ def _scaled(graph: nx.Graph[int], begin: dict[int, Any]) -> dict[int, Array]:
 
 def _cycle_order(graph: nx.Graph[int]) -> list[int]:
     """Nodes of a cycle or path, one after the other."""
+    import networkx as nx
+
     ends = [name for name, degree in graph.degree if degree < 2]
     return list(nx.dfs_preorder_nodes(graph, source=(ends or list(graph))[0]))
 
