@@ -1,4 +1,4 @@
-"""One cycle, positions to all reactions, against dense solves: ``python tests/benchmarks/bench_cycle.py [--profile] [--quick]``.
+"""One cycle, positions to all reactions, against dense solves: ``python tests/benchmarks/bench_cycle.py [--quick]``.
 
 Timed is all of it: ``mg.solve`` with driver rates and gravity, the reaction of every pair, the efforts of the drivers, the checks. Beside
 it, in the same run, ``np.linalg.solve`` of as many systems as the full equations of the mechanism have (Lee 1977). One BLAS thread.
@@ -6,8 +6,6 @@ it, in the same run, ``np.linalg.solve`` of as many systems as the full equation
 
 import os
 import sys
-import time
-from contextlib import contextmanager
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -19,33 +17,8 @@ import numpy as np
 from bench_core import best, seven_r
 
 import mechgraph as mg
-from mechgraph import kinetostatics, outcome
-from mechgraph.force import block
-from mechgraph.force.reactions import METHODS
-from mechgraph.kinematics import motion_path
-from mechgraph.maths.tracker import Follower
-from mechgraph.result.trajectory import Trajectory
 
 TURN = (0.0, 360.0)
-STAGES = (
-    ("assembly, freedoms", kinetostatics.Pipeline, "__init__"),
-    ("march", Follower, "_quick"),
-    ("nodes closed", Follower, "_settled"),
-    ("certificate", Follower, "_certified_all"),
-    ("careful march", Follower, "_careful"),
-    ("nodes between", motion_path, "refined"),
-    ("interpolation, Newton", motion_path.Legs, "_closed"),
-    ("rates", outcome, "rates"),
-    ("loads", block.Site, "collect"),
-    ("inertia", block, "inertia_wrenches"),
-    ("wrenches", METHODS, "loop_wrench"),
-    ("reactions, stress", block, "_least"),
-    ("checks", block, "_balance"),
-    ("power", block, "_power"),
-    ("output", Trajectory, "reaction"),
-    ("driver efforts", Trajectory, "efforts"),
-    ("output of checks", Trajectory, "checks"),
-)
 
 
 def with_gravity(m):
@@ -91,51 +64,6 @@ def dense(n, count, repeat):
     return best(lambda: np.linalg.solve(A, b), repeat)
 
 
-@contextmanager
-def timed(spent):
-    """Stage times collected in ``spent``."""
-
-    def wrapped(function, label):
-        def run(*args, **more):
-            begin = time.perf_counter()
-            try:
-                return function(*args, **more)
-            finally:
-                spent[label] = spent.get(label, 0.0) + time.perf_counter() - begin
-
-        return run
-
-    kept = []
-    for label, owner, name in STAGES:
-        old = owner[name] if isinstance(owner, dict) else getattr(owner, name)
-        kept.append((owner, name, old))
-        _put(owner, name, wrapped(old, label))
-    try:
-        yield
-    finally:
-        for owner, name, old in kept:
-            _put(owner, name, old)
-
-
-def _put(owner, name, value):
-    if isinstance(owner, dict):
-        owner[name] = value
-    else:
-        setattr(owner, name, value)
-
-
-def profile(run, repeat=7):
-    """Seconds by stage of the fastest of some runs."""
-    found = []
-    for _ in range(repeat):
-        spent = {}
-        with timed(spent):
-            total = best(run, 1)
-        found.append((total, spent))
-    total, spent = min(found, key=lambda item: item[0])
-    return {**spent, "other": total - sum(spent.values())}
-
-
 def main():
     quick = "--quick" in sys.argv
     repeat = 3 if quick else 9
@@ -156,11 +84,6 @@ def main():
             if count == 36000 and name == "7R":
                 line += "  goal 150"
             print(line, flush=True)
-        if "--profile" in sys.argv:
-            for count in (3600,) if quick else (3600, 36000):
-                parts = profile(cycle(m, span, count), 3 if count > 10000 else 7)
-                for label, value in parts.items():
-                    print(f"    {count:6d} {label:24s} {1e3 * value:8.2f} ms {1e6 * value / count:7.3f} us a position")
 
 
 if __name__ == "__main__":
