@@ -2,8 +2,8 @@
 
     de/dt = (c^2 / (eta R L^3)) H(e)^-1 W(t) + (w_b - w_a) / 2 x e,   e(T) = e(0)
 
-with the load W on the journal and the eccentricity e on link a (see ``mechgraph.pairs.journal``). The orbit that closes is found by
-Newton's method on the map of one cycle.
+with the load W on the journal and the eccentricity e on link a (see ``mechgraph.pairs.journal``). Cycles from the middle of the bearing
+lead near the orbit that closes; collocation over the whole cycle finds it.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ FILM_DIMENSIONS = {
 """Numbers of a film that a study may ask for, ``"B.film.min"``, with the dimension of each."""
 WALL = 1.0 - 1e-9
 """The largest eccentricity ratio at which a film is evaluated."""
-ORBIT_GAP = 1e-8
-"""Eccentricity ratio by which the end of an orbit that closes may miss its beginning."""
+ORBIT, ROUGH = 1e-7, 1e-4
+"""Relative accuracy of an orbit over its span, and of the cycles that lead to it."""
 
 
 class Loaded(NamedTuple):
@@ -133,23 +133,24 @@ class FilmResult(Shown):
 
 def _orbit_of(journal: Journal, loaded: Loaded) -> tuple[Array, bool]:
     """The orbit ``(2, T)``; of a cycle the one that closes, and whether it does."""
-    e, step, last = np.zeros(2), 1e-4, loaded.t[-1:] + loaded.gap
-    aside = step * np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])  # differences of the map of a cycle
-    rates = _rates_of(journal, loaded)
+    rates, span = _rates_of(journal, loaded), loaded.t[-1] + loaded.gap - loaded.t[0]
+    e, places = np.zeros(2), (loaded.t - loaded.t[0]) / span
     # an orbit that attracts closes in some six cycles; 40 tell that it does not
     for _ in range(40) if loaded.is_cycle else ():
-        ends_at = _led(rates, loaded, e[:, None] + aside, last)[..., 0]
-        missed = ends_at[:, 0] - e
-        if np.abs(missed).max() < ORBIT_GAP:
-            return _led(rates, loaded, e[:, None], loaded.t)[:, 0], True
-        slope = (ends_at[:, 1:] - ends_at[:, :1]) / step
-        new = e + np.linalg.lstsq(np.eye(2) - slope, missed)[0]
-        e = new if np.hypot(*new) < 1.0 - step else ends_at[:, 0]
-    return _led(rates, loaded, np.zeros((2, 1)), loaded.t)[:, 0], False
+        led = _led(rates, e, None, ROUGH)
+        if np.abs(led.y[:, -1] - e).max() < np.sqrt(ROUGH):
+            found = scipy.integrate.solve_bvp(
+                rates, lambda first, last: first - last, led.t, led.y, tol=ORBIT, max_nodes=100_000
+            )
+            if found.success:
+                return found.sol(places), True
+            break
+        e = led.y[:, -1]
+    return np.asarray(_led(rates, np.zeros(2), places, 0.01 * ORBIT).y), False
 
 
-def _rates_of(journal: Journal, loaded: Loaded) -> Callable[[float, Array], Array]:
-    """Rates of eccentricities ``(2 n,)`` at a time, under load and speed drawn through the positions."""
+def _rates_of(journal: Journal, loaded: Loaded) -> Callable[[Any, Array], Array]:
+    """Rates per span of all positions of eccentricities ``(2,)`` or ``(2, n)`` at parts of it, under load and speed drawn through these."""
     t, values = loaded.t, np.concatenate([loaded.load.T, loaded.speed[None]])
     ends: Literal["periodic", "not-a-knot"] = "periodic" if loaded.is_cycle else "not-a-knot"
     if loaded.gap:
@@ -157,20 +158,17 @@ def _rates_of(journal: Journal, loaded: Loaded) -> Callable[[float, Array], Arra
         values = np.concatenate([values, values[:, :1]], axis=1)
     elif loaded.is_cycle:
         values[:, -1] = values[:, 0]
-    drawn: Any = scipy.interpolate.CubicSpline(t, values, axis=1, bc_type=ends)
+    span = t[-1] - t[0]
+    drawn: Any = scipy.interpolate.CubicSpline((t - t[0]) / span, values, axis=1, bc_type=ends)
 
-    def rates(time: float, x: Array) -> Array:
-        e, now = x.reshape(2, -1), drawn(time)
+    def rates(part: Any, e: Array) -> Array:
+        now = drawn(part)
         # trial steps of the integrator may pass the wall, where the film lets nothing by
-        e = e / np.maximum(1.0, np.hypot(*e) / WALL)
-        same = np.ones(e.shape[1])
-        return journal.rates(e, now[:2, None] * same, now[2] * same).ravel()
+        return np.asarray(span * journal.rates(e / np.maximum(1.0, np.hypot(*e) / WALL), now[:2], now[2]))
 
     return rates
 
 
-def _led(rates: Callable[[float, Array], Array], loaded: Loaded, e: Array, times: Array) -> Array:
-    """Where eccentricities ``(2, n)`` at the beginning are led to at ``times``, ``(2, n, times)``."""
-    span = loaded.t[0], loaded.t[-1] + loaded.gap
-    found = scipy.integrate.solve_ivp(rates, span, e.ravel(), method="LSODA", t_eval=times, rtol=1e-9, atol=1e-11)
-    return np.asarray(found.y.reshape(*e.shape, -1))
+def _led(rates: Callable[[Any, Array], Array], e: Array, places: Array | None, rtol: float) -> Any:
+    """Where eccentricities ``(2,)`` at the beginning are led to at parts of the span."""
+    return scipy.integrate.solve_ivp(rates, (0.0, 1.0), e, method="LSODA", t_eval=places, rtol=rtol, atol=0.01 * rtol)
