@@ -296,7 +296,8 @@ def test_friction_that_was_typed() -> None:
     assert "friction" in run("report", "--help").stdout
     for typed, words in (
         ("A:nu=0.1", "did you mean"), ("A:radius=0.1", "expected PAIR:mu=NUMBER"), ("Q:mu=0.1", "unknown pair 'Q'"),
-        ("A:mu=much", "is not a number"), ("A:mu=0.1,radius=0.1,flank=5deg", "flank: has no meaning"),
+        ("A:mu=0,1", "a comma ends a field"), ("A:mu", "'mu': expected FIELD=VALUE"), ("A:mu=.1,mu=.2", "mu is given twice"),
+        ("A:efficiency=0.9", "efficiency: has no meaning"), ("A:mu=much", "is not a number"), ("A:mu=0.1,radius=0.1,flank=5deg", "flank: has no meaning"),
     ):  # fmt: skip
         assert words in bad("solve", "four-bar", "--drive", "A=1", "--friction", typed)
 
@@ -687,7 +688,7 @@ def test_the_summary_and_the_table_tell_motor_from_spring(tmp_path: Path) -> Non
     text = run("solve", str(tmp_path / "arm.toml"), "--drive", "A=0:1.5:0.5", "--out", str(out)).stdout
     motor, spring = re.findall(r"^A\.Rz +(\S+) +\S+ deg +(\S+) +\S+ deg$", text, re.MULTILINE)
     assert (motor, spring) == (("0", "7"), ("-7", "0"))
-    assert "Applied efforts (springs, dampers, given efforts)" in text
+    assert "Applied efforts (springs, dampers, friction, given efforts)" in text
     rows = list(csv.DictReader(out.read_text().splitlines()))
     assert [(float(r["A.Rz effort"]), float(r["A.Rz applied effort"])) for r in rows] == [(0, 0), (3.5, -3.5), (7, -7)]
 

@@ -68,6 +68,20 @@ def test_a_collar_bears_the_axial_force() -> None:
     assert s["A"].effort[0] == pytest.approx(MU * 0.03 * W, rel=1e-12)
 
 
+def test_a_collar_alone_rubs_by_the_axial_force() -> None:
+    """Roller bearings aside it needs no radius of a journal; a radial force beside it is told to rub nothing."""
+    dry = mg.Friction("A", mu=MU, thrust_radius=0.03)
+    m = shaft(mg.Wrench("wheel", force=(0, 0, -W), point=(0, 0, 0))).replace(loads=[])
+    axial = mg.Wrench("wheel", force=(0, 0, -W), point=(0, 0, 0))
+    s = moved(m, loads=[axial, dry])
+    assert s["A"].effort[0] == pytest.approx(MU * 0.03 * W, rel=1e-12)
+    assert not s.warnings
+    (note,) = moved(m, loads=[axial, force(5.0, 0, (0, 0, 0)), dry]).warnings
+    assert "a radial force of up to 5 rubs nothing; give radius=" in str(note)
+    with pytest.raises(mg.DeclarationError, match="radius: type R turns"):
+        m.replace(loads=[mg.Friction("A", mu=MU, thrust_radius=0.03, length=0.1)])
+
+
 def jack(mu: float = 0.1, flank: float = 0.0, pitch: float = 0.002, **more: object) -> mg.Mechanism:
     screw = mg.Pair("A", "H", "frame", "nut", point=(0, 0, 0), axis=Z, pitch=pitch)
     dry = mg.Friction("A", mu=mu, radius=0.01, flank=flank, **more)
@@ -414,31 +428,42 @@ def test_belts_with_pretension_rub_in_their_bearings() -> None:
 
 @pytest.mark.parametrize("k", [(1e6, 1e6, 1e6, 1e6), (1e6, 2e6, 3e6, 4e6)])
 def test_a_table_is_dragged_on_four_elastic_feet(k: tuple[float, ...]) -> None:
-    """Normal forces of a rigid plate on springs, friction mu N at each; where a foot would have to pull nothing is determined."""
-    at = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)])
+    """Rigid plate on springs, mu N at each: pulled at a height it leans over, by mu height; a foot that would pull lifts off; it tips over."""
+    at, height = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)]), 0.5
     plate = [
         mg.Pair(f"f{i}", "Sp", "ground", "plate", point=(x, y, 0), axis=Z, closed="force", stiffness={"Fz": k[i]})
         for i, (x, y) in enumerate(at)
     ]
-    guide = mg.Pair("G", "Fr", "ground", "plate", point=(0, 0, 0), axis=Z)
+    guide = mg.Pair("G", "Fr", "ground", "plate", point=(0, 0, height), axis=Z)
 
-    def dragged(*center: float) -> mg.Solution:
+    def dragged(*center: float, rate: float = 1.0) -> mg.Solution:
         push = mg.Wrench("plate", force=(0, 0, -W), point=(*center, 0))
         dry = [mg.Friction(p.name, mu=0.3) for p in plate]
         m = mg.Mechanism("plate", pairs=[*plate, guide], drives=["G.Tx", "G.Ty", "G.Rz"], loads=[push, *dry])
-        return mg.solve(m, {"G.Tx": mg.Motion([0.0], velocity=1.0), "G.Ty": 0.0, "G.Rz": 0.0}, redundant="elastic")
+        motions = {"G.Tx": mg.Motion([0.0], velocity=rate), "G.Ty": 0.0, "G.Rz": 0.0}
+        return mg.solve(m, motions, redundant="elastic", on_reach="flag")
 
-    s = dragged(0.1, 0.2)
     twist = np.array([1, -1, 1, -1]) / k
-    N = np.linalg.solve([np.ones(4), *at.T, twist], [W, 0.1 * W, 0.2 * W, 0.0])
-    assert [s[p.name].components["Fz"][0] for p in plate] == pytest.approx(N, rel=1e-10)
-    effort = dict(zip(guide.freedom_names, s["G"].effort[0], strict=True))
-    assert effort["G.Tx"] == pytest.approx(0.3 * W, rel=1e-10)
-    assert effort["G.Rz"] == pytest.approx(-0.3 * N @ at[:, 1], rel=1e-9)
-    far = dragged(0.9, 0.9)
-    assert far.status == "friction not determined"
-    assert np.isnan(far["G"].effort).all()
-    assert np.isnan(far["f0"].normal_forces).all()
+    lifts = 0
+    for center in ((0.1, 0.2), (0.9, 0.8), (-0.6, 0.5), (0.3, -0.55)):
+        for rate in (1.0, -1.0):
+            x, y = center[0] + rate * 0.3 * height, center[1]
+            s = dragged(*center, rate=rate)
+            if abs(x) > 1.0:
+                assert s.status == "lifts off"
+                assert np.isnan(s["f0"].normal_forces).all()
+                continue
+            N = np.linalg.solve([np.ones(4), *at.T, twist], [W, x * W, y * W, 0.0])
+            if N.min() < 0:  # on three feet
+                lifts, left = lifts + 1, N != N.min()
+                N[~left] = 0.0
+                N[left] = np.linalg.solve([np.ones(3), *at[left].T], [W, x * W, y * W])
+            assert [s[p.name].components["Fz"][0] for p in plate] == pytest.approx(N, rel=1e-10, abs=1e-10 * W)
+            effort = dict(zip(guide.freedom_names, s["G"].effort[0], strict=True))
+            assert effort["G.Tx"] == pytest.approx(0.3 * W * rate, rel=1e-10)
+            assert effort["G.Rz"] == pytest.approx(-0.3 * rate * N @ at[:, 1], rel=1e-9)
+            assert abs(s.checks.power[0]) < 1e-12 * W
+    assert lifts > 1
 
 
 def test_preload_and_viscous() -> None:
@@ -467,6 +492,14 @@ def test_the_summary_tells_what_friction_costs() -> None:
     assert f"{low:.5g}" in rest.partition("holds at rest")[2]
     assert f"{high:.5g}" in rest.partition("holds at rest")[2]
     assert "Friction" not in str(mg.solve(jack(), {"A": 0.0}, loads=jack().loads[:1]))
+
+
+def test_an_efficiency_names_drives_and_loads() -> None:
+    s = moved(jack())
+    assert s.efficiency("loads[0]", ["A"]) == s.efficiency("loads[0]", "A.Rz")
+    for name in ("load[0]", "loads[7]", "Q"):
+        with pytest.raises(mg.DeclarationError, match=r"unknown drive or load .*loads\[0\]"):
+            s.efficiency(name)
 
 
 def test_faults_and_files(tmp_path) -> None:

@@ -501,6 +501,7 @@ KINDS: dict[str, _Picture] = {
     "path": _Picture(lambda s, a: pictures.point_path(s, a.of or None)),
     "hodograph": _Picture(lambda s, a: pictures.hodograph(s, a.of or None)),
     "margin": _Picture(lambda s, a: pictures.margin_curve(s, over=a.over)),
+    "losses": _Picture(lambda s, a: pictures.friction_losses(s), forces=True),
 }
 
 
@@ -540,6 +541,7 @@ def plot(
     moment: Annotated[bool, typer.Option("--moment", help="Moments rather than forces of reactions.")] = False,
     drive: opt.Drives = None,
     actuate: opt.Actuate = None,
+    friction: opt.Dry = None,
     on_reach: opt.OnReach = "raise",
     tol: opt.Tolerance = None,
     json: opt.AsJson = False,
@@ -552,7 +554,7 @@ def plot(
     """
     if what not in KINDS:
         opt.refuse(f"WHAT {what!r}", f"expected one of {', '.join(KINDS)}")
-    kind, m = KINDS[what], opt.loaded(mechanism)
+    kind, m = KINDS[what], opt.loaded(mechanism, friction)
     target = Path(f"{Path(mechanism).stem}.png") if out is None else out
     film = what == "skeleton" and (
         frames is not None or target.suffix.lower() in (s for one in FILMS[:2] for s in one.suffixes)

@@ -451,7 +451,10 @@ Actuate = Annotated[Texts, option("--actuate", ACTUATE, "FREEDOM", freedom_names
 Out = Annotated[Path | None, file_option("Write a table, one row per position; ", FORMATS)]
 Include = Annotated[Texts, option("--include", f"More columns for --out (repeat): {', '.join(MORE)}.", "WHAT")]
 TRANSMISSION = "Also print transmission and deviation angle of this output (repeat)."
-FRICTION = "Dry friction in a pair, beside the declared loads: B:mu=0.1,radius=0.01 (repeat); the fields of mg.Friction, flank=15deg."
+FRICTION = (
+    "Dry friction in a pair or between teeth, beside the declared loads: B:mu=0.1,radius=0.01 or g:efficiency=0.97 (repeat); "
+    "the fields of mg.Friction, flank=15deg."
+)
 Dry = Annotated[Texts, option("--friction", FRICTION, "PAIR:mu=NUMBER[,FIELD=VALUE]")]
 Outputs = Annotated[Texts, option("--transmission", TRANSMISSION, "FREEDOM", freedom_names)]
 Compare = Annotated[bool, typer.Option("--compare", help="Compare with results stored in a FreeCAD assembly (.asmt).")]
@@ -499,14 +502,19 @@ def parse_friction(text: str) -> mg.Friction:
     of, _, rest = text.partition(":")
     found: dict[str, Any] = {}
     for part in filter(None, rest.split(",")):
-        name, value = named_value(part, "--friction")
+        name, sign, value = map(str.strip, part.partition("="))
+        if not (sign and name and value):
+            comma = "; a decimal point is a point, a comma ends a field" if found else ""
+            refuse(where, f"{part!r}: expected FIELD=VALUE, e.g. B:mu=0.1,radius=0.01{comma}")
         if name not in known or name == "of":
             near = did_you_mean(near_names(name, known)) or f"expected one of {', '.join(list(known)[1:])}"
             refuse(where, f"{name} is no field of friction; {near}")
+        if name in found:
+            refuse(where, f"{name} is given twice")
         is_text = known[name].kind is TEXT
         found[name] = value if is_text else _values([value], known[name].degrees, where)[0]
-    if "mu" not in found:
-        refuse(where, "expected PAIR:mu=NUMBER, e.g. B:mu=0.1,radius=0.01")
+    if not {"mu", "efficiency"} & set(found):
+        refuse(where, "expected PAIR:mu=NUMBER, e.g. B:mu=0.1,radius=0.01, or of teeth GEARS:efficiency=NUMBER")
     return mg.Friction(of, **found)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 
 from mechgraph.errors import DeclarationError
-from mechgraph.force.elastic import LIFTS_OFF, component_values, elastic_split, seats_of
+from mechgraph.force.elastic import LIFTS_OFF, component_values, elastic_split, openings, seats_of
 from mechgraph.force.friction import OUTCOMES, Rubbed, moving_rates, places_of, rubbed
 from mechgraph.force.loads import Site, inertia_wrenches, kinetic_power
 from mechgraph.force.reactions import (
@@ -157,10 +157,8 @@ class BlockForces:
     @property
     def outcome(self) -> Array:
         """What became of every position ``(T,)``, by its number in ``FORCE_OUTCOMES``."""
-        if self.rubs is not None:
-            return self.rubs.outcome
-        lifts = FORCE_OUTCOMES.index(LIFTS_OFF)
-        return np.zeros(self.power.shape, int) if self.unborne is None else np.where(self.unborne, lifts, 0)
+        came = np.zeros(self.power.shape, int) if self.rubs is None else self.rubs.outcome
+        return came if self.unborne is None else np.where(self.unborne, FORCE_OUTCOMES.index(LIFTS_OFF), came)
 
 
 @dataclass(frozen=True)
@@ -274,6 +272,8 @@ class _FreeForces:
     locked: Array | None = None
     of_misfit: Array | None = None
     unborne: Mask | None = None
+    all_stress: Array | None = None
+    """All self-stresses ``(6, P, s, T)`` of which stiffness decides."""
 
 
 def _least_on_flanks(
@@ -334,8 +334,12 @@ def _least(
     lines: ContactLines,
     flank: Array,
     known: Stress | None = None,
+    lifted: Mask | None = None,
 ) -> _FreeForces:
-    """Reactions and efforts of least norm; where self-stresses are random ones only if that is asked for. They may be ``known``."""
+    """Reactions and efforts of least norm; where self-stresses are random ones only if that is asked for. They may be ``known``.
+
+    ``lifted``: see ``elastic_split``; beside friction nothing is as long as it is left out.
+    """
     totals, multipliers = wrenches.totals, wrenches.multipliers
     if task.redundant == "elastic" and not f.complete:
         every = f.self_stresses(every=True)
@@ -351,7 +355,9 @@ def _least(
         multipliers = multipliers - others
     found = _found(here, totals, multipliers, stress)
     if s and task.redundant == "elastic":
-        return _elastic(here, found, any(load.follows_reactions for load in task.loads))
+        if lifted is None and any(load.follows_reactions for load in task.loads):
+            lifted = np.zeros((len(seats_of(here.system).labels), here.T), dtype=bool)
+        return _elastic(here, found, lifted)
     if not (s and f.complete):
         return found
     y = least_multiples(here, found.reactions, found.efforts, multipliers, stress)
@@ -424,8 +430,10 @@ class _FrictionProblem:
         self.yields = yields
         self.here, self.task, self.f, self.wrenches, self.lines, self.dry = here, task, f, wrenches, lines, dry
         self.found, self.flank = self.smooth = smooth
-        # with friction a split by stiffness holds what only pushes as if it could pull; where it would, nothing is determined
-        self.push = None if self.found.locked is None else seats_of(here.system).push
+        # which components have lifted off, of those that only push under a split by stiffness
+        push = seats_of(here.system).push
+        self.push = push if push.any() and self.found.locked is not None else None
+        self.lifted: Mask | None = None if self.push is None else np.zeros((len(push), here.T), dtype=bool)
         self._answer_units()
 
     def _answer_units(self) -> None:
@@ -476,26 +484,44 @@ class _FrictionProblem:
         """The forces of total wrenches on the first flanks, on those that act; their self-stresses may be known."""
         here, lines, flank = self.here, self.lines, self.flank
         wrenches = _relieved(on_settled_flanks(here, wrenches, lines), lines, flank) if lines else wrenches
-        return _least(here, wrenches, self.f, self.task, lines, flank, known)
+        return _least(here, wrenches, self.f, self.task, lines, flank, known, self.lifted)
 
     def forces(self, dq: Array, at_rest: bool = False) -> tuple[_FreeForces, Rubbed, Array]:
         """Forces with the friction of a motion, that friction, and the flanks ``(n, T)`` on which teeth then touch: friction may turn the
-        force between them round.
+        force between them round, or lift what only pushes.
         """
-        self._put_on(*self.smooth)
-        # how often flanks are changed
-        for _ in range(5):
+        self._put_on(*self.smooth, None if self.lifted is None else np.zeros_like(self.lifted))
+        # how often flanks and what has lifted off are changed
+        for _ in range(5 if self.lifted is None else 5 + 2 * len(self.lifted)):
             found, rubs = self._on_flanks(dq, at_rest)
-            turned = ((found.multipliers < 0.0) != (self.flank < 0.0)).any(axis=0) & (rubs.outcome == 0)
-            if not (self.lines and turned.any()):
+            turned = (
+                ((found.multipliers < 0.0) != (self.flank < 0.0)).any(axis=0) & (rubs.outcome == 0) & bool(self.lines)
+            )
+            lifted, moved = self._lifts(found)
+            if not (turned | moved).any():
                 return found, rubs, self.flank
-            self._put_on(None, np.where(turned, found.multipliers, self.flank))
-        return _undetermined(found, rubs, turned), rubs, self.flank
+            self._put_on(None, np.where(turned, found.multipliers, self.flank), lifted)
+        return _undetermined(found, rubs, turned | moved), rubs, self.flank
 
-    def _put_on(self, found: _FreeForces | None, flank: Array) -> None:
-        """Take forces without friction, and those of unit efforts, on flanks of signs ``(n, T)``."""
-        same = ((flank < 0.0) == (self.flank < 0.0)).all()
-        self.flank = flank
+    def _lifts(self, found: _FreeForces) -> tuple[Mask | None, Mask]:
+        """What has lifted off beside forces, and where ``(T,)`` that is another than it was: what would pull lifts, what would sink in bears
+        again.
+        """
+        if self.push is None or self.lifted is None:
+            return None, np.zeros(self.here.T, dtype=bool)
+        values, assumed = component_values(PairFrames(self.here), found.reactions), self.lifted
+        size = np.abs(values).max(axis=0)
+        pulls = self.push[:, None] & ~assumed & (values < -STRESSES.rounding * size)
+        assert found.all_stress is not None
+        gaps = openings(self.here, found.reactions, found.all_stress, assumed)
+        largest = np.abs(gaps).max(axis=0)
+        sinks = (gaps < -STRESSES.rounding * largest) & ~pulls.any(axis=0)
+        return (assumed | pulls) & ~sinks, (pulls | sinks).any(axis=0)
+
+    def _put_on(self, found: _FreeForces | None, flank: Array, lifted: Mask | None) -> None:
+        """Take forces without friction, and those of unit efforts, on flanks of signs ``(n, T)``, without what has lifted off."""
+        same = ((flank < 0.0) == (self.flank < 0.0)).all() and (lifted is None or (lifted == self.lifted).all())
+        self.flank, self.lifted = flank, lifted
         if not same:
             self.lines.settle(flank)
             self.found = self._least(self.wrenches) if found is None else found
@@ -523,9 +549,6 @@ class _FrictionProblem:
                 break
         doubtful = (moved > MOTIONS.still * size) & any(place.follows for place in places)
         found = replace(found, **sums)
-        if self.push is not None:
-            values = component_values(PairFrames(self.here), found.reactions)
-            doubtful |= (values[self.push] < -STRESSES.rounding * np.abs(values).max(axis=0)).any(axis=0)
         return _undetermined(found, rubs, doubtful), rubs
 
     def _read(self, forces: Mapping[str, Array]) -> Array:
@@ -556,9 +579,9 @@ class _FrictionProblem:
         return out
 
 
-def _elastic(here: Configuration, found: _FreeForces, held: bool) -> _FreeForces:
-    """Reactions and efforts as stiffness splits them; the self-stresses that stay unknown. ``held``: see ``elastic_split``."""
-    split, stress = elastic_split(here, found.reactions, found.efforts, found.stress, held), found.stress
+def _elastic(here: Configuration, found: _FreeForces, lifted: Mask | None) -> _FreeForces:
+    """Reactions and efforts as stiffness splits them; the self-stresses that stay unknown. ``lifted``: see ``elastic_split``."""
+    split, stress = elastic_split(here, found.reactions, found.efforts, found.stress, lifted), found.stress
 
     def of(multiples: Array) -> Array:
         return np.asarray(np.einsum("cpit,it->cpt", stress.wrenches, multiples))
@@ -574,6 +597,7 @@ def _elastic(here: Configuration, found: _FreeForces, held: bool) -> _FreeForces
         of(split.locked),
         np.einsum("cpit,ikt->cpkt", stress.wrenches, split.unit[:, split.soft]),
         split.unborne,
+        stress.wrenches,
     )
 
 

@@ -104,13 +104,16 @@ def seats_of(system: System) -> Seats:
     return Seats(labels, *map(np.array, parts))
 
 
-def elastic_split(here: Configuration, reactions: Array, efforts: Array, stress: Stress, held: bool) -> ElasticSplit:
+def elastic_split(
+    here: Configuration, reactions: Array, efforts: Array, stress: Stress, lifted: Mask | None
+) -> ElasticSplit:
     """The multiples of all self-stresses that come about in reactions ``(6, P, T)`` beside ``efforts (F, T)``, at every position.
 
-    ``held``: what only pushes is held as if it could pull too.
+    ``lifted (K, T)``: which components carry nothing, and what else only pushes is held as if it could pull; found here if left out.
     """
     seats, frames, T = seats_of(here.system), PairFrames(here), here.T
-    push = np.zeros(0, dtype=np.intp) if held else np.flatnonzero(seats.push)
+    push = np.zeros(0, dtype=np.intp) if lifted is not None else np.flatnonzero(seats.push)
+    loose = np.repeat(seats.loose[:, None], T, axis=1) if lifted is None else seats.loose[:, None] | lifted
     if not (seats.compliance.any() or seats.loose.any()):
         m = here.system.m
         raise DeclarationError(
@@ -124,16 +127,34 @@ def elastic_split(here: Configuration, reactions: Array, efforts: Array, stress:
     out = ElasticSplit(*parts, seats.soft, np.zeros(T, dtype=bool))
     size = np.maximum(np.abs(own).max(axis=1, initial=0.0), np.abs(efforts).max(axis=0, initial=0.0))
     for t in range(T):
-        _split_at(t, seats, push, N[t], own[t], out, float(size[t]))
+        _split_at(t, seats, push, loose[:, t], N[t], own[t], out, float(size[t]))
     return out
 
 
-def _split_at(t: int, seats: Seats, push: Index, N: Array, own: Array, out: ElasticSplit, size: float) -> None:
-    """Fill in one position: self-stresses ``N (K, s)``, reactions ``own (K,)``; ``size`` of the largest one, components that only push."""
+def openings(here: Configuration, reactions: Array, stress: Array, lifted: Mask) -> Array:
+    """How far components that are ``lifted (K, T)`` stand off, ``(K, T)``, zero elsewhere; ``reactions (6, P, T)`` are those that come
+    about, ``stress (6, P, s, T)`` all self-stresses, along which the motions ``misfit - l / k + opening`` of a closed graph cancel.
+    """
+    seats, frames, out = seats_of(here.system), PairFrames(here), np.zeros(lifted.shape)
+    N, own = component_values(frames, stress), component_values(frames, reactions)
+    for t in np.flatnonzero(lifted.any(axis=0)):
+        open_ = lifted[:, t] | seats.loose
+        strain = N[:, :, t].T @ (seats.misfit - seats.compliance * own[:, t])
+        out[open_, t] = np.linalg.lstsq(N[open_, :, t].T, -strain)[0]
+    return np.where(lifted, out, 0.0)
+
+
+def _split_at(
+    t: int, seats: Seats, push: Index, loose: Mask, N: Array, own: Array, out: ElasticSplit, size: float
+) -> None:
+    """Fill in one position: self-stresses ``N (K, s)``, reactions ``own (K,)``; ``size`` of the largest one, components that only push,
+    and those that carry nothing.
+    """
     C, s = seats.compliance, N.shape[1]
-    free, fixed = _conditions(N[seats.loose], own[seats.loose], s, size)
+    free, fixed = _conditions(N[loose], own[loose], s, size)
     if fixed is None:  # the loads ask for what carries nothing: no self-stress is known
         out.left[:, :, t] = np.eye(s)
+        out.unborne[t] = (loose > seats.loose).any()
         return
     strain = np.sqrt(C)[:, None] * (N @ free)
     _, sizes, turn = np.linalg.svd(strain, full_matrices=True)

@@ -170,14 +170,15 @@ class Friction(Load):
         if pair is None and coupling is None:
             known = [*(p.name for p in names.pairs), *(c.name for c in names.couplings)]
             return [*found, self.where + unknown("pair", self.of, known)]
-        if found or (coupling is None and not isinstance(pair.type, PairType)):
+        if coupling is None and not isinstance(pair.type, PairType):
             return found
+        more: list[str] = []
         own = [load for load in names.loads if isinstance(load, Friction) and load.of == self.of]
         if len(own) > 1 and own[0] is not self:
-            found.append("of: is declared before; a pair or coupling takes one mg.Friction")
-        found += self._of_pair(pair) if coupling is None else self._of_coupling(coupling)
-        found += self._of_numbers()
-        return [self.where + fault for fault in found]
+            more.append("of: is declared before; a pair or coupling takes one mg.Friction")
+        own_faults = self._of_pair(pair) if coupling is None else self._of_coupling(coupling)
+        numbers = () if found else (*self._of_numbers(), *(self._of_thread(pair) if coupling is None else ()))
+        return found + [self.where + fault for fault in (*more, *own_faults, *numbers)]
 
     def _of_numbers(self) -> Iterator[str]:
         if self.mu is None and self.efficiency is None:
@@ -213,13 +214,16 @@ class Friction(Load):
             return
         taken = {*OF_PAIRS, *(name for way in ways for name in (*way.needs, *way.takes))}
         yield from self._misplaced(taken, f"type {row.symbol}")
-        if self.radius is None and any(way.needs for way in ways):
+        alone = self.thrust_radius is not None and self.length is None and row.f == 1
+        if self.radius is None and not alone and any(way.needs for way in ways):
             yield f"radius: type {row.symbol} turns; give the radius at which it rubs"
         if self.width == 0.0:
             yield wrong(self.width, "width", "a number other than 0, or leave it out")
         if self.viscous and len({f.turns for f in row.freedoms}) > 1:
             yield f"viscous: type {row.symbol} turns and slides, in two units; give mg.Spring(freedom=, damping=) instead"
-        if row.takes_pitch and self.radius is not None:
+
+    def _of_thread(self, pair: Any) -> Iterator[str]:
+        if pair.type.takes_pitch and self.radius is not None:
             lead = np.arctan2(abs(pair.pitch_per_radian), self.radius)
             phi = np.arctan(self.coefficient_at_rest / np.cos(np.arctan(np.tan(self.flank) * np.cos(lead))))
             if lead + phi >= 0.5 * np.pi:
@@ -249,7 +253,10 @@ def rests_on(m: Any, load: Friction) -> tuple[str, ...]:
     if load.of not in m.pair_index:
         return ("effort",)
     row = m.pair(load.of).type
-    axial = "Fz" if row.f == 1 and rubs_as_journal(row) and load.thrust_radius is None else ""
+    journal = row.f == 1 and rubs_as_journal(row)
+    axial = "Fz" if journal and load.thrust_radius is None else ""
+    if journal and load.radius is None:
+        return ("Fz",)
     moments = load.length is not None or load.width is not None or rubs_as_plane(row)
     return tuple(c.name for c in row.reactions or () if (moments if c.is_couple else c.name != axial))
 
@@ -324,7 +331,8 @@ def places_in(load: Friction, row: PairType) -> Iterator[Rubs]:
         turn, slide = found.get(True), found.get(False)
         if row.takes_pitch:
             yield Rubs("thread", turn)
-        if not row.takes_pitch or load.length is not None:
+        rubs = turn is None or load.radius is not None  # else a collar alone
+        if rubs and (not row.takes_pitch or load.length is not None):
             yield from (Rubs("axis", turn, slide, side) for side in ((0.0,) if load.length is None else (1.0, -1.0)))
             if load.width is not None:
                 yield Rubs("couple", turn, slide)

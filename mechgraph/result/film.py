@@ -29,7 +29,7 @@ FILM_DIMENSIONS = {
 """Numbers of a film that a study may ask for, ``"B.film.min"``, with the dimension of each."""
 WALL = 1.0 - 1e-9
 """The largest eccentricity ratio at which a film is evaluated."""
-ORBIT, ROUGH = 1e-7, 1e-4
+ORBIT, ROUGH = 1e-7, 1e-3
 """Relative accuracy of an orbit over its span, and of the cycles that lead to it."""
 
 

@@ -23,7 +23,7 @@ from mechgraph.model.loads import Law
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.pairs.factors import WRENCHES
 from mechgraph.pairs.journal import Journal
-from mechgraph.quantities import BASE_UNITS, items_of, place_among, unit_of, wrong
+from mechgraph.quantities import BASE_UNITS, items_of, place_among, unit_of, unknown, wrong
 from mechgraph.result.contacts import (
     ContactResult,
     LiftOff,
@@ -672,15 +672,21 @@ class Solution(Shown):
 
     def _power_of(self, names: str | Iterable[str]) -> Array:
         """Power that drives and loads bring, ``(...)``."""
-        total = np.zeros(self.batch)
+        total, loads = np.zeros(self.batch), [f"loads[{i}]" for i in range(len(self.mechanism.loads))]
+        drives = [self.whole.freedom(name) for name in self.actuated]
         for name in (names,) if isinstance(names, str) else tuple(names):
-            found = re.fullmatch(r"loads\[(\d+)\]", name)
-            if found:
-                total = total + self.load(int(found[1])).power
+            try:
+                place = self.whole.freedom(self.whole.full_name(name)) if name not in loads else None
+            except DeclarationError:
+                place = (-1, -1)
+            if place is None:
+                total = total + self.load(loads.index(name)).power
+            elif place in drives:
+                pair = self[self.whole.pairs[place[0]].name]
+                total = total + pair.effort[..., place[1]] * pair.velocity[..., place[1]]
             else:
-                k, j = self.whole.freedom(self.whole.full_name(name))
-                pair = self[self.whole.pairs[k].name]
-                total = total + pair.effort[..., j] * pair.velocity[..., j]
+                why = unknown("drive or load", name, [*self.actuated, *loads], self.whole.pair_index)
+                raise DeclarationError(f"efficiency of {self.mechanism.name!r}", [why])
         return total
 
     @property

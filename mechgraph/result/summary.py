@@ -508,7 +508,7 @@ class _SummaryText(PositionLabels):
         largest = max([float(own.size[k]) for k in known] + [float(applied.size[k]) for k in loaded], default=0.0)
         heads = [name + bracket(self.effort_unit(name)) for name in names]
         yield from self._ranges("Efforts of the drivers", "driver", own, driven, heads, largest)
-        title = "Applied efforts (springs, dampers, given efforts)"
+        title = "Applied efforts (springs, dampers, friction, given efforts)"
         yield from self._ranges(title, "freedom", applied, loaded, heads, largest)
         plain = [k for k, c in enumerate(self.m.couplings) if not c.steps]
         heads = [c.name + bracket(coupling_unit(self.m, c)) for c in self.m.couplings]
@@ -691,7 +691,7 @@ class _SummaryText(PositionLabels):
     def friction_notes(self) -> Iterator[Block]:
         """What friction leaves out."""
         if notes := _shortened([str(note) for note in friction_notes(self.values)]):
-            yield Heading("Friction left out", 2)
+            yield Heading("Remarks on friction", 2)
             yield Bullets(notes)
 
     def crossings(self) -> Iterator[Block]:

@@ -13,6 +13,7 @@ from mechgraph.errors import DeclarationError
 from mechgraph.fields import vector_fault
 from mechgraph.maths.se3 import Array
 from mechgraph.memo import dataclass
+from mechgraph.maths.tolerances import MOTIONS
 from mechgraph.model.belts import BeltCourse, BeltDrive
 from mechgraph.model.couplings import Belt
 from mechgraph.model.friction import WAYS, Friction, coupling_of
@@ -555,6 +556,13 @@ def _notes_of_pair(values: Trajectory, load: Friction) -> Iterator[FrictionNote]
         if row.takes_pitch:
             along = values.whole.pair(load.of).pitch_per_radian * np.nan_to_num(result.components["Fz"])
         across = np.sqrt(np.abs((np.nan_to_num(result.moment) ** 2).sum(axis=-1) - along**2))
+    if load.radius is None and load.thrust_radius is not None:
+        radial = np.hypot(*(np.nan_to_num(result.components.get(name, 0.0)) for name in ("Fx", "Fy")))
+        if (radial > MOTIONS.idle * np.nan_to_num(result.magnitude)).any():
+            most = f"{radial.max():.4g} {unit_of(values.mechanism.units, FORCE)}".rstrip()
+            yield FrictionNote(
+                load.of, f"{where}a radial force of up to {most} rubs nothing; give radius=, that of the journal"
+            )
     # a bearing as long as its diameter bears it by more than its force; of a guide any moment that is no rounding
     arm = 1e-6 * values.radius if load.radius is None else load.radius
     for name, how, moment in (("length", "across", across), ("width", "about", about)):

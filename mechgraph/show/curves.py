@@ -20,6 +20,7 @@ from mechgraph.pairs import cams
 from mechgraph.pairs.cam_laws import CamLaw
 from mechgraph.pairs.journal import Journal
 from mechgraph.quantities import LENGTH, POWER, door, real_array, shown, unit_of, wrong
+from mechgraph.result.film import FilmResult
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import MaterialPoint
 from mechgraph.show.canvas import HATCH, INK, MUTED, PALETTE, REACTION, Axes, axis_label, new_axes, plain, said
@@ -580,7 +581,7 @@ def polar_force(s: Solution, pair: str, *, on: Literal["a", "b"] = "a", ax: Axes
     return ax
 
 
-def film_orbit(s: Solution, pair: str, journal: Journal | None = None, *, ax: Axes = None) -> Any:
+def film_orbit(s: Solution, pair: str, journal: Journal | FilmResult | None = None, *, ax: Axes = None) -> Any:
     """Draw the orbit of a journal in its clearance circle, with the place and direction of the least film.
 
     Parameters
@@ -589,8 +590,8 @@ def film_orbit(s: Solution, pair: str, journal: Journal | None = None, *, ax: Ax
         A solution with forces over a cycle.
     pair : str
         Name of the pair of the bearing.
-    journal : Journal, optional
-        The film. Default: the pair's ``film=``.
+    journal : Journal or FilmResult, optional
+        The film, or what ``Solution.film`` found. Default: the pair's ``film=``.
     ax : Axes, optional
         Axes of matplotlib. Default: new ones.
 
@@ -615,7 +616,7 @@ def film_orbit(s: Solution, pair: str, journal: Journal | None = None, *, ax: Ax
     ... )
     >>> ax = show.film_orbit(s, "B", mg.Journal(radius=0.02, length=0.02, clearance=2e-5, viscosity=0.05))
     """
-    film = s.film(pair, journal)
+    film = journal if isinstance(journal, FilmResult) else s.film(pair, journal)
     p, units = s.mechanism.pair(pair), s.mechanism.units
     ax = new_axes((5.6, 5.6)) if ax is None else ax
     turn = np.linspace(0, 2 * np.pi, 181)

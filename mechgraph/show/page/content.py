@@ -248,7 +248,7 @@ class ShownCycle:
         acting = {n: v for n, v in given.items() if np.abs(np.nan_to_num(v)).max(initial=0.0) > 0}
         supplied = {n: self.of_freedom(n, "effort") for n in self.s.actuated}
         for title, rows in (("Effort of the driver" if len(supplied) == 1 else "Efforts of the drivers", supplied),
-                            ("Applied efforts (springs, dampers, given efforts)", acting)):  # fmt: skip
+                            ("Applied efforts (springs, dampers, friction, given efforts)", acting)):  # fmt: skip
             for couple, dimension in ((True, MOMENT), (False, FORCE)):
                 mine = {n: v for n, v in rows.items() if self._is_couple(n) is couple}
                 if mine:
