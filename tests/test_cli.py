@@ -297,7 +297,8 @@ def test_friction_that_was_typed() -> None:
     for typed, words in (
         ("A:nu=0.1", "did you mean"), ("A:radius=0.1", "expected PAIR:mu=NUMBER"), ("Q:mu=0.1", "unknown pair 'Q'"),
         ("A:mu=0,1", "a comma ends a field"), ("A:mu", "'mu': expected FIELD=VALUE"), ("A:mu=.1,mu=.2", "mu is given twice"),
-        ("A:efficiency=0.9", "efficiency: has no meaning"), ("A:mu=much", "is not a number"), ("A:mu=0.1,radius=0.1,flank=5deg", "flank: has no meaning"),
+        ("A:efficiency=0.9", "efficiency: has no meaning"),
+        ("A:mu=much", "is not a number"), ("A:mu=0.1,radius=0.1,flank=5deg", "flank: has no meaning"),
     ):  # fmt: skip
         assert words in bad("solve", "four-bar", "--drive", "A=1", "--friction", typed)
 

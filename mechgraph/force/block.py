@@ -504,7 +504,7 @@ class _FrictionProblem:
         return _undetermined(found, rubs, turned | moved), rubs, self.flank
 
     def _lifts(self, found: _FreeForces) -> tuple[Mask | None, Mask]:
-        """What has lifted off beside forces, and where ``(T,)`` that is another than it was: what would pull lifts, what would sink in bears
+        """What has lifted off beside forces, and where ``(T,)`` that is not what it was: what would pull lifts, what would sink in bears
         again.
         """
         if self.push is None or self.lifted is None:

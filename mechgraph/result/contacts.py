@@ -351,7 +351,7 @@ class ContactResult(ContactGeometry, Shown):
         if not (self._pair.closed == "force" or (not self._pair.closed and is_open(self._pair))):
             return np.zeros(pushed.shape, dtype=bool)
         # part of the greatest normal force of a contact below which a pull is rounding
-        least = 1e-10 * float(np.nanmax(np.linalg.norm(self._parts, axis=-1), initial=0.0))
+        least = 1e-10 * float(np.nanmax(np.linalg.norm(self._parts, axis=-1), initial=0.0)) + self._values.no_force
         return np.asarray(pushed < -least)
 
     @property

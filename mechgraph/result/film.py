@@ -133,15 +133,14 @@ class FilmResult(Shown):
 
 def _orbit_of(journal: Journal, loaded: Loaded) -> tuple[Array, bool]:
     """The orbit ``(2, T)``; of a cycle the one that closes, and whether it does."""
+    collocate: Any = scipy.integrate.solve_bvp
     rates, span = _rates_of(journal, loaded), loaded.t[-1] + loaded.gap - loaded.t[0]
     e, places = np.zeros(2), (loaded.t - loaded.t[0]) / span
     # an orbit that attracts closes in some six cycles; 40 tell that it does not
     for _ in range(40) if loaded.is_cycle else ():
         led = _led(rates, e, None, ROUGH)
         if np.abs(led.y[:, -1] - e).max() < np.sqrt(ROUGH):
-            found = scipy.integrate.solve_bvp(
-                rates, lambda first, last: first - last, led.t, led.y, tol=ORBIT, max_nodes=100_000
-            )
+            found = collocate(rates, lambda first, last: first - last, led.t, led.y, tol=ORBIT, max_nodes=100_000)
             if found.success:
                 return found.sol(places), True
             break

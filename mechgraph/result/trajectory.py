@@ -595,6 +595,11 @@ class Trajectory:
         jammed = [name for name, size in zip(self.rubbing, growth, strict=True) if size > MOTIONS.nearby * growth.max()]
         return float(self._kept["factor"][place]), tuple(dict.fromkeys(jammed))
 
+    @property
+    def no_force(self) -> float:
+        """The size of a force that is rounding beside the largest term of equilibrium."""
+        return float(self._L * STRESSES.rounding * self._largest[0])
+
     def effort_range(self, pair: int) -> Array:
         """Least and greatest effort of drives at rest, ``(..., f, 2)``; the effort itself in motion and where nothing rubs."""
         columns = self._columns(pair)
