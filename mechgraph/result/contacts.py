@@ -21,7 +21,7 @@ import numpy as np
 from mechgraph.document import Block, Document, Paragraph, Shown
 from mechgraph.errors import DeclarationError
 from mechgraph.maths.se3 import Array
-from mechgraph.maths.tolerances import SHAPES
+from mechgraph.maths.tolerances import SHAPES, STRESSES
 from mechgraph.memo import dataclass
 from mechgraph.model.belts import BeltDrive
 from mechgraph.model.mechanism import Mechanism
@@ -351,7 +351,8 @@ class ContactResult(ContactGeometry, Shown):
         if not (self._pair.closed == "force" or (not self._pair.closed and is_open(self._pair))):
             return np.zeros(pushed.shape, dtype=bool)
         # part of the greatest normal force of a contact below which a pull is rounding
-        least = 1e-10 * float(np.nanmax(np.linalg.norm(self._parts, axis=-1), initial=0.0)) + self._values.no_force
+        least = 1e-10 * float(np.nanmax(np.linalg.norm(self._parts, axis=-1), initial=0.0))
+        least += STRESSES.rounding * self._values.radius * float(self._values.largest[0])
         return np.asarray(pushed < -least)
 
     @property

@@ -126,7 +126,7 @@ class Trajectory:
         self._asked = batch, t, np.arange(self._count)
         self._status = np.full(self._count, Status.OK.value, dtype="U24")
         self._kept: dict[str, Array] = {}
-        self._largest = np.zeros(2)
+        self.largest = np.zeros(2)
         self._solved = np.zeros(self._count, dtype=bool)
         self._motions: list[BlockMotion] = []
         self.passed: tuple[PassedCrossing, ...] = ()
@@ -158,7 +158,7 @@ class Trajectory:
             values = getattr(forces, name)
             if values is not None:
                 self._keep(name, places, values)
-        self._largest = np.maximum(self._largest, forces.largest)
+        self.largest = np.maximum(self.largest, forces.largest)
         if (rubs := forces.rubs) is not None:
             self.rubbing = rubs.names
             self._keep("friction", places, rubs.efforts - rubs.teeth)
@@ -180,7 +180,7 @@ class Trajectory:
             own = self._kept["efforts"] - self._kept["given"] - self._kept["coupled"]
             none = np.zeros((6, len(self.whole.couplings), self._count))
             self._kept |= {"range": np.stack([own, own], axis=1), "teeth": 0.0 * own, "rubbing": none}
-        self.has_forces, self._largest = forces, records.largest
+        self.has_forces, self.largest = forces, records.largest
 
     def _keep(self, name: str, places: Index, values: Array) -> None:
         if len(places) == self._count:
@@ -458,7 +458,7 @@ class Trajectory:
         if not self.has_forces:
             nothing = np.full(self.batch, np.nan)
             return Checks(closure, nothing, nothing, accuracy)
-        wrench, term = (float(size) or 1.0 for size in self._largest)
+        wrench, term = (float(size) or 1.0 for size in self.largest)
         balance, power = self._out(self._of("balance") / wrench), self._out(self._of("power") / term)
         return Checks(closure, balance, power, accuracy)
 
@@ -594,11 +594,6 @@ class Trajectory:
         # parts of the largest: what grows with it, and what is loaded beside it
         jammed = [name for name, size in zip(self.rubbing, growth, strict=True) if size > MOTIONS.nearby * growth.max()]
         return float(self._kept["factor"][place]), tuple(dict.fromkeys(jammed))
-
-    @property
-    def no_force(self) -> float:
-        """The size of a force that is rounding beside the largest term of equilibrium."""
-        return float(self._L * STRESSES.rounding * self._largest[0])
 
     def effort_range(self, pair: int) -> Array:
         """Least and greatest effort of drives at rest, ``(..., f, 2)``; the effort itself in motion and where nothing rubs."""
