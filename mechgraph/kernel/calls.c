@@ -36,30 +36,35 @@ int mgk_table(const int *I, const double *P, void *state, int n, const double *m
   return MGK_OK;
 }
 
-/* The right-hand side of the equations of motion (motion.c): y = u, v of the first n drives, increments u counted from x0, where the
- * others have the position, rate and acceleration p[3][drives - n]. The state is predicted from a `known` one, x, q', q'', a time h before;
- * found: the same of this one. out: u', v', the power, the steepness and the condition. */
-int mgk_motion(const int *I, const double *P, void *memory, int n, int stored, const double *x0, const double *y, const double *p,
-               const double *known, double h, double *found, double *out) {
+/* The right-hand side of the equations of motion (motion.c) at states one by one: y[count][2n] = u, v of the first n drives, increments u
+ * counted from x0, where the others have the positions, rates and accelerations p[count][3][drives - n]. Every state is predicted from a
+ * `known` one, x, q', q'', a time h before; found: the same of this one. head, way[count][columns]: what slips (NULL: nothing rubs).
+ * out[count][2n + 4]: u', v', what friction takes, the power, the steepness and the condition. */
+int mgk_motion(const int *I, const double *P, void *memory, int n, int stored, const double *x0, const int *head, int count, const double *y,
+               const double *p, const double *way, const double *known, const double *h, double *found, double *out) {
   Model m;
   Work w;
   Motion at;
   opened_motion(I, P, memory, &m, &w, &at);
-  const int c = m.columns, d = m.drives;
-  const double *dq = known + m.states, *ddq = dq + c;
-  FOR(i, c) w.increment[i] = h * (dq[i] + 0.5 * h * ddq[i]);
-  advance(&m, known, w.increment, found);
-  int status = closed_at(&m, &w, &at, n, x0, y, p, found);
-  if (status) return status;
-  FOR(i, d) at.y[i] = i < n ? y[n + i] : p[d - 2 * n + i];
-  status = accelerations(&m, &w, &at, n, found, at.y, p + 2 * (d - n), stored, out + 2 * n);
-  if (status) return status;
-  rates_of_increments(&m, &w, &at, n, x0, found, out);
-  memcpy(out + n, at.a, n * sizeof(double));
-  memcpy(found + m.states, w.dq, c * sizeof(double)), memcpy(found + m.states + c, w.ddq, c * sizeof(double));
-  out[2 * n + 1] = fmax(1.0, size_of(at.Z, n * c));
-  fill(&m, w.S, w.middle, NULL, NULL, w.a.matrix);
-  out[2 * n + 2] = made_inverse(&m, &w, w.a.matrix);
+  const int c = m.columns, d = m.drives, size = m.states + 2 * c;
+  FOR(k, count) {
+    const double *dq = known + m.states, *ddq = dq + c;
+    FOR(i, c) w.increment[i] = *h * (dq[i] + 0.5 * *h * ddq[i]);
+    advance(&m, known, w.increment, found);
+    int status = closed_at(&m, &w, &at, n, x0, y, p, found);
+    if (status) return status;
+    FOR(i, d) at.y[i] = i < n ? y[n + i] : p[d - 2 * n + i];
+    status = accelerations(&m, &w, &at, n, found, at.y, p + 2 * (d - n), stored, head, way, out + 2 * n);
+    if (status) return status;
+    rates_of_increments(&m, &w, &at, n, x0, found, out);
+    memcpy(out + n, at.a, n * sizeof(double));
+    memcpy(found + m.states, w.dq, c * sizeof(double)), memcpy(found + m.states + c, w.ddq, c * sizeof(double));
+    out[2 * n + 2] = fmax(1.0, size_of(at.Z, n * c));
+    fill(&m, w.S, w.middle, NULL, NULL, w.a.matrix);
+    out[2 * n + 3] = made_inverse(&m, &w, w.a.matrix);
+    y += 2 * n, p += 3 * (d - n), known += size, h++, found += size, out += 2 * n + 4;
+    if (way) way += c;
+  }
   return MGK_OK;
 }
 

@@ -1343,17 +1343,16 @@ static int rubs_at(const Model *m, Work *w, int t, const int *load) {
   return 3;
 }
 
-/* Answers of all reactions to a unit effort in every freedom that rubs. */
-static void unit_answers(const Model *m, Work *w, double *record, const int *places) {
+/* Answers of all reactions to a unit effort in every freedom that rubs, beside wrenches on the links: of freedom i from on + i apart. */
+static void unit_answers(const Model *m, Work *w, const double *on, size_t apart, double *record, const int *places) {
   const int c = m->columns, p = 6 * m->pairs;
   int last = -1;
-  memset(w->nothing, 0, (size_t)6 * m->links * sizeof(double));
   FOR(l, m->loads) if (m->load[4 * l] >= MGK_CONTACT && m->load[4 * l + 1] != last) {
     last = m->load[4 * l + 1];
     for (int i = first_column(m, last); i < first_column(m, last + 1); i++) {
       memset(w->rubbed, 0, c * sizeof(double));
       w->rubbed[i] = 1.0;
-      borne(m, w, w->nothing, w->rubbed, record, places);
+      borne(m, w, on + apart * i, w->rubbed, record, places);
       memcpy(w->unit + (size_t)p * i, w->reaction, p * sizeof(double));
     }
   }
@@ -1446,21 +1445,26 @@ static int loosened(const Model *m, const Work *w, const int *rubs) {
   return 0;
 }
 
-/* Friction beside the reactions without it, which stand in w->reaction: efforts w->rubbed and what pairs take up w->taken; 0 where that is
- * sure, 1 where it is not, 2 where nothing moves. */
-static int friction(const Model *m, Work *w, double *record, const int *places) {
-  const int R = m->rubs, c = m->columns, p = 6 * m->pairs;
-  int follows = 0, moves = 0, found = 0, *rubs = w->row_of + R + 1;
-  FOR(l, m->loads) if (m->load[4 * l] >= MGK_CONTACT) rubs[found++] = l, follows |= m->load[4 * l] <= MGK_PLANE;
-  const magnitude fastest = size_of(w->dq, c);
-  FOR(i, c) {
+/* Rates that tell where friction acts in a given motion; whether anything moves. */
+static int directed(const Model *m, Work *w) {
+  const magnitude fastest = size_of(w->dq, m->columns);
+  int moves = 0;
+  FOR(i, m->columns) {
     const magnitude rate = fabs(w->dq[i]);
     const int rests = rate <= TURNING * fastest || rate <= STILL * sqrt(fabs(w->ddq[i]));
     w->slip[i] = rests ? 0.0 : w->dq[i], moves |= !rests;
   }
-  if (!moves) return 2;
+  return moves;
+}
+
+/* Friction beside the reactions without it, which stand in w->reaction, in the directions of w->slip: efforts w->rubbed and what pairs take
+ * up w->taken; 0 where that is sure, 1 where it is not. Links yield to unit efforts by wrenches `on` them, see unit_answers. */
+static int friction(const Model *m, Work *w, const double *on, size_t apart, double *record, const int *places) {
+  const int R = m->rubs, c = m->columns, p = 6 * m->pairs;
+  int follows = 0, found = 0, *rubs = w->row_of + R + 1;
+  FOR(l, m->loads) if (m->load[4 * l] >= MGK_CONTACT) rubs[found++] = l, follows |= m->load[4 * l] <= MGK_PLANE;
   memcpy(w->smooth, w->reaction, p * sizeof(double)), memcpy(w->pressing, w->reaction, p * sizeof(double));
-  unit_answers(m, w, record, places);
+  unit_answers(m, w, on, apart, record, places);
   FOR(round, follows ? MOST_ROUNDS : 1) {
     magnitude moved = 0.0;
     w->row_of[0] = 0;
@@ -1497,7 +1501,8 @@ static int forces(const Model *m, Work *w, const double *x, double *record, cons
   FOR(i, 6 * m->links) w->bare[i] = w->applied[i] + w->inertial[i];
   borne(m, w, w->bare, w->given, record, places);
   if (m->rubs) {
-    const int unsure = friction(m, w, record, places);
+    memset(w->nothing, 0, (size_t)6 * m->links * sizeof(double));
+    const int unsure = directed(m, w) ? friction(m, w, w->nothing, 0, record, places) : 2;
     record[places[MGK_UNSURE]] = unsure;
     if (unsure) memset(w->rubbed, 0, m->columns * sizeof(double)), memset(w->taken, 0, (size_t)6 * m->pairs * sizeof(double));
     add_part(m->columns, 1.0, w->rubbed, w->given);

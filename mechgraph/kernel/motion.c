@@ -1,4 +1,5 @@
 /* Motion under given loads: accelerations of independent freedoms, for any of the package's steppers, and steps of an integrator of its own.
+ * Friction of what slips is solved beside them, see force/friction.py: reactions and accelerations are linear in it.
  *
  * The principle of virtual power along every independent motion Z_k eliminates the reactions, see response/motion_equations.py:
  *   M a = Q,   M_kl = sum V_k . I V_l,   Q_k = sum V_k . (W - I A_0 - V x* I V) + Z_k . given.
@@ -9,6 +10,7 @@
 static const double LARGEST_CORRECTION = 1.0; /* corrections to a closed state above which a step was too long */
 static const double LAST_STEP = 1e-13;        /* difference from the independent coordinates asked for that is rounding */
 static const double RESISTED = 1e-9;          /* pivot of the mass matrix in unit inertias above which every motion has inertia */
+static const double VANISHING = 1e-100;       /* rate up to which a freedom is about to slip */
 enum { CLOSING_STEPS = 12, STAGES = 7 };
 
 typedef struct {
@@ -16,7 +18,7 @@ typedef struct {
   double *rate, *step;
   int *drive, *unknown, *place;
   double *kept, *load_number;
-  double *Z, *V, *momentum, *mass, *force, *a, *off, *guess, *begin, *speed, *y, *slope;
+  double *Z, *V, *momentum, *mass, *unit, *force, *a, *off, *yields, *guess, *begin, *speed, *y, *slope;
   size_t n_kept;
 } Motion;
 
@@ -30,7 +32,8 @@ static size_t lay_out_motion(const Model *m, int load_numbers, double *memory, M
   at->place = (int *)taken(&memory, &size, c);
   at->n_kept = size;
   TAKE(kept, at->n_kept), TAKE(load_number, load_numbers);
-  TAKE(Z, d * c), TAKE(V, 6 * n * d), TAKE(momentum, 6 * n * d), TAKE(mass, d * d), TAKE(force, d), TAKE(a, d), TAKE(off, 2 * c);
+  TAKE(Z, d * c), TAKE(V, 6 * n * d), TAKE(momentum, 6 * n * d), TAKE(mass, d * d), TAKE(unit, d), TAKE(force, d), TAKE(a, d), TAKE(off, 2 * c);
+  TAKE(yields, m->rubs ? 6 * n * c : 0);
   TAKE(guess, m->states), TAKE(begin, m->states), TAKE(speed, 2 * c), TAKE(y, 6 * d), TAKE(slope, STAGES * 2 * d);
 #undef TAKE
   return size * sizeof(double);
@@ -141,35 +144,79 @@ static void carried_along(const Model *m, const Work *w, const double *dq, doubl
   }
 }
 
-/* a with M a = Q over the first n, which are used up, in coordinates of unit inertia; 0 where a motion may have no inertia. */
-static int accelerated(int n, int d, double *M, double *Q, double *a) {
+/* The mass matrix of the first n, in coordinates of unit inertia `unit`, factored in place (Cholesky); 0 where a motion may have no inertia. */
+static int masses_factored(int n, int d, double *M, double *unit) {
   FOR(i, n) {
-    a[i] = sqrt(M[i * d + i]);
-    if (!(a[i] > 0.0)) return 0;
+    unit[i] = sqrt(M[i * d + i]);
+    if (!(unit[i] > 0.0)) return 0;
   }
+  FOR(i, n) FOR(j, n) M[i * d + j] /= unit[i] * unit[j];
   FOR(i, n) {
-    Q[i] /= a[i];
-    FOR(j, n) M[i * d + j] /= a[i] * a[j];
-  }
-  FOR(i, n) { /* Cholesky */
     const double pivot = M[i * d + i] - dot(M + i * d, M + i * d, i);
     if (!(pivot > RESISTED)) return 0;
     M[i * d + i] = sqrt(pivot);
     for (int r = i + 1; r < n; r++) M[r * d + i] = (M[r * d + i] - dot(M + r * d, M + i * d, i)) / M[i * d + i];
-    Q[i] = (Q[i] - dot(M + i * d, Q, i)) / M[i * d + i];
   }
-  for (int i = n - 1; i >= 0; i--) {
-    for (int r = i + 1; r < n; r++) Q[i] -= M[r * d + i] * Q[r];
-    Q[i] /= M[i * d + i];
-  }
-  FOR(i, n) a[i] = Q[i] / a[i];
   return 1;
 }
 
+/* a with M a = Q over the first n by that factorization. */
+static void accelerated(int n, int d, const double *M, const double *unit, const double *Q, double *a) {
+  FOR(i, n) a[i] = (Q[i] / unit[i] - dot(M + i * d, a, i)) / M[i * d + i];
+  for (int i = n - 1; i >= 0; i--) {
+    for (int r = i + 1; r < n; r++) a[i] -= M[r * d + i] * a[r];
+    a[i] /= M[i * d + i];
+  }
+  FOR(i, n) a[i] /= unit[i];
+}
+
+/* Accelerations a of the first n drives added: to those of all freedoms, and as inertia wrenches to those on the links. */
+static void add_accelerations(const Model *m, Work *w, const Motion *at, int n, const double *a) {
+  FOR(k, n) {
+    add_part(m->columns, a[k], at->Z + k * m->columns, w->ddq);
+    add_part(6 * m->links, -a[k], at->momentum + k * 6 * m->links, w->inertial);
+  }
+}
+
+/* Rates that tell where friction acts: those of freedoms that slip, by their `way`, together with the first of them in `head` (-1: none), on
+ * the side of their ways also where they have just passed zero, so that the motion is smooth there. */
+static void slipping(const Model *m, Work *w, const int *head, const double *way) {
+  FOR(i, m->columns) {
+    double along = 0.0, fastest = 0.0, slips = 0.0;
+    if (head[i] >= 0) FOR(j, m->columns) if (head[j] == head[i]) {
+      along += w->dq[j] * way[j], fastest = fmax(fastest, fabs(w->dq[j])), slips = fmax(slips, fabs(way[j]));
+    }
+    w->slip[i] = !(slips > 0.0) ? 0.0 : fastest <= VANISHING ? VANISHING * way[i] : along < 0.0 ? -w->dq[i] : w->dq[i];
+  }
+}
+
+/* Friction of what slips, beside the accelerations without it, whose inertia stands in w->inertial: adds to at->a what it brings. */
+static int rubbing(const Model *m, Work *w, Motion *at, int n, const int *head, const double *way) {
+  const int d = m->drives, c = m->columns, links = 6 * m->links, places[MGK_PARTS + 1] = {0};
+  if (efforts(m, w)) return MGK_SINGULAR;
+  if (m->stresses && self_stresses(m, w)) return MGK_STRAIN;
+  borne(m, w, w->inertial, w->given, w->record, places);
+  slipping(m, w, head, way);
+  double *more = at->off;
+  memset(at->yields, 0, (size_t)links * c * sizeof(double));
+  FOR(i, c) {
+    FOR(k, n) at->force[k] = at->Z[k * c + i];
+    accelerated(n, d, at->mass, at->unit, at->force, more);
+    FOR(k, n) add_part(links, -more[k], at->momentum + k * links, at->yields + (size_t)i * links);
+  }
+  if (friction(m, w, at->yields, links, w->record, places)) return MGK_FRICTION;
+  FOR(k, n) at->force[k] = dot(at->Z + k * c, w->rubbed, c);
+  accelerated(n, d, at->mass, at->unit, at->force, more);
+  add_accelerations(m, w, at, n, more);
+  add_part(n, 1.0, more, at->a);
+  return MGK_OK;
+}
+
 /* Accelerations of the first n drives (at->a) at a closed state just factored, with rates v of all drives and accelerations p of the others.
- * In w the rates and accelerations of all freedoms. `power`, unless NULL: of all loads but the first `stored`, and of the prescribed drives. */
+ * In w the rates and accelerations of all freedoms. `power`, unless NULL: what friction takes, and the power of all loads but the first
+ * `stored`, and of the prescribed drives. `head`, `way`: see `slipping`. */
 static int accelerations(const Model *m, Work *w, Motion *at, int n, const double *x, const double *v, const double *p, int stored,
-                         double *power) {
+                         const int *head, const double *way, double *power) {
   const int d = m->drives, c = m->columns, links = 6 * m->links;
   if (sensitivity(m, w, at) > INDEPENDENT) return MGK_CONTRADICTION;
   double *a = at->a;
@@ -180,7 +227,7 @@ static int accelerations(const Model *m, Work *w, Motion *at, int n, const doubl
     Model rest = *m;
     rest.loads -= stored, rest.load += 4 * stored;
     loads(&rest, w, x);
-    *power = dot(w->V, w->applied, links) + dot(w->dq, w->given, c);
+    power[0] = 0.0, power[1] = dot(w->V, w->applied, links) + dot(w->dq, w->given, c);
   }
   loads(m, w, x);
   inertia(m, w);
@@ -190,12 +237,16 @@ static int accelerations(const Model *m, Work *w, Motion *at, int n, const doubl
     FOR(l, k + 1) at->mass[k * d + l] = at->mass[l * d + k] = dot(at->V + k * links, at->momentum + l * links, links);
     at->force[k] = dot(at->V + k * links, w->inertial, links) + dot(at->Z + k * c, w->given, c);
   }
-  if (!accelerated(n, d, at->mass, at->force, a)) return MGK_NOT_FINITE;
-  FOR(k, n) FOR(i, c) w->ddq[i] += at->Z[k * c + i] * a[k];
-  if (power) {
-    FOR(k, n) FOR(j, links) w->inertial[j] -= at->momentum[k * links + j] * a[k];
-    for (int i = n; i < d; i++) *power -= v[i] * (dot(at->V + i * links, w->inertial, links) + dot(at->Z + i * c, w->given, c));
+  if (!masses_factored(n, d, at->mass, at->unit)) return MGK_NOT_FINITE;
+  accelerated(n, d, at->mass, at->unit, at->force, a);
+  add_accelerations(m, w, at, n, a);
+  if (way) {
+    const int unsure = rubbing(m, w, at, n, head, way);
+    if (unsure) return unsure;
+    if (power) power[0] = -dot(w->dq, w->rubbed, c), power[1] -= power[0];
+    add_part(c, 1.0, w->rubbed, w->given);
   }
+  if (power) for (int i = n; i < d; i++) power[1] -= v[i] * (dot(at->V + i * links, w->inertial, links) + dot(at->Z + i * c, w->given, c));
   return isfinite(size_of(w->ddq, c)) ? MGK_OK : MGK_NOT_FINITE;
 }
 
@@ -258,7 +309,7 @@ static int slope_of(const Model *m, Work *w, Motion *at, const double *y, double
   FOR(c, m->columns) w->increment[c] = h * (at->speed[c] + 0.5 * h * at->speed[m->columns + c]);
   advance(m, at->begin, w->increment, at->guess);
   int status = closed_at(m, w, at, d, at->begin, y, NULL, at->guess);
-  if (!status) status = accelerations(m, w, at, d, at->guess, y + d, NULL, 0, NULL);
+  if (!status) status = accelerations(m, w, at, d, at->guess, y + d, NULL, 0, NULL, NULL, NULL);
   if (status) return status;
   rates_of_increments(m, w, at, d, at->begin, at->guess, out);
   memcpy(out + d, at->a, d * sizeof(double));

@@ -654,6 +654,10 @@ class PathStage:
         mass = np.array([self._terms(u)[0] for u in y[0].tolist()])
         return self.arc.close(y[0]), y[1:2] / np.sqrt(mass / self._mass)
 
+    def by_kernel(self, t: Array, y: Array) -> Array | None:
+        """See ``Stage``."""
+        return None
+
 
 def _same(system: System, variants: Any) -> System:
     return system

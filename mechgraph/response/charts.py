@@ -381,18 +381,30 @@ class ChartStage:
         here = self._by_kernel(t, y)
         if here is None:
             return self._rates(t, y[:, None])[:, 0]
-        return np.insert(here.rates, -1, 0.0)
+        return here.rates
 
     def _by_kernel(self, t: float, y: Array) -> EvaluatedRates | None:
         """The same by the kernel; None where there is none, or it does not serve: numpy says what is there."""
         if self._kernel is None:
             return None
         near = self._near(t)
-        found = self._kernel(near.state, t - near.t, y[:-2], self.task.prescribed_at(np.array([t]))[..., 0])
+        p = self.task.prescribed_at(np.array([t]))[..., 0]
+        found = self._kernel(near.state, t - near.t, y[:-2], p, self._ways[-1])
         if found is not None:
             self._last = _Known(t, found.state, *self._sizes)
             self._y, self._shape = y, lambda: (found.steepness, found.condition)
         return found
+
+    def by_kernel(self, t: Array, y: Array) -> Array | None:
+        """See ``Stage``."""
+        if self._kernel is None:
+            return None
+        before = self._before(t).tolist()
+        h = t - np.array([self._path[i].t for i in before])
+        known = np.stack([self._path[i].state for i in before])
+        ways = None if self._ways[0] is None else np.stack([self._ways[i] for i in before])
+        found = self._kernel.many(known, h, y[:-2].T, np.moveaxis(self.task.prescribed_at(t), -1, 0), ways)
+        return None if found is None else found.T
 
     @property
     def _loads(self) -> Loads:

@@ -230,6 +230,9 @@ class Stage(Protocol):
         their factors hold fixed.
         """
 
+    def by_kernel(self, t: Array, y: Array) -> Array | None:
+        """States, rates and accelerations ``(nx + 2 F, T)`` at such places by the kernel; None where it does not serve."""
+
 
 @dataclass(frozen=True)
 class StepSpan:

@@ -580,7 +580,7 @@ def in_unit_inertias(M: Array) -> Array:
 
 @dataclass(frozen=True)
 class EvaluatedRates:
-    """Of one state: the rates of ``u``, ``v`` and the work, how steep the chart is there and its condition; and the state itself."""
+    """Of one state: the rates of ``u``, ``v``, what friction took and the work, how steep the chart is there and its condition; and the state itself."""
 
     rates: Array
     steepness: float
@@ -592,8 +592,8 @@ def cannot(system: System, loads: Loads, held: bool) -> str | None:
     """Why the kernel does not serve a motion; None where it does."""
     if held:
         return "passive freedoms are held at rest"
-    if loads.dry:
-        return "dry friction holds freedoms and lets them go"
+    if loads.dry and any(coupling.steps for coupling in system.m.couplings):
+        return "friction beside gears, racks or belts follows forces at their contacts"
     if system.n_freedoms * len(system.m.links) >= SPARSE_FROM:
         return f"it has {system.n_freedoms} freedoms and {len(system.m.links)} links; expected fewer than {SPARSE_FROM} of the product"
     whys = (why_not_load(load, system.m) for load in (*loads.stored, *loads.rest))
@@ -630,41 +630,43 @@ class KernelRates:
     """The tables of a chart with the library that evaluates them."""
 
     def __init__(self, library: Any, chart: Chart, loads: Loads) -> None:
-        columns = np.concatenate([chart.free, chart.prescribed])
+        columns, F = np.concatenate([chart.free, chart.prescribed]), chart.system.n_freedoms
         self._tables, self._memory = _tables(library, chart.system, columns, chart.x0, loads)
         self.n, self._x0 = len(chart.free), np.ascontiguousarray(chart.x0)
+        self._heads = np.full(F, -1, dtype=np.intc)
+        for some in loads.rough:
+            self._heads[list(some)] = some[0]
         of_motion = library.mgk_motion
-        of_motion.argtypes = [
-            *[ctypes.c_void_p] * 3,
-            *[ctypes.c_int] * 2,
-            *[ctypes.c_void_p] * 4,
-            ctypes.c_double,
-            *[ctypes.c_void_p] * 2,
-        ]
-        self._y, self._p, self._out = (
-            np.empty(2 * self.n),
-            np.empty((3, len(chart.prescribed))),
-            np.empty(2 * self.n + 3),
-        )
-        of_tables, own = (
-            [array.ctypes.data for array in some]
-            for some in ((*self._tables, self._memory), (self._x0, self._y, self._p))
-        )
-        self._call, self._result = (
-            partial(of_motion, *of_tables, self.n, len(loads.stored), *own),
-            self._out.ctypes.data,
-        )
+        of_motion.argtypes = [*[ctypes.c_void_p] * 3, *[ctypes.c_int] * 2, *[ctypes.c_void_p] * 2, ctypes.c_int, *[ctypes.c_void_p] * 7]
+        own = (*self._tables, self._memory, self._x0, self._heads)
+        I, P, memory, x0, heads = (array.ctypes.data for array in own)
+        self._call = partial(of_motion, I, P, memory, self.n, len(loads.stored), x0, heads)
+        # numbers of a single state, and where they lie
+        size = len(chart.x0) + 2 * F
+        self._one = [np.empty(n) for n in (2 * self.n, 3 * len(chart.prescribed), F, size, 1, size, 2 * self.n + 4)]
+        self._at: list[int | None] = [array.ctypes.data for array in self._one]
+        if not loads.dry:
+            self._at[2] = None
 
-    def __call__(self, known: Array, h: float, y: Array, p: Array) -> EvaluatedRates | None:
-        """At ``y = (u, v)`` a time ``h`` behind a ``known`` state (x, q', q''), prescribed freedoms at ``p (3, p)``; None where it does not
-        serve.
+    def __call__(self, known: Array, h: float, y: Array, p: Array, ways: Array | None) -> EvaluatedRates | None:
+        """At ``y = (u, v)`` a time ``h`` behind a ``known`` state (x, q', q''), prescribed freedoms at ``p (3, p)``, with friction in the
+        ``ways (F,)``; None where it does not serve.
         """
-        self._y[:], self._p[:] = y, p
-        found = np.empty(len(known))
-        if self._call(known.ctypes.data, h, found.ctypes.data, self._result):
+        to_y, to_p, to_ways, to_known, to_h, found, out = self._one
+        to_y[:], to_p[:], to_known[:], to_h[0] = y, p.ravel(), known, h
+        if ways is not None:
+            to_ways[:] = ways
+        if self._call(1, *self._at):
             return None
-        *_, steepness, condition = self._out.tolist()
-        return EvaluatedRates(self._out[:-2].copy(), steepness, condition, found)
+        *_, steepness, condition = out.tolist()
+        return EvaluatedRates(out[:-2].copy(), steepness, condition, found.copy())
+
+    def many(self, known: Array, h: Array, y: Array, p: Array, ways: Array | None) -> Array | None:
+        """States ``(T, k)`` of the same for several ``(T, ...)`` of each; None where one of them is not served."""
+        given = [None if one is None else np.ascontiguousarray(one) for one in (y, p, ways, known, h)]
+        found, out = np.empty_like(known), np.empty((len(h), 2 * self.n + 4))
+        at = [None if one is None else one.ctypes.data for one in (*given, found, out)]
+        return None if self._call(len(h), *at) else found
 
 
 class KernelPath:

@@ -332,19 +332,17 @@ class Course:
                     )
                 yield places[part], stage.task_at(flat[places[part]]), closed, v, done[:, part]
 
-    def positions(self, t: Array) -> Array:
-        """Internal states ``(nx, T)`` at times ``(T,)``."""
-        x = np.empty((self.task.system.n_state, len(t)))
-        for places, _, closed, _, _ in self._states(t):
-            x[:, places] = closed.here.x
-        return x
-
-    def rates(self, t: Array) -> Array:
-        """Rates and accelerations ``(2, F, T)`` of all freedoms at times ``(T,)``, internal units."""
-        out = np.empty((2, self.task.system.n_freedoms, len(t)))
-        for places, found in self._moved(t):
-            out[0][:, places], out[1][:, places] = found.rates.dq, found.rates.ddq
-        return out
+    def motion(self, t: Array) -> tuple[Array, Array]:
+        """Internal states ``(nx, T)``, rates and accelerations of all freedoms ``(2, F, T)`` at times ``(T,)``."""
+        s = self.task.system
+        out = np.empty((s.n_state + 2 * s.n_freedoms, len(t)))
+        for places, stage, y, _ in self.integration.at(t):
+            known = stage.by_kernel(t[places], y)
+            if known is None:
+                parts = [found.rates for _, found in self._moved(t[places])]
+                known = np.concatenate([np.concatenate([one.here.x, one.dq, one.ddq]) for one in parts], axis=1)
+            out[:, places] = known
+        return out[: s.n_state], out[s.n_state :].reshape(2, s.n_freedoms, len(t))
 
     def efforts_held(self, t: Array) -> Array:
         """Efforts ``(p, T)`` of the freedoms that are prescribed and held at times ``(T,)`` of one stage."""
@@ -358,8 +356,9 @@ class Course:
 
     def site(self, t: Array) -> Site:
         """What loads see of the motion at times ``(T,)``."""
-        here = Configuration(self.task.system, self.positions(t))
-        velocities = Velocities(here, self.rates(t)[0])
+        x, rates = self.motion(t)
+        here = Configuration(self.task.system, x)
+        velocities = Velocities(here, rates[0])
         return Site(here, velocities, self.task.system.coordinates_of(here.x), (len(t),), np.arange(len(t)), t)
 
     def freedom(self, name: str, t: Array) -> Array:
@@ -368,7 +367,8 @@ class Course:
         k, j = self.mechanism.freedom(name)
         column = int(s.first_column[k]) + j
         unit = s.par.L if s.is_length[column] else 1.0
-        return unit * np.stack([self.positions(t)[s.single_rows[column]], *self.rates(t)[:, column]])
+        x, rates = self.motion(t)
+        return unit * np.stack([x[s.single_rows[column]], *rates[:, column]])
 
 
 @dataclass(frozen=True)
@@ -823,7 +823,8 @@ def _occurrences(
         if crowd > 1000:
             raise Stopped("impacts and releases of stops follow each other without end")
         at = np.array([met])
-        t, x, dq = met, course.positions(at)[:, 0], course.rates(at)[0, :, 0]
+        x, (dq, _) = course.motion(at)
+        t, x, dq = met, x[:, 0], dq[:, 0]
         dq, lost, first, found = stops.after(t, x, dq)
         it.done = it.done + lost
         yield from found
@@ -836,7 +837,7 @@ def _end_at_ranges(course: Course, begin: float, end: float) -> None:
     if not columns.size:
         return
     looks = begin + (end - begin) * LOOKS_IN_STEP
-    over = beyond(system, course.positions(looks)) - BEYOND_END
+    over = beyond(system, course.motion(looks)[0]) - BEYOND_END
     met = {}
     for k in range(len(columns)):
         height = partial(_over, course, k)
@@ -853,7 +854,7 @@ def _end_at_ranges(course: Course, begin: float, end: float) -> None:
 
 def _over(course: Course, k: int, t: Array) -> Array:
     """How far a pair is beyond the end of its curve or surface at times ``(T,)``."""
-    return np.asarray(beyond(course.task.system, course.positions(t))[k] - BEYOND_END)
+    return np.asarray(beyond(course.task.system, course.motion(t)[0])[k] - BEYOND_END)
 
 
 def _first_stage(it: Integration, task: Task, begin: float, x: Array, dq: Array) -> Stage:

@@ -87,11 +87,8 @@ class _Stuck:
 class Moving(Protocol):
     """What is seen of a motion."""
 
-    def positions(self, t: Array) -> Array:
-        """Internal states ``(nx, T)`` at times ``(T,)``."""
-
-    def rates(self, t: Array) -> Array:
-        """Rates and accelerations ``(2, F, T)`` of all freedoms at times ``(T,)``."""
+    def motion(self, t: Array) -> tuple[Array, Array]:
+        """Internal states ``(nx, T)``, rates and accelerations of all freedoms ``(2, F, T)`` at times ``(T,)``."""
 
     def efforts_held(self, t: Array) -> Array:
         """Efforts ``(p, T)`` of the freedoms that are prescribed and held, in their order."""
@@ -224,18 +221,16 @@ class Rests:
         """
         # rates at the beginning are those before an impact, if there was one
         looks = begin + (end - begin) * LOOKS_IN_STEP[1:]
-        rates = motion.rates(looks) if self.rough else np.zeros((2, 0, len(looks)))
+        x, rates = motion.motion(looks)
         bad = np.flatnonzero(np.isnan(rates[1]).any(axis=0))
         if bad.size:
             last = begin if bad[0] == 0 else float(looks[bad[0] - 1])
             raise no_force(self.task, OUTCOMES[2], float(looks[bad[0]]), last)
         times: list[float | None] = []
         free = [limit for limit in self.limits if limit not in self.holding.limits]
-        if free:
-            x = motion.positions(looks)
-            for limit in free:
-                gap = limit.sign * (x[limit.row] - limit.value)
-                times.append(_first_below(partial(_gap, motion, limit), looks, gap, RESPONSE.touching))
+        for limit in free:
+            gap = limit.sign * (x[limit.row] - limit.value)
+            times.append(_first_below(partial(_gap, motion, limit), looks, gap, RESPONSE.touching))
         if self.holding.limits:
             push = partial(self._pressing, motion)
             if push(looks[-1:])[0] < 0.0:
@@ -244,7 +239,7 @@ class Rests:
         self._leaving = None
         if self.rough:
             met = self._turned(motion, looks, rates[0], met)
-            met = self._yielded(motion, looks, rates[0], met, apart)
+            met = self._yielded(motion, looks, x, rates[0], met, apart)
         return met
 
     def _pressing(self, motion: Moving, times: Array) -> Array:
@@ -280,27 +275,31 @@ class Rests:
         contacts = [limit for limit in self.limits if limit.contact == one.name]
         return bool(contacts) and not any(limit in holding.limits for limit in contacts)
 
-    def _yielded(self, motion: Moving, looks: Array, rates: Array, met: float | None, apart: float) -> float | None:
+    def _yielded(
+        self, motion: Moving, looks: Array, x: Array, rates: Array, met: float | None, apart: float
+    ) -> float | None:
         """The first time at which friction does not hold any more, if that is before another."""
-        loads, x = self.task.loads, motion.positions(looks)
+        loads = self.task.loads
         timed = len(self.task.columns) or any(load.of_time for load in (*loads.stored, *loads.rest))
         if not self.holding.stuck or not (timed or rates.any()):
             return met
         count = int(np.ceil((looks[-1] - looks[0]) / apart)) if timed and np.isfinite(apart) else 0
         if count > len(looks):
             looks = np.linspace(looks[0], looks[-1], count + 1)
-            x, rates = motion.positions(looks), motion.rates(looks)[0]
+            x, (rates, _) = motion.motion(looks)
         held, _ = evaluated(self.holding.task(self.task), looks, x, rates)
         for kept in self._modes(self.holding, held):
 
             def height(t: Array, kept: tuple[_Stuck, ...] = kept) -> Array:
-                return -self._verge(self.holding, kept, t, motion.positions(t), motion.rates(t)[0])[0]
+                x, (dq, _) = motion.motion(t)
+                return -self._verge(self.holding, kept, t, x, dq)[0]
 
             beyond, _ = self._verge(self.holding, kept, looks, x, rates, held)
             found = _first_below(height, looks, -beyond, MOTIONS.rounding)
             if found is not None and (met is None or found < met):
                 at = np.array([found])
-                _, ways = self._verge(self.holding, kept, at, motion.positions(at), motion.rates(at)[0])
+                x_there, (dq, _) = motion.motion(at)
+                _, ways = self._verge(self.holding, kept, at, x_there, dq)
                 met, self._leaving = found, ways[:, 0]
         return met
 
@@ -724,8 +723,8 @@ def _null(A: Array) -> Array:
 
 
 def _gap(motion: Moving, limit: Limit, t: Array) -> Array:
-    return np.asarray(limit.sign * (motion.positions(t)[limit.row] - limit.value))
+    return np.asarray(limit.sign * (motion.motion(t)[0][limit.row] - limit.value))
 
 
 def _rate(motion: Moving, columns: list[int], way: Array, t: Array) -> Array:
-    return np.asarray(way @ motion.rates(t)[0, columns])
+    return np.asarray(way @ motion.motion(t)[1][0, columns])
