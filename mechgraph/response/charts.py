@@ -42,6 +42,7 @@ from mechgraph.model.motion import Motion
 from mechgraph.response.motion_equations import (
     Chart,
     ClosedChart,
+    Columns,
     EvaluatedRates,
     KernelRates,
     Loads,
@@ -356,17 +357,19 @@ class ChartStage:
         self.trouble: Stopped | None = None
         self.engine = task.engine if task.library is None else COMPILED
         self._shape: Callable[[], tuple[float, float]]
-        found = self._found(t, self._first[:, None])
-        if found is None:
+        self._y = np.full(0, np.nan)
+        if task.library is not None:
+            self._kernel = KernelRates(task.library, self.chart, task.loads)
+        if not self._evaluated(t, self._first):
             raise Stopped(
                 "the loops do not close any more to where a step led, as at positions where the mechanism locks"
             )
         self._path = [self._last]
-        # kinetic energy, and the work of the forces over a unit of the coordinates
-        kinetic = float(kinetic_energy(found.rates.here, found.rates.V)[0])
-        self.energy = kinetic + float(np.abs(found.force).sum()) or 1.0
-        if task.library is not None:
-            self._kernel = KernelRates(task.library, self.chart, task.loads)
+        # kinetic energy, and the work of the forces M v' over a unit of the coordinates
+        columns = Columns(self.chart.start, self.chart.factors, self.n, self.chart.held)
+        forces = columns.mass[..., 0] @ self._last.ddq[self.chart.moving]
+        twists = self.chart.start.link_twists(self._last.dq[:, None])
+        self.energy = float(kinetic_energy(self.chart.start, twists)[0] + np.abs(forces).sum()) or 1.0
 
     def __getstate__(self) -> dict[str, Any]:
         """What is kept of a motion is asked for its states, which need neither the kernel nor the last shape."""
@@ -458,7 +461,11 @@ class ChartStage:
         if not (loads or len(self.task.columns)) or (loads and not self._evaluated(t, y)):
             return None
         rates = np.concatenate([y[self.n : -2], self.task.prescribed_at(np.array([t]))[1, :, 0]])
-        return partial(_by_time, self.task, self._moved, loads), rates
+        return (partial(_by_time, self.task, self._moved, loads) if loads else self._of_prescribed), rates
+
+    def _of_prescribed(self, t: Array) -> Array:
+        """Accelerations ``(n + p, T)`` that depend on time by themselves where no loads do."""
+        return np.concatenate([np.zeros((len(self.chart.moving), len(t))), self.task.prescribed_at(t)[2]])
 
     def _evaluated(self, t: float, y: Array) -> bool:
         """Evaluate at an accepted place, where that was not the last evaluation; whether the loops close there."""
@@ -505,7 +512,7 @@ class ChartStage:
 def _by_time(task: Task, at: Moved, loads: tuple[Load, ...], t: Array) -> Array:
     """Accelerations ``(n + p, T)`` of loads, and of the prescribed freedoms, at times, the state as it is ``at`` one."""
     columns, here, force = at.columns, at.columns.here, np.zeros((at.columns.n, len(t)))
-    for some in in_blocks(np.arange(len(t)), positions_together(task.system, 1)) if loads else ():
+    for some in in_blocks(np.arange(len(t)), positions_together(task.system, 1)):
         many = here.part(np.zeros(len(some), dtype=np.intp))
         velocities = Velocities(many, np.repeat(at.rates.dq[:, :1], len(some), axis=1))
         wrenches, efforts = applied(many, loads, velocities, t[some])

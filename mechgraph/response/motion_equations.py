@@ -129,8 +129,8 @@ class Chart:
         self.solver: ClosureSolver = closure_solver(engine, np.concatenate([self.free, prescribed]))
         self.which = self.solver.chosen(here, np.full(1, -1))
         self.start = here
-        f = self.solver.factored(here, self.which)
-        self.steepness, self.condition = self.shape(f)
+        self.factors = self.solver.factored(here, self.which)
+        self.steepness, self.condition = self.shape(self.factors)
         self._singles = system.single_rows[self.free]
         self.turns = bool((self._singles < 0).any())
         rows = system.single_rows[prescribed]

@@ -472,6 +472,8 @@ class Rests:
                 ways[columns] = found.rates.ddq[columns, 0]
         self._rested = tuple(slow)
         sets = self._together(Z, slow, x)
+        if not sets and not resting:
+            return _Holding(ways=ways), found.rates.dq[:, 0]
         # what is at rest is so exactly
         still = self._independent(_Holding(ways=ways), Z, sets)
         dq = evaluated(still.task(self.task), np.array([t]), x[:, None], dq[:, None])[0].rates.dq[:, 0]
@@ -709,7 +711,7 @@ class _Instant:
 
 def _rank(parts: Sequence[Array]) -> int:
     """The number of independent motions of freedoms; those in proportion are one."""
-    rows = np.concatenate(parts)
+    rows = np.concatenate(parts) if parts else np.zeros((0, 1))
     size = np.linalg.norm(rows, axis=1)
     moves = size > MOTIONS.still
     return rank_of(singular_values(rows[moves] / size[moves, None]), MOTIONS.proportional) if moves.any() else 0
