@@ -71,6 +71,13 @@ def agree(r: mg.Response, s: mg.Response, within: float) -> None:
     np.testing.assert_allclose(r.energy.work, s.energy.work, atol=within * max(1.0, np.abs(s.energy.kinetic).max()))
 
 
+def rough(m: mg.Mechanism, mu: float = 0.1) -> mg.Mechanism:
+    """Friction in every pair, and what springs and gravity there is."""
+    numbers = {"R": {"radius": 0.01, "length": 0.05}, "P": {"length": 0.1, "width": 0.05}, "S": {"radius": 0.01}}
+    dry = [mg.Friction(p.name, mu=mu, **numbers[p.type.symbol]) for p in m.pairs]
+    return m.replace(loads=[*m.loads, *dry], drives=[])
+
+
 MOTIONS = {
     "stiff": (
         lambda: mg.load(GOVERNOR).replace(drives=[]),
@@ -83,6 +90,12 @@ MOTIONS = {
     "change points": (parallelogram, {"rates": {"A0": -2.0}}, 1.5),
     "one path": (lambda: mg.load("bricard-cube").replace(drives=[]), {}, 1.0),
     "event": (chain, {"events": [mg.Event("B", 0.02)], "rates": {"A": 1.0}}, 0.27),
+    "friction": (lambda: rough(chain()), {"rates": {"S.Rx": 3.0, "S.Rz": 0.5, "A": 1.0}, "rtol": 1e-8}, 0.02),
+    "friction of a prescribed loop": (
+        lambda: rough(five_bar()),
+        {"motions": {"J0": lambda t: (np.sin(t), np.cos(t), -np.sin(t))}},
+        0.01,
+    ),
     "stop": (chain, {"stops": [mg.Stop("B", upper=0.01, restitution=0.5)]}, 0.3),
 }
 
@@ -101,6 +114,8 @@ def test_it_is_the_motion_of_the_dense_engine(name):
     assert [str(one.event) for one in r.events] == [str(one.event) for one in s.events]
     np.testing.assert_allclose([one.t for one in r.events], [one.t for one in s.events], atol=1e-7)
     assert bool(s.events) == (name in ("event", "stop"))
+    np.testing.assert_allclose(r.energy.friction, s.energy.friction, atol=1e-7 * (1.0 + s.energy.friction.max()))
+    assert (s.energy.friction.max() > 0.0) == name.startswith("friction")
 
 
 @pytest.mark.usefixtures("compiled")

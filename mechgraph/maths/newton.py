@@ -443,9 +443,10 @@ class Nodes:
 
 STRAIGHT_ON = 1 - 1e-9
 """Cosine between two steps above which a track goes straight on: rounding, no corner."""
-CLOSEST = 1 / 16
+CLOSEST = 1 / 4
 """Distance of two nodes, in parts of a step beside them, below which only the step's own nodes give its polynomial: divided differences
-over nodes at a distance d err by the rounding of the nodes times (h / d)^3."""
+over nodes at a distance d err by the rounding of the nodes times (h / d)^3, and polynomials through nodes that crowd before a dead point
+miss what lies in the wide step before these."""
 
 
 def divided_differences(places: Array, values: Array, rates: Array) -> tuple[Array, Array]:
