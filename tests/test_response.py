@@ -358,13 +358,19 @@ def test_stiff_loads_on_an_explicit_stepper_are_told_and_lose_nothing():
             raise KeyboardInterrupt
 
     with pytest.warns(mg.MechgraphWarning, match="method='Radau' takes far fewer.*An interrupt keeps"):
-        r = mg.respond(m, (0, 10), rates={"A": 1.0}, progress=progress, on_stop="return")
+        r = mg.respond(m, (0, 2), rates={"A": 1.0}, progress=progress, on_stop="return")
     assert r.t[-1] == taken[-1]
     with pytest.raises(mg.ResponseError, match=r"followed to t = .*Radau") as failed:
         mg.respond(m, (0, 1e5), rates={"A": 1.0})
     assert failed.value.solution.t[-1] > 0.0
     done = mg.respond(m, (0, 1e5), rates={"A": 1.0}, method="Radau", rtol=1e-6)
     assert done["A"].velocity[-1, 0] == pytest.approx(1e-6, rel=1e-4)
+
+
+def test_a_swing_that_no_stepper_passes_ends_with_a_sentence():
+    """A shaft on a spring of 1e12 N m makes half a million swings a second, which are not damped."""
+    with pytest.raises(mg.ResponseError, match="more lead to t = 10; something swings or jumps that fast"):
+        mg.respond(rotor([mg.TorsionSpring("A", 1e12)]), (0, 10), start={"A": 0.01}, method="Radau")
 
 
 def test_start_values_that_contradict_each_other_are_named():

@@ -358,17 +358,22 @@ class Integration:
         return overlooked(accelerations, *inside, self.apart, self.rtol * np.abs(rates) + self.atol)
 
     def _look(self, end: float) -> None:
-        """Say where steps have become so short that loads are likely stiff, and a long wait certain; give up where there is no end."""
-        if self.method not in EXPLICIT or self.work.steps % RESPONSE.look:
+        """Say where steps have become so short that a long wait is certain; give up where there is no end."""
+        if self.work.steps % RESPONSE.look:
             return
         t = self.segments[-1].end
         left = (end - t) * RESPONSE.look / (t - self.segments[-RESPONSE.look].begin)
-        message = (
-            f"at the length of the last {RESPONSE.look} steps of {self.method}, some {left:.0e} more lead to t = {end:g}; "
-            "where loads are stiff, method='Radau' takes far fewer. Declare dry friction with mg.Friction; smooth other loads that jump"
+        stiff = (
+            "where loads are stiff, method='Radau' takes far fewer"
+            if self.method in EXPLICIT
+            else "something swings or jumps that fast; damp it, hold it, or ask for a shorter time"
         )
-        # steps to come from which on the motion is given up: an hour and more of .5 ms each
-        if left > 1e7:
+        message = (
+            f"at the length of the last {RESPONSE.look} steps of {self.method}, some {left:.0e} more lead to t = {end:g}; {stiff}. "
+            "Declare dry friction with mg.Friction; smooth other loads that jump"
+        )
+        # steps to come from which on the motion is given up: all are kept, some kilobytes each
+        if left > 1e6:
             raise Stopped(message)
         # steps to come from which on the user is told: minutes
         if left > 100_000 and not self._told:

@@ -580,7 +580,9 @@ def in_unit_inertias(M: Array) -> Array:
 
 @dataclass(frozen=True)
 class EvaluatedRates:
-    """Of one state: the rates of ``u``, ``v``, what friction took and the work, how steep the chart is there and its condition; and the state itself."""
+    """Of one state: the rates of ``u``, ``v``, what friction took and the work, how steep the chart is there and its condition; and the
+    state itself.
+    """
 
     rates: Array
     steepness: float
@@ -637,7 +639,13 @@ class KernelRates:
         for some in loads.rough:
             self._heads[list(some)] = some[0]
         of_motion = library.mgk_motion
-        of_motion.argtypes = [*[ctypes.c_void_p] * 3, *[ctypes.c_int] * 2, *[ctypes.c_void_p] * 2, ctypes.c_int, *[ctypes.c_void_p] * 7]
+        of_motion.argtypes = [
+            *[ctypes.c_void_p] * 3,
+            *[ctypes.c_int] * 2,
+            *[ctypes.c_void_p] * 2,
+            ctypes.c_int,
+            *[ctypes.c_void_p] * 7,
+        ]
         own = (*self._tables, self._memory, self._x0, self._heads)
         I, P, memory, x0, heads = (array.ctypes.data for array in own)
         self._call = partial(of_motion, I, P, memory, self.n, len(loads.stored), x0, heads)
