@@ -23,6 +23,7 @@ from mechgraph.kinematics.system import System
 from mechgraph.maths.newton import Work
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.memo import dataclass
+from mechgraph.model.belts import pretensions
 from mechgraph.model.friction import Friction, places_in
 from mechgraph.model.loads import Load
 from mechgraph.outcome import Call, Outcome, Starts, system_at
@@ -223,9 +224,9 @@ def _filled(line: Started, library: Any, system: System, x: Array, loads: tuple[
 
 
 def _layout(line: Started) -> Layout | str:
-    """The layout of a mechanism, or what of it cannot be carried; kept with all mechanisms of its graph."""
+    """The layout of a mechanism, or what of it cannot be carried; kept with all mechanisms of its graph, whose couplings may be others."""
     sized = line.system.sized_once
-    key = COMPILED, line.columns.tobytes(), _passive(line)
+    key = COMPILED, line.columns.tobytes(), _passive(line), tuple((c.freedoms, c.steps) for c in line.m.couplings)
     if key not in sized:
         why = why_not(line.system)
         sized[key] = layout(line.system, line.columns, line.passive) if why is None else why
@@ -249,10 +250,10 @@ def cannot(line: Started) -> str | None:
 
 
 def gives_forces(line: Started) -> bool:
-    """Whether the kernel gives the forces that are asked for; it knows no line along which gears touch each other."""
+    """Whether the kernel gives the forces that are asked for."""
     return (
         line.options.method == "loop_wrench"
         and line.options.redundant != "elastic"
         and line.acting is line.columns
-        and not any(c.steps for c in line.m.couplings)
+        and not line.m.once(pretensions)
     )

@@ -26,6 +26,7 @@ from mechgraph.kernel.tables import (
     Layout,
     layout,
     tables,
+    why_no_line,
     why_not_load,
 )
 from mechgraph.kinematics.assembly import closed_start
@@ -61,6 +62,7 @@ STATUSES = (
     ("FORMAT_ERROR", "other tables", "tables of another version"),
     ("NOT_PASSIVE", "no longer passive", "a passive freedom moves other links here"),
     ("FRICTION", "friction not solved", "friction jams here, has no finite force, or none that is surely the only one"),
+    ("FLANKS", "flanks not settled", "flanks on which gears that are redundant press are not found"),
 )
 """What the kernel returns, by its number: identifier, word, meaning."""
 TABLE_CHANGE = 0.02
@@ -225,13 +227,13 @@ def tabled(m: Mechanism, asked: str = "compile") -> Tabled:
     line = Pipeline(DriverMotion(own, dict(zip(drives, home.tolist(), strict=True))), Options())
     system, x = line.system, line.x
     if fault := cannot(line) or (
-        None if gives_forces(line) else "it does not find the forces at contacts of gears, racks and belts"
+        None if gives_forces(line) else "it does not find the tensions of belts with a pretension"
     ):
         raise DeclarationError(subject, [f"the compiled kernel does not carry it: {fault}"])
     places = layout(system, line.columns, line.passive)
     found = tables(places, system, x[:, None], own.loads)
     if found is None:
-        fault = "; ".join(filter(None, (why_not_load(load, own) for load in own.loads)))
+        fault = "; ".join(filter(None, (why_no_line(system), *(why_not_load(load, own) for load in own.loads))))
         raise DeclarationError(subject, [f"the compiled kernel does not carry it: {fault}"])
     I, P = found
     return Tabled(own, system, x, places, I, P[0], drives, home)
@@ -434,7 +436,7 @@ def _whole_numbers(tables: Tabled) -> Iterator[str]:
     """The table of what the mechanism is made of, part by part as the comment of the kernel says."""
     known = tables.I.tolist()
     pairs, factors, columns, _, loops, steps, couplings, terms, drives, unknowns, loads = known[2:13]
-    passives, moved = known[16:18]
+    passives, moved, *_, lines, line_steps = known[16 : len(COUNTS)]
     parts = [
         ("counts", len(COUNTS)), ("first factor of every pair", pairs + 1), ("kinds of factors", factors),
         ("their first columns", factors + 1),
@@ -446,7 +448,9 @@ def _whole_numbers(tables: Tabled) -> Iterator[str]:
         ("efforts at marker B", columns),
         ("pairs with efforts made dual", pairs), ("drives", drives), ("unknown freedoms", unknowns),
         ("couplings: first terms", couplings + 1),        ("freedoms of the terms", terms),
-        ("passive motions: first links", passives + 1), ("links that they move as one", moved), ("turns", passives), ("loads", 4 * loads),
+        ("passive motions: first links", passives + 1), ("links that they move as one", moved), ("turns", passives),
+        ("couplings along lines, links on which these stand still", 2 * lines), ("their first steps", lines + 1),
+        ("pairs on the way, senses", 2 * line_steps), ("loads", 4 * loads),
     ]  # fmt: skip
     assert sum(count for _, count in parts) == len(known)
     at = 0
@@ -470,6 +474,7 @@ def _numbers(tables: Tabled) -> Iterator[str]:
         ("inertia about it, over L^2: xx yy zz xy xz yz", links, 6), ("frame of the link, over L", links, 12),
         ("rates of the passive motions at the start", (), known["passive motions"] * len(freedoms)),
         ("coefficients of couplings", (), known["terms"]), ("their constants", (), known["couplings"]),
+        ("unit wrenches of couplings along lines, on either flank", (), 12 * known["couplings along lines"]),
         ("loads", (), known["load numbers"]),
     ]  # fmt: skip
     assert sum(max(1, len(names)) * count for _, names, count in parts) == len(P)
@@ -483,7 +488,7 @@ def _numbers(tables: Tabled) -> Iterator[str]:
 COUNTS = (
     "format", "links", "pairs", "factors", "columns", "states", "loops", "steps", "couplings", "terms", "drives", "unknowns", "loads",
     "frame", "factor numbers", "load numbers", "passive motions", "links in them", "first component of loops", "rows of a loop",
-    "places that rub",
+    "places that rub", "couplings along lines", "pairs on their ways",
 )  # fmt: skip
 """What stands at the head of the table."""
 

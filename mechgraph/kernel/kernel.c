@@ -43,18 +43,18 @@ static const magnitude NEWTON_DONE = 1e-14;  /* part of the normal forces by whi
 static const magnitude SETTLED = 1e-12;     /* part of the reactions up to which places of contact have settled */
 static const magnitude OFF_TABLE = 1e-9;     /* part of a table's length up to which a place beyond its end is on it by rounding */
 static const magnitude STRAIGHT_ON = 1e-12; /* change of direction up to which a polygon goes straight on */
-enum { ITERATIONS = 8, MOST_STEPS = 20000, MOST_TURNS = 8, POINTS = 8, TOLD = 8, POWERS = 8, SEVERAL = 4, MOST_NEWTON = 60, MOST_ROUNDS = 50, AT_ONCE = 20 }; /* AT_ONCE: positions a step from which on nearer nodes cost less than corrections */
+enum { ITERATIONS = 8, MOST_STEPS = 20000, MOST_TURNS = 8, POINTS = 8, TOLD = 8, POWERS = 8, SEVERAL = 4, MOST_NEWTON = 60, MOST_ROUNDS = 50, MOST_TURNED = 4, AT_ONCE = 20 }; /* AT_ONCE: positions a step from which on nearer nodes cost less than corrections */
 
 #define FOR(i, n) for (int i = 0; i < (n); i++)
 
 /* --- tables and memory ------------------------------------------------------------------------------------------------------------- */
 
 typedef struct {
-  int links, pairs, factors, columns, states, loops, steps, couplings, terms, drives, unknowns, loads, frame_link, rows, stresses, passives, held, part, height, rubs;
+  int links, pairs, factors, columns, states, loops, steps, couplings, terms, drives, unknowns, loads, frame_link, rows, stresses, passives, held, part, height, rubs, lines;
   const int *first, *kind, *column, *state, *number, *ends, *walk, *chord, *loop_first, *loop_pair, *loop_sign, *owner, *column_state,
-      *is_length, *place, *effort_factor, *effort_at_b, *dual, *drive, *unknown, *term_first, *term_column, *passive_first, *passive_link, *turns, *load;
+      *is_length, *place, *effort_factor, *effort_at_b, *dual, *drive, *unknown, *term_first, *term_column, *passive_first, *passive_link, *turns, *line, *line_first, *line_step, *load;
   const double *unit, *origin, *start, *start_coordinates, *frame, *marker_a, *marker_b, *factor_number, *effort, *mass, *center,
-      *inertia, *base, *border, *coefficient, *constant, *load_number;
+      *inertia, *base, *border, *coefficient, *constant, *line_wrench, *load_number;
 } Model;
 
 /* A place on the path: state, rates and accelerations along the way, the closure matrix, its rate along the way, the inverse C^-1 of its
@@ -88,7 +88,7 @@ typedef struct {
   /* friction: rates that tell its directions, reactions without it and as they press, those of unit efforts; of every place what it reads,
    * the wrenches that it exerts for a unit of its normal force and vector, these as efforts in its pair, first row; efforts and what pairs take up */
   double *slip, *smooth, *pressing, *unit, *nothing, *reads, *exerts, *own, *linear, *slope, *sized, *normal, *vector, *sliding, *rubbed, *taken, *bare;
-  int *row_of;
+  int *row_of, *flank; /* flank: whether the second line of a coupling acts, that of a negative multiplier */
   magnitude single, told, allowed, corrected, *speed;
   size_t n_kept;
   Node a, b, before;
@@ -104,7 +104,7 @@ static void read_tables(const int *I, const double *P, Model *m) {
   m->links = I[MGK_LINKS], m->pairs = I[MGK_PAIRS], m->factors = I[MGK_FACTORS], m->columns = I[MGK_COLUMNS];
   m->states = I[MGK_STATES], m->loops = I[MGK_LOOPS], m->steps = I[MGK_STEPS], m->couplings = I[MGK_COUPLINGS];
   m->terms = I[MGK_TERMS], m->drives = I[MGK_DRIVES], m->unknowns = I[MGK_UNKNOWNS], m->loads = I[MGK_LOADS];
-  m->frame_link = I[MGK_FRAME], m->passives = I[MGK_PASSIVES], m->part = I[MGK_FIRST_PART], m->height = I[MGK_LOOP_ROWS], m->rubs = I[MGK_RUBS];
+  m->frame_link = I[MGK_FRAME], m->passives = I[MGK_PASSIVES], m->part = I[MGK_FIRST_PART], m->height = I[MGK_LOOP_ROWS], m->rubs = I[MGK_RUBS], m->lines = I[MGK_LINES];
   m->held = m->height * m->loops + m->couplings;
   m->rows = m->held + m->passives, m->stresses = m->rows - m->unknowns;
   const int p = m->pairs, f = m->factors, c = m->columns, n = m->links, *i = I + MGK_HEAD;
@@ -115,14 +115,15 @@ static void read_tables(const int *I, const double *P, Model *m) {
   m->effort_factor = i, i += c, m->effort_at_b = i, i += c, m->dual = i, i += p;
   m->drive = i, i += m->drives, m->unknown = i, i += m->unknowns;
   m->term_first = i, i += m->couplings + 1, m->term_column = i, i += m->terms;
-  m->passive_first = i, i += m->passives + 1, m->passive_link = i, i += I[MGK_PASSIVE_LINKS], m->turns = i, i += m->passives, m->load = i;
+  m->passive_first = i, i += m->passives + 1, m->passive_link = i, i += I[MGK_PASSIVE_LINKS], m->turns = i, i += m->passives;
+  m->line = i, i += 2 * m->lines, m->line_first = i, i += m->lines + 1, m->line_step = i, i += 2 * I[MGK_LINE_STEPS], m->load = i;
   if (!P) return;
   const double *d = P;
   m->unit = d, d += 1, m->origin = d, d += 3, m->start = d, d += m->states, m->start_coordinates = d, d += c, m->frame = d, d += 12;
   m->marker_a = d, d += 12 * p, m->marker_b = d, d += 12 * p, m->factor_number = d, d += I[MGK_FACTOR_NUMBERS];
   m->effort = d, d += 6 * c, m->mass = d, d += n, m->center = d, d += 3 * n, m->inertia = d, d += 6 * n, m->base = d, d += 12 * n;
   m->border = d, d += c * m->passives;
-  m->coefficient = d, d += m->terms, m->constant = d, d += m->couplings, m->load_number = d;
+  m->coefficient = d, d += m->terms, m->constant = d, d += m->couplings, m->line_wrench = d, d += 12 * m->lines, m->load_number = d;
 }
 
 /* The first freedom of a pair. */
@@ -173,7 +174,7 @@ static size_t lay_out(const Model *m, double *memory, Work *w) {
   const size_t R = m->rubs, moved = R ? c : 0, pairs = R ? 6 * p : 0;
   TAKE(slip, moved), TAKE(smooth, pairs), TAKE(pressing, pairs), TAKE(unit, pairs * c), TAKE(nothing, R ? 6 * n : 0), TAKE(reads, 18 * R), TAKE(exerts, 24 * R), TAKE(own, 24 * R);
   TAKE(linear, 3 * R * (4 * R + 1)), TAKE(slope, R * (R + 1)), TAKE(sized, R * R), TAKE(normal, R), TAKE(vector, 3 * R + 2 * R), TAKE(sliding, R), TAKE(rubbed, moved), TAKE(taken, pairs), TAKE(bare, 6 * n);
-  w->row_of = (int *)taken(&memory, &size, 2 * R + 1);
+  w->row_of = (int *)taken(&memory, &size, 2 * R + 1), w->flank = (int *)taken(&memory, &size, m->lines);
 #undef TAKE
   return size * sizeof(double);
 }
@@ -1085,6 +1086,37 @@ static void couple(const Model *m, const double *multiplier, double *out) {
     out[m->term_column[i]] += m->coefficient[i] * multiplier[k];
 }
 
+/* What couplings along lines take off the wrenches of pairs on their ways for multipliers, times a sign: links touch each other, and pairs do
+ * not bear what `couple` would bring them (kinematics/touching.py). */
+static void relieve(const Model *m, const Work *w, const double *multiplier, double sign, double *pairs) {
+  FOR(l, m->lines) {
+    const int k = m->line[2 * l];
+    const double *X = w->pose + 12 * m->line[2 * l + 1], *G = m->line_wrench + 12 * l + 6 * w->flank[l], at[3] = {X[3], X[7], X[11]};
+    double f[6];
+    turned(X, G, f);
+    turned(X, G + 3, f + 3);
+    wrench_moved(f, at, 1.0);
+    for (int s = m->line_first[l]; s < m->line_first[l + 1]; s++) {
+      const int pair = m->line_step[2 * s];
+      add_part(6, -sign * m->line_step[2 * s + 1] * multiplier[k], f, pairs + 6 * pair);
+      for (int i = m->term_first[k]; i < m->term_first[k + 1]; i++) {
+        const int c = m->term_column[i];
+        if (m->owner[c] == pair) add_part(6, sign * m->coefficient[i] * multiplier[k], w->E + 6 * c, pairs + 6 * pair);
+      }
+    }
+  }
+}
+
+/* Flanks of the signs of multipliers; how many are other ones now. */
+static int turned_over(const Model *m, Work *w) {
+  int changed = 0;
+  FOR(l, m->lines) {
+    const int other = REAL_PART(w->multiplier[m->line[2 * l]]) < 0.0;
+    changed += other != w->flank[l], w->flank[l] = other;
+  }
+  return changed;
+}
+
 static void at_points(const Model *m, const Work *w, double *pairs, double sign) {
   FOR(k, m->pairs) {
     const double *X = w->end + 12 * k, point[3] = {X[3], X[7], X[11]};
@@ -1110,8 +1142,9 @@ static int self_stresses(const Model *m, Work *w) {
       effort[at] = dot(w->S + 6 * at, stress + 6 * m->owner[at], 6);
     }
     FOR(i, c) if (effort[i] != 0.0) add_part(6, -effort[i], w->E + 6 * i, stress + 6 * m->owner[i]);
-    at_points(m, w, stress, -1.0);
     FOR(i, k) effort[c + i] = -null[m->height * m->loops + i];
+    relieve(m, w, effort + c, 1.0, stress);
+    at_points(m, w, stress, -1.0);
     w->size[s] = sqrt(dot(stress, stress, p));
     largest = raised(largest, fabs(w->size[s]));
   }
@@ -1160,6 +1193,7 @@ static void borne(const Model *m, Work *w, const double *on, const double *given
     w->tau[i] = dot(w->S + 6 * i, w->total + 6 * m->owner[i], 6);
     add_part(6, -w->tau[i], w->E + 6 * i, w->reaction + 6 * m->owner[i]);
   }
+  relieve(m, w, w->multiplier, 1.0, w->reaction);
   if (!m->stresses) return;
   at_points(m, w, w->reaction, -1.0);
   FOR(s, m->stresses) {
@@ -1185,6 +1219,7 @@ static void checks(const Model *m, Work *w, double *balance, double *power, magn
     *power += w->dq[c] * acting;
     wrench = raised(wrench, most), term = raised(term, fabs(w->dq[c]) * most);
   }
+  relieve(m, w, w->multiplier, -1.0, w->total);
   FOR(b, m->links) w->speed[b] = size_of(w->V + 6 * b, 6);
   FOR(k, m->pairs) {
     const int a = m->ends[2 * k], b = m->ends[2 * k + 1];
@@ -1497,17 +1532,23 @@ static int forces(const Model *m, Work *w, const double *x, double *record, cons
   if (efforts(m, w)) return MGK_SINGULAR;
   loads(m, w, x);
   inertia(m, w);
-  if (m->stresses && self_stresses(m, w)) return MGK_STRAIN;
+  int turns = 0;
   FOR(i, 6 * m->links) w->bare[i] = w->applied[i] + w->inertial[i];
-  borne(m, w, w->bare, w->given, record, places);
+  memset(w->flank, 0, m->lines * sizeof(int));
+  do {
+    if (turns++ > MOST_TURNED) return MGK_FLANKS;
+    if (m->stresses && self_stresses(m, w)) return MGK_STRAIN;
+    borne(m, w, w->bare, w->given, record, places);
+  } while (turned_over(m, w));
   if (m->rubs) {
     memset(w->nothing, 0, (size_t)6 * m->links * sizeof(double));
-    const int unsure = directed(m, w) ? friction(m, w, w->nothing, 0, record, places) : 2;
-    record[places[MGK_UNSURE]] = unsure;
+    int unsure = directed(m, w) ? friction(m, w, w->nothing, 0, record, places) : 2;
     if (unsure) memset(w->rubbed, 0, m->columns * sizeof(double)), memset(w->taken, 0, (size_t)6 * m->pairs * sizeof(double));
     add_part(m->columns, 1.0, w->rubbed, w->given);
     borne(m, w, w->bare, w->given, record, places);
     add_part(6 * m->pairs, -1.0, w->taken, w->reaction);
+    if (turned_over(m, w)) unsure = 1; /* friction turns forces between teeth round */
+    record[places[MGK_UNSURE]] = unsure;
   }
   couple(m, w->multiplier, w->coupled);
   double *own = w->column_value;

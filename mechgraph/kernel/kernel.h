@@ -17,23 +17,25 @@
  *       drive[drives], unknown[unknowns]        columns
  *       term_first[couplings + 1], term_column[terms]
  *       passive_first[passives + 1], passive_link[links of all], turns[passives]   links that a passive motion moves as one; a turn?
+ *       line[2 lines], line_first[lines + 1], line_step[2 steps of all]   couplings along lines: its number and the link on which the line stands
+ *                                               still; pairs on the way from gear a to gear b, the sense in which each is passed
  *       load[4 loads]                           kind (MGK_WEIGHT ...), two numbers, place among the load numbers
  * P   L, origin[3], start[states], start_coordinates[columns], frame[12], marker_a, marker_b[12 pairs], factor numbers, effort[6 columns],
  *     mass[links], center[3 links], inertia[6 links] (xx yy zz xy xz yz), base[12 links], border[passives columns], coefficients[terms], constants[couplings],
- *     load numbers. Poses are three rows of four. Every link has the frame of its pair in the tree; its own is that times its base.
+ *     line_wrench[12 lines] (on gear b for a positive and for a negative unit multiplier, in the frame of that link), load numbers. Poses are three rows of four. Every link has the frame of its pair in the tree; its own is that times its base.
  *     The border holds rates of the passive motions at the start.
  */
 #ifndef MECHGRAPH_KERNEL_H
 #define MECHGRAPH_KERNEL_H
 #include <stddef.h>
 
-#define MGK_FORMAT 5
+#define MGK_FORMAT 6
 
 /* The counts at the head of I. */
 enum {
   MGK_IS_FORMAT, MGK_LINKS, MGK_PAIRS, MGK_FACTORS, MGK_COLUMNS, MGK_STATES, MGK_LOOPS, MGK_STEPS, MGK_COUPLINGS, MGK_TERMS,
   MGK_DRIVES, MGK_UNKNOWNS, MGK_LOADS, MGK_FRAME, MGK_FACTOR_NUMBERS, MGK_LOAD_NUMBERS,
-  MGK_PASSIVES, MGK_PASSIVE_LINKS, MGK_FIRST_PART, MGK_LOOP_ROWS, MGK_RUBS, MGK_HEAD
+  MGK_PASSIVES, MGK_PASSIVE_LINKS, MGK_FIRST_PART, MGK_LOOP_ROWS, MGK_RUBS, MGK_LINES, MGK_LINE_STEPS, MGK_HEAD
 };
 
 /* Every loop closes MGK_LOOP_ROWS components of a twist, from MGK_FIRST_PART on: all six from 0 on, in the plane Rz Tx Ty from 2 on. */
@@ -67,7 +69,8 @@ enum {
   MGK_TOO_FAR = 7,      /* more steps than are made */
   MGK_FORMAT_ERROR = 8, /* tables of another version */
   MGK_NOT_PASSIVE = 9,  /* a passive motion moves other links here, or is not told from another one */
-  MGK_FRICTION = 10     /* friction jams here, has no finite force, or no solution that is surely the only one */
+  MGK_FRICTION = 10,    /* friction jams here, has no finite force, or no solution that is surely the only one */
+  MGK_FLANKS = 11       /* flanks on which gears that are redundant press are not found */
 };
 
 /* Parts of a record, in order, for one position (condition: that number, and how far links reach, by which rounding counts; unsure: 1 where friction has no sure solution, 2 where nothing moves); s = rows of loops + couplings + passives - unknowns self-stresses. */

@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from mechgraph.fields import PerCase
 from mechgraph.kinematics.rates import PassiveMotion
 from mechgraph.kinematics.system import CouplingRows, System
+from mechgraph.kinematics.touching import on_carrier
 from mechgraph.maths.linear import complement
-from mechgraph.maths.se3 import Array, Index, compose, identity, inverse, rotate
+from mechgraph.maths.se3 import Array, Index, compose, cross, identity, inverse, rotate
 from mechgraph.memo import carried, dataclass
 from mechgraph.model.friction import Friction, places_in
 from mechgraph.model.gears import moving_lines
@@ -41,7 +42,7 @@ from mechgraph.pairs.factors import ConstantScrew, Factor, Freedom, Rotation
 
 Integers = NDArray[np.int32]
 
-FORMAT = 5
+FORMAT = 6
 PARTS = (
     "x", "coordinates", "dq", "ddq", "closure", "condition", "points", "reactions", "efforts", "given", "loads", "stress", "stress_efforts",
     "coupled", "multipliers", "multiplier_stress", "coupled_stress", "shaking", "balance", "power",
@@ -184,7 +185,7 @@ def layout(system: System, drives: Index, passive: Sequence[PassiveMotion]) -> L
     ends = np.stack([s.a, s.b], axis=1)
     moved = [link for motion in passive for link in motion.links]
     head = [FORMAT, len(s.m.links), len(s.m.pairs), len(steps), s.n_freedoms, s.n_state, g.n_loops, len(pair), K, len(term_columns),
-            len(drives), len(unknown), 0, g.frame, int(numbers[-1]), 0, len(passive), len(moved), g.span.start, g.width, 0]  # fmt: skip
+            len(drives), len(unknown), 0, g.frame, int(numbers[-1]), 0, len(passive), len(moved), g.span.start, g.width, *[0] * 3]  # fmt: skip
     parts = [
         head, first, [step.kind for _, step in steps], columns, states[:-1], numbers[:-1], ends.ravel(), tree.ravel(), g.chords,
         np.searchsorted(loop, np.arange(g.n_loops + 1)), pair, sign, s.pair_of_freedom, s.single_rows, s.is_length, place, *effort_factor,
@@ -296,17 +297,20 @@ def tables(known: Layout, system: System, x: Array, loads: Sequence[Load] | None
     turned = np.einsum("jinb,jknb,klnb->ilnb", R, par.inertia, R)
     inertia = turned[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     acts: Acting | None = Acting([], []) if loads is None else acting(s, own, known.I[HEAD:], loads)
-    if acts is None:
+    lines = _Lines([], [], []) if loads is None else _lines(s, own)
+    if acts is None or lines is None:
         return None
     rows = _coupling_rows(s)
     parts = [
         np.full((1, 1), par.L), par.origin[:, None], x, s.start_coordinates(s.m.start)[:, None], par.frame.reshape(12, 1),
         _flat(A), _flat(B), known.constant[:, None] + known.per_pitch[:, None] * par.pitch[known.pair],
         _by_item(np.concatenate([moment, force])), par.mass, _by_item(center), _by_item(inertia), _flat(own), known.border.reshape(-1, 1),
-        *(row.coefficients for row in rows), *(row.constant for row in rows), *acts.numbers,
+        *(row.coefficients for row in rows), *(row.constant for row in rows), *lines.wrenches, *acts.numbers,
     ]  # fmt: skip
-    I = np.concatenate([known.I, np.array(acts.entries, dtype=np.int32).ravel()])
+    entries = lines.entries, np.cumsum([0, *map(len, lines.steps)]), *lines.steps, acts.entries
+    I = np.concatenate([known.I, *(np.asarray(part, dtype=np.int32).ravel() for part in entries)])
     I[HEAD_LOADS], I[HEAD_LOAD_NUMBERS] = len(acts.entries), len(acts.numbers)
+    I[HEAD_LINES], I[HEAD_LINE_STEPS] = len(lines.entries), sum(map(len, lines.steps))
     I[HEAD_RUBS] = sum(kind >= CONTACT for kind, *_ in acts.entries)
     parts = [np.atleast_2d(part) for part in parts]
     out = np.empty((count, sum(map(len, parts))))
@@ -317,8 +321,41 @@ def tables(known: Layout, system: System, x: Array, loads: Sequence[Load] | None
     return I, out
 
 
-HEAD_LOADS, HEAD_LOAD_NUMBERS, HEAD_RUBS, HEAD = 12, 15, 20, 21
-"""Places of the numbers of loads, and of places that rub, in the head, and its length."""
+HEAD_LOADS, HEAD_LOAD_NUMBERS, HEAD_RUBS, HEAD_LINES, HEAD_LINE_STEPS, HEAD = 12, 15, 20, 21, 22, 23
+"""Places of the numbers of loads, of places that rub, and of couplings along lines in the head, and its length."""
+
+
+@dataclass(frozen=True)
+class _Lines:
+    """Couplings along lines in the tables: number and carrier, pairs on the way with their senses, and wrenches ``(12, B)`` of each."""
+
+    entries: list[tuple[int, int]]
+    steps: list[list[tuple[int, int]]]
+    wrenches: list[Array]
+
+
+def _lines(system: System, own: Array) -> _Lines | None:
+    """The lines of all couplings in the frames ``own (3, 4, N, B)`` of the tables; None where one of them moves on every link."""
+    out = _Lines([], [], [])
+    for g, coupling in enumerate(system.m.couplings):
+        if not coupling.steps:
+            continue
+        found = on_carrier(system, g)
+        if found is None:
+            return None
+        link, G = found
+        R, p = own[:, :3, [link]], own[:, 3, [link]]
+        moment, force = rotate(R, G[:3]), rotate(R, G[3:])
+        out.entries.append((g, link))
+        out.steps.append([(step.pair, int(step.sense)) for step in coupling.steps])
+        out.wrenches.append(_by_item(np.concatenate([moment + cross(p, force), force])))
+    return out
+
+
+def why_no_line(system: System) -> str | None:
+    """What of the lines of couplings the kernel cannot carry."""
+    stray = [c.name for g, c in enumerate(system.m.couplings) if c.steps and on_carrier(system, g) is None]
+    return f"the line of the coupling {stray[0]!r} stands still on no link between its gears" if stray else None
 
 
 def _by_item(values: Array) -> Array:

@@ -14,14 +14,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from mechgraph.kinematics.lines import LineRows
 from mechgraph.kinematics.state import Configuration
-from mechgraph.maths.se3 import Array, Index, Mask, cross
+from mechgraph.kinematics.system import System
+from mechgraph.maths.se3 import Array, Index, Mask, compose, cross, identity, inverse, rotate, rotate_back
+from mechgraph.maths.tolerances import MOTIONS
 from mechgraph.model.couplings import Axes, BaseCoupling, Contact, Lines, fitting_of
 from mechgraph.model.gears import LineCoupling, moving_lines
+from mechgraph.pairs import pair_type as evaluation
 
 
 def strayed(here: Configuration) -> str | None:
@@ -33,10 +37,61 @@ def strayed(here: Configuration) -> str | None:
     return LineRows(here.system, which).strayed(here, max(fitting_of(m), 1e-7))
 
 
+class _OnTheWay:
+    """What a configuration tells of the links and pairs on the way from gear a to gear b of a coupling, seen from gear a, the pairs at
+    some coordinates: one a variant.
+    """
+
+    def __init__(self, system: System, coupling: BaseCoupling, coordinate: float) -> None:
+        m, P, T = system.m, len(system.m.pairs), system.par.batch
+        constants = system.numbers.constants
+        self.system, self.T, self.links = system, T, [m.link_index[coupling.gears(m)[0]]]
+        self.poses = identity(len(m.links), T)
+        self.pair_points, self.S = np.zeros((3, P, T)), np.zeros((6, system.n_freedoms, T))
+        for place, step in enumerate(coupling.steps):
+            k, forward = step.pair, step.sense > 0
+            row, A, B = m.pairs[k].type, constants[:, :, [1 + k]], constants[:, :, [1 + P + k]]
+            x = evaluation.coordinates_to_state(row, np.full((row.f, 1, 1), coordinate * (1 + place)))
+            moved = evaluation.frames_of(row, system.par.pitch[[k]], x)[-1]
+            there = compose(compose(A, moved), inverse(B))
+            before = self.poses[:, :, self.links[-1:]]
+            behind = compose(before, there if forward else inverse(there))
+            self.links.append(m.link_index[m.pairs[k].b if forward else m.pairs[k].a])
+            self.poses[:, :, self.links[-1:]] = behind
+            frame = compose(before if forward else behind, A)[:, :, 0]
+            self.pair_points[:, k] = compose(behind if forward else before, B)[:, 3, 0]
+            for column, freedom in enumerate(row.freedoms, system.first_column[k]):
+                turn, slide = (
+                    rotate(frame[:, :3], np.reshape(v, (3, 1))) for v in np.split(np.array(freedom.twist), 2)
+                )
+                self.S[:, column] = np.concatenate([turn, slide + cross(frame[:, 3], turn)])
+
+    def seen_from(self, link: int, wrenches: Array) -> Array:
+        """Wrenches ``(6, n, T)`` about the origin of a link, in its frame."""
+        R, p = self.poses[:, :3, [link]], self.poses[:, 3, [link]]
+        return np.concatenate([rotate_back(R, wrenches[:3] - cross(p, wrenches[3:])), rotate_back(R, wrenches[3:])])
+
+
+def on_carrier(system: System, g: int) -> tuple[int, Array] | None:
+    """The link between gears a and b in which both lines of a coupling stand still, and their wrenches on gear b there ``(6, 2, B)``, for a
+    positive and a negative unit multiplier, internal units; None where there is no such link.
+    """
+    coupling = system.m.couplings[g]
+    if coupling.name in system.m.once(moving_lines):
+        return None
+    ways = [_OnTheWay(system, coupling, coordinate) for coordinate in (0.0, 0.7)]
+    lines = [ContactLines(way).wrenches_of(g, coupling)[0] for way in ways]
+    for link in ways[0].links:
+        one, other = (way.seen_from(link, G) for way, G in zip(ways, lines, strict=True))
+        if np.abs(one - other).max() <= MOTIONS.rounding * np.abs(one).max():
+            return link, one
+    return None
+
+
 class ContactLines:
     """Lines of all contacts at the positions of a configuration, internal units about the internal origin."""
 
-    def __init__(self, here: Configuration) -> None:
+    def __init__(self, here: Configuration | Any) -> None:
         self.here = here
         self.contacts = [(g, c) for g, c in enumerate(here.system.m.couplings) if c.steps]
         self.settled: dict[int, Mask] = {}
@@ -52,9 +107,10 @@ class ContactLines:
         """For every contact the wrench on gear b for a unit multiplier ``(6, 2, T)``, of a positive and of a negative one, the points
         ``(3, 2, T)`` at which it acts, and its normal force ``(2, T)``.
         """
-        return [self._of(g, contact) for g, contact in self.contacts]
+        return [self.wrenches_of(g, contact) for g, contact in self.contacts]
 
-    def _of(self, g: int, contact: BaseCoupling) -> tuple[Array, Array, Array]:
+    def wrenches_of(self, g: int, contact: BaseCoupling) -> tuple[Array, Array, Array]:
+        """Those of one contact."""
         if not isinstance(contact, Contact):
             return self._of_line(g)
         here, columns = self.here, self._columns(contact)

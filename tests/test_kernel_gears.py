@@ -1,0 +1,169 @@
+"""Forces of gears, racks and belts in the compiled kernel: those of numpy, in calls, studies, files of C and derivatives."""
+
+import numpy as np
+import pytest
+from attack import differences
+from strategies import body, pose, unit
+from test_c_file import library_of
+from test_c_file import solved as run_c
+from test_compile import beside
+from test_gears import planetary
+
+import mechgraph as mg
+from mechgraph.compiled.tabled import tabled, write_c
+
+pytestmark = [pytest.mark.usefixtures("compiled"), pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")]
+
+STAGES = ("spur", "ring", "bevel", "worm", "belt", "mesh", "rack")
+
+
+def random_train(seed: int, stages: tuple[str, ...] = ()) -> mg.Mechanism:
+    """Shafts on the frame, each driven by the one before through a gear or belt of a random kind, somewhere in space, under loads."""
+    rng = np.random.default_rng(seed)
+    stages = stages or tuple(rng.choice(STAGES, size=rng.integers(1, 4)).tolist())
+    p, z = rng.normal(size=3) * 0.1, unit(rng)
+    axes, couplings, gears, kinds = [(p, z)], [], [], ["R"]
+    for i, kind in enumerate(stages):
+        e = unit(rng)
+        e = e - z * (e @ z)
+        e /= np.linalg.norm(e)
+        t, a, b, name = np.cross(z, e), f"S{i}", f"S{i + 1}", f"g{i}"
+        za, zb = int(rng.integers(17, 30)), int(rng.integers(35, 70))
+        sense = rng.choice([-1.0, 1.0])
+        module, helix = 0.002, float(rng.choice([0.0, 0.3]))
+        if kind in ("spur", "ring", "mesh"):
+            inner = kind == "ring"
+            far = p + e * module * (zb - za if inner else zb + za) / 2 / np.cos(helix) + z * rng.normal() * 0.01
+            if kind == "mesh":
+                at = p + z * ((far - p) @ z)
+                gears += [
+                    mg.Gear(a + "m", f"l{i}", za, at, z, module=module, helix_angle=helix),
+                    mg.Gear(b + "m", f"l{i + 1}", zb, far, z, module=module, helix_angle=-helix),
+                ]
+                couplings.append(mg.Mesh(name, a + "m", b + "m"))
+            else:
+                couplings.append(mg.SpurGears(name, a, b, teeth=(za, zb), helix_angle=helix, internal=inner))
+            p, z = far, sense * z
+        elif kind == "bevel":
+            couplings.append(mg.BevelGears(name, a, b, teeth=(za, zb), module=module, spiral_angle=helix))
+            p, z = p + 0.1 * z + 0.1 * e, sense * e
+        elif kind == "worm":
+            couplings.append(mg.WormGear(name, a, b, teeth=(2, zb), radius=0.01, left_hand=bool(helix)))
+            p, z = p + 0.05 * e, sense * t
+        elif kind == "belt":
+            couplings.append(mg.Belt(name, a, b, radii=(0.03, 0.05), crossed=bool(helix)))
+            p, z = p + 0.3 * e, sense * z
+        else:
+            couplings.append(mg.Rack(name, a, b, radius=0.02))
+            p, z = p + 0.02 * e + 0.1 * t, sense * t
+        axes.append((p, z))
+        kinds.append("P" if kind == "rack" else "R")
+        if kind == "rack":
+            break
+    pairs = []
+    for i, ((at, axis), kind) in enumerate(zip(axes, kinds, strict=True)):
+        ends = ("frame", f"l{i}") if rng.random() < 0.5 else (f"l{i}", "frame")
+        pairs.append(mg.Pair(f"S{i}", kind, *ends, point=tuple(at), axis=tuple(axis)))
+    links = [mg.Link("frame"), *(body(rng, f"l{i}", at, 0.1) for i, (at, _) in enumerate(axes))]
+    loads = [
+        mg.Gravity(tuple(rng.normal(size=3))),
+        mg.Effort(pairs[-1].name, float(rng.choice([-1, 1]) * rng.uniform(1, 9))),
+    ]
+    order = rng.permutation(len(pairs)) if len(stages) > 1 else range(len(pairs))
+    m = mg.Mechanism(
+        "train", links, [pairs[i] for i in order], drives=["S0"], couplings=couplings, gears=gears, loads=loads
+    )
+    return m.moved(pose(rng))
+
+
+def differ(m: mg.Mechanism, given: dict[str, mg.Motion], **how) -> float:
+    """The worst difference of the kernel to numpy, forces of couplings too."""
+    one, other = (mg.solve(m, given, engine=engine, **how) for engine in ("compiled", "dense"))
+    worst, where, faults = differences(one, other)
+    assert (one.engine, faults) == ("compiled", []), where
+    for c in m.couplings:
+        mine, theirs = one.coupling(c.name).force, other.coupling(c.name).force
+        assert (np.isnan(mine) == np.isnan(theirs)).all()
+        worst = max(worst, np.nanmax(np.abs(mine - theirs), initial=0.0) / np.nanmax(np.abs(theirs), initial=1e-3))
+    return worst
+
+
+def turning(m: mg.Mechanism, count: int = 5) -> dict[str, mg.Motion]:
+    return {d.freedom: mg.Motion(np.linspace(-0.4, 0.7, count), 3.0 + i, -2.0) for i, d in enumerate(m.drives)}
+
+
+@pytest.mark.seeds(12)
+def test_random_trains(seed):
+    m = random_train(seed)
+    assert tabled(m).I is not None
+    assert differ(m, turning(m)) < 1e-10
+
+
+@pytest.mark.parametrize("redundant", ["nan", "minimum_norm"])
+@pytest.mark.parametrize("count", [1, 3])
+def test_planets(count, redundant):
+    m = planetary(count)
+    assert differ(m, turning(m), redundant=redundant) < 1e-10
+    plane = m.to_planar()
+    assert differ(plane, turning(plane), redundant=redundant) < 1e-10
+
+
+@pytest.mark.seeds(3)
+def test_calls_one_by_one(seed):
+    m = random_train(20 + seed)
+    c = mg.compile(m)
+    assert beside(c, m, c.tables.home + np.linspace(-0.3, 0.3, 4)[:, None]) < 1e-10
+
+
+@pytest.mark.parametrize(
+    ("stages", "numbers"),
+    [
+        (("spur", "bevel"), ("pressure_angle", "spiral_angle")),
+        (("worm", "belt"), ("pressure_angle", "radii.b")),
+        (("ring", "rack"), ("pressure_angle", "radius")),
+    ],
+)
+def test_derivatives_are_exact(stages, numbers):
+    """Of a reaction by a mass, a load and numbers of gears, beside differences."""
+    m = random_train(1, stages)
+    c = mg.compile(m)
+    c(c.tables.home + 0.2, 2.0, -1.0)
+    names = ["l1.mass", *(f"g{i}.{name}" for i, name in enumerate(numbers))]
+    found = c.gradient("S1.reaction", names)
+    for name, mine in zip(names, found.T, strict=True):
+        middle, step = c.parameters[name], 1e-3 * max(abs(c.parameters[name]), 0.1)
+        sides = []
+        for sense in (1.0, -1.0):
+            c.parameters[name] = middle + sense * step
+            c(c.tables.home + 0.2, 2.0, -1.0)
+            sides.append(c.reaction("S1"))
+        c.parameters[name] = middle
+        slope = (sides[0] - sides[1]) / (2 * step)
+        np.testing.assert_allclose(mine, slope, atol=1e-5 * np.abs(slope).max() + 1e-12)
+
+
+def test_a_file_of_c(tmp_path):
+    m = random_train(3, ("spur", "bevel", "belt"))
+    t = tabled(m)
+    write_c(t, tmp_path / "train.c")
+    q = (t.home + 0.1).tolist()
+    status, (effort, reaction, _) = run_c(library_of(tmp_path / "train.c", "train"), "train", m, q)
+    s = mg.solve(m, {"S0": mg.Motion(q[0], 2.0, 0.5)}, engine="dense")
+    expected = np.concatenate([s[p.name].reaction for p in m.pairs])
+    assert status == 0
+    np.testing.assert_allclose(reaction, expected, atol=1e-11 * np.abs(expected).max())
+    np.testing.assert_allclose(effort, s["S0"].effort, rtol=1e-11)
+
+
+def test_other_couplings_of_the_same_graph():
+    """What is kept of a graph is not taken for other couplings of it, nor for the same with their terms in another order."""
+    pairs = [
+        mg.Pair(k, "R", "frame", k, point=(x, 0, 0), axis=(0, 0, 1)) for k, x in (("p", 0.0), ("w", 0.1), ("v", 0.2))
+    ]
+    last = mg.Coupling({"w": 1.0, "v": 3.0}, name="h")
+    m = mg.Mechanism("c", pairs=pairs, couplings=[mg.Coupling({"p": 1.0, "w": 2.0}, name="g"), last], drives=["p"])
+    for terms, w in (({"p": 1.0, "w": 2.0}, -0.5), ({"w": 2.0, "p": 1.0}, -0.5), ({"p": 1.0, "v": 2.0}, 1.5)):
+        s = mg.solve(
+            m.replace(couplings=[mg.Coupling(terms, name="g"), last]), {"p": mg.Motion(0.5, 1.0)}, engine="compiled"
+        )
+        assert s["w"].velocity[0] == pytest.approx(w)
