@@ -184,8 +184,10 @@ def layout(system: System, drives: Index, passive: Sequence[PassiveMotion]) -> L
     K = len(s.m.couplings)
     ends = np.stack([s.a, s.b], axis=1)
     moved = [link for motion in passive for link in motion.links]
-    head = [FORMAT, len(s.m.links), len(s.m.pairs), len(steps), s.n_freedoms, s.n_state, g.n_loops, len(pair), K, len(term_columns),
-            len(drives), len(unknown), 0, g.frame, int(numbers[-1]), 0, len(passive), len(moved), g.span.start, g.width, *[0] * 3]  # fmt: skip
+    head = [
+        FORMAT, len(s.m.links), len(s.m.pairs), len(steps), s.n_freedoms, s.n_state, g.n_loops, len(pair), K, len(term_columns),
+        len(drives), len(unknown), 0, g.frame, int(numbers[-1]), 0, len(passive), len(moved), g.span.start, g.width, *[0] * 3,
+    ]  # fmt: skip
     parts = [
         head, first, [step.kind for _, step in steps], columns, states[:-1], numbers[:-1], ends.ravel(), tree.ravel(), g.chords,
         np.searchsorted(loop, np.arange(g.n_loops + 1)), pair, sign, s.pair_of_freedom, s.single_rows, s.is_length, place, *effort_factor,

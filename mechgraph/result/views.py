@@ -12,8 +12,8 @@ from mechgraph.document import Block, Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import vector_fault
 from mechgraph.maths.se3 import Array
-from mechgraph.memo import dataclass
 from mechgraph.maths.tolerances import MOTIONS
+from mechgraph.memo import dataclass
 from mechgraph.model.belts import BeltCourse, BeltDrive
 from mechgraph.model.couplings import Belt
 from mechgraph.model.friction import WAYS, Friction, coupling_of
