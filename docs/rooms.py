@@ -18,9 +18,19 @@ PICTURE = ROOT / "docs" / "_static" / "rooms.svg"
 WIDTH, HEIGHT, ACROSS, DOWN = 118, 30, 140, 62
 
 
+def statements(node: ast.AST) -> Iterator[ast.AST]:
+    """All statements below, but for what only a type checker reads."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.dump(child.test):
+            yield from statements(ast.Module(child.orelse, []))
+        elif not isinstance(child, ast.expr):
+            yield child
+            yield from statements(child)
+
+
 def imported(tree: ast.AST) -> Iterator[str]:
     """Rooms that a module imports when it is loaded, or later."""
-    for node in ast.walk(tree):
+    for node in statements(tree):
         names = []
         if isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
             names = [
@@ -31,14 +41,6 @@ def imported(tree: ast.AST) -> Iterator[str]:
         yield from (name.split(".")[1] for name in names if name.startswith("mechgraph."))
 
 
-def typing_only(tree: ast.Module) -> ast.Module:
-    """The module without what only a type checker reads."""
-    guarded = [node for node in ast.walk(tree) if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)]
-    for node in guarded:
-        node.body = [ast.Pass()]
-    return tree
-
-
 @functools.cache
 def rooms() -> nx.DiGraph:
     """Folders of the package, and which imports which; ``root`` stands for the modules beside them."""
@@ -47,7 +49,7 @@ def rooms() -> nx.DiGraph:
     graph.add_nodes_from(sorted(folders))
     for file in sorted(PACKAGE.rglob("*.py")):
         room = file.relative_to(PACKAGE).parts[0]
-        tree = typing_only(ast.parse(file.read_text(encoding="utf-8")))
+        tree = ast.parse(file.read_text(encoding="utf-8"))
         graph.add_edges_from((room, name) for name in imported(tree) if {room, name} <= folders and room != name)
     return graph
 

@@ -12,7 +12,7 @@ from hypothesis import settings
 import mechgraph as mg
 from mechgraph import by_kernel
 
-settings.register_profile("dev", max_examples=25, deadline=None)
+settings.register_profile("dev", max_examples=10, deadline=None)
 settings.register_profile("ci", max_examples=10, deadline=None, derandomize=True, database=None)
 CI = os.environ.get("CI", "").lower() not in {"", "0", "false"}
 settings.load_profile("ci" if CI else "dev")
@@ -20,7 +20,7 @@ settings.load_profile("ci" if CI else "dev")
 GOLDEN = Path(__file__).parent / "golden"
 FURTHER = 10_000
 """First seed of ``--attack``."""
-DAILY = 3
+DAILY = 2
 """Seeds of a test that are run every day; its others are slow."""
 
 
@@ -39,8 +39,8 @@ def pytest_configure(config: pytest.Config) -> None:
     """Markers of these tests."""
     config.addinivalue_line(
         "markers",
-        "seeds(n, without=()): a test for each of n seeds, the first but those named, and for as many more as --attack says; "
-        "only these further ones may be skipped",
+        "seeds(n, without=(), daily=...): a test for each of n seeds, the first but those named, and for as many more as "
+        "--attack says; only these further ones may be skipped; every day the first, or those named as quick",
     )
     config.addinivalue_line(
         "markers", "daily(n): n of the cases of this test, evenly spread, are run every day; the others are slow"
@@ -54,8 +54,9 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         without = marker.kwargs.get("without", ())
         always = list(itertools.islice((seed for seed in itertools.count() if seed not in without), marker.args[0]))
         more = metafunc.config.getoption("--attack")
-        late = (pytest.param(seed, marks=pytest.mark.slow) for seed in itertools.islice(always, DAILY, None))
-        metafunc.parametrize("seed", [*always[:DAILY], *late, *range(FURTHER, FURTHER + more)])
+        daily = marker.kwargs.get("daily", always[:DAILY])
+        late = (pytest.param(seed, marks=pytest.mark.slow) for seed in always if seed not in daily)
+        metafunc.parametrize("seed", [*daily, *late, *range(FURTHER, FURTHER + more)])
 
 
 @pytest.hookimpl(tryfirst=True)

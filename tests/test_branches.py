@@ -96,7 +96,7 @@ def test_a_position_is_on_the_branch_that_leads_there() -> None:
     m = linked_four_bar(1.17, 1.93, 1.1295, 1.97, 0.5)
     b = mg.branches(m, "O0", samples=12, points=60)
     rocker = m.freedom_names().index("O2.Rz")
-    for angle in (-0.05, -0.02, 0.02, 0.05):
+    for angle in (-0.02, 0.02):
         for mode in mg.assemblies(m, {"O0": angle}):
             branch = b.branches[b.defects([mode]).branches[0]]
             assert branch.interval[0] - 2 * np.pi < angle < branch.interval[1]
@@ -105,7 +105,7 @@ def test_a_position_is_on_the_branch_that_leads_there() -> None:
         b.defects([mode, mode.start | {"O3.Rz": 0.2}])
 
 
-@pytest.mark.daily(8)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("seed", range(1000))
 def test_branch_and_circuit_of_every_position_are_those_of_the_closed_form(seed: int) -> None:
     """Of four-bars, many of them near a change point, at places anywhere and near folds; their crank turns right round without folds."""
@@ -139,6 +139,7 @@ def test_turns_are_those_next_to_the_start() -> None:
     assert all(-np.pi < middle <= np.pi for middle in map(np.mean, ranges))
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("samples", [12, 13])
 def test_whether_the_driver_turns_right_round_does_not_depend_on_the_samples(samples: int) -> None:
     """Declared at a right angle, samples of a parallelogram at whole parts of a turn from there would lie where its branches cross."""

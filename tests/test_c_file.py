@@ -71,6 +71,7 @@ def solved(library: ctypes.CDLL, name: str, m: mg.Mechanism, q: list[float]) -> 
     return status, out
 
 
+@pytest.mark.daily(3)
 @pytest.mark.usefixtures("compiled")
 @pytest.mark.parametrize("name", ["rcsr-csr", "bricard-cube", "rssr", "planar marghitu-2-1", "rough rcsr"])
 def test_c_gives_what_solve_gives(name, tmp_path):

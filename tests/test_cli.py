@@ -416,6 +416,7 @@ def test_nothing_solved_is_no_success() -> None:
     assert "Solved 0 of 1 position." in result.stdout
 
 
+@pytest.mark.slow
 def test_loops_that_cannot_be_closed(unclosable: Path) -> None:
     assert run("solve", unclosable, "--drive", "A=0").exit_code == 1
 

@@ -184,7 +184,7 @@ KNOWN = ("goldberg", "myard", "bricard_cube", "sarrus", "spherical", "three_cran
          "rccc", "door", "prprrh_special", "hexapod", "three_upu", "folded_bars", "two_four_bars")  # fmt: skip
 
 
-@pytest.mark.daily(8)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("name", LOOPS)
 def test_library_reports_do_not_depend_on_the_engine(name: str) -> None:
     assert_same_report(mg.load(name))

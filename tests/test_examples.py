@@ -17,6 +17,8 @@ EXAMPLES = sorted((ROOT / "examples").glob("[0-9]*.py"))
 LARGEST_PICTURE = 150_000
 ELSEWHERE = {"05_lee_verdicts", "12_excavator"}
 """Run by ``reference/test_lee_verdicts.py``, and for its page below."""
+LONG = {"04_readme_figures", "07_lee_rchch", "09_tolerances"}
+"""Seconds each; what they show has its tests among the pictures, the published tables and the studies."""
 
 
 def run(script: Path, *arguments: str) -> str:
@@ -36,7 +38,7 @@ def draws(script: Path) -> bool:
 @pytest.mark.parametrize(
     "script",
     [
-        pytest.param(script, marks=[pytest.mark.slow] if script.stem in ELSEWHERE else [], id=script.stem)
+        pytest.param(script, marks=[pytest.mark.slow] if script.stem in {*ELSEWHERE, *LONG} else [], id=script.stem)
         for script in EXAMPLES
     ],
 )

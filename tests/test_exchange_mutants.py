@@ -55,6 +55,7 @@ def damaged(text, rng):
     return text
 
 
+@pytest.mark.daily(40)
 @pytest.mark.parametrize("seed", range(40))
 @pytest.mark.parametrize("kind", ["asmt", "stored", "xml", "urdf"])
 def test_damage_is_named(tmp_path, kind, seed):

@@ -42,7 +42,7 @@ def solution(request: pytest.FixtureRequest) -> mg.Solution:
     return SOLUTIONS[request.param]()
 
 
-@pytest.mark.daily(4)
+@pytest.mark.daily(2)
 def test_netcdf_comes_back(solution: mg.Solution, tmp_path: Path) -> None:
     xr = pytest.importorskip("xarray")
     pytest.importorskip("h5netcdf")

@@ -38,6 +38,7 @@ SOLVABLE = [
 ]
 
 
+@pytest.mark.daily(12)
 @pytest.mark.parametrize("name", SOLVABLE)
 def test_every_link_is_in_balance(name: str) -> None:
     m = mg.load(name)

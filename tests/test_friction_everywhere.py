@@ -125,6 +125,7 @@ def test_without_friction_it_is_the_smooth_machine(name: str) -> None:
     assert power(CASES[name](1e-9), 1.0) == pytest.approx(power(smooth, 1.0), rel=1e-6, abs=1e-7)
 
 
+@pytest.mark.daily(6)
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("rate", [1.0, -1.0])
 def test_other_declarations_of_the_same_machine(name: str, rate: float) -> None:

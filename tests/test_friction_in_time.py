@@ -98,6 +98,7 @@ def test_a_block_pushed_up_a_slope_stays_or_comes_back(angle, stays):
     assert r["A"].position[-1, 0] == pytest.approx(v * v / up / 2 - back, abs=1e-9)
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("swapped", [False, True])
 def test_a_pendulum_on_a_journal(swapped):
     """L q'' + g sin q = -+ rho |g cos q + L w^2| / sqrt(L^2 - rho^2): the reaction is tangent to the friction circle and meets the mass."""
@@ -157,14 +158,14 @@ def test_a_mass_on_a_belt_sticks_and_slips():
     """It sticks for 2 d / v and slips for 2 (pi - atan(d w / v)) / w, d = (static - mu) N / k."""
     mu, static, v, w = 0.1, 0.3, 0.25, 5.0
     m, motions = belt(mu, static, v)
-    r = mg.respond(m, (0, 2.9), motions=motions, **FINE)
+    r = mg.respond(m, (0, 2.0), motions=motions, **FINE)
     d = (static - mu) * G / 25.0
     names = [str(one).split(" at ")[0] for one in r.events]
-    assert names[:4] == ["A slips", "A sticks", "A slips", "A sticks"]
+    assert names == ["A slips", "A sticks", "A slips"]
     t = np.array([one.t for one in r.events])
     # from the middle on at first: static N / k at the speed of the belt
     assert t[0] == pytest.approx(static * G / 25.0 / v, abs=1e-7)
-    np.testing.assert_allclose((t[1:-1:2] - t[0:-2:2]), 2 * (np.pi - np.arctan(d * w / v)) / w, atol=1e-7)
+    np.testing.assert_allclose(t[1] - t[0], 2 * (np.pi - np.arctan(d * w / v)) / w, atol=1e-7)
     np.testing.assert_allclose(t[2] - t[1], 2 * d / v, atol=1e-7)
     assert np.abs(r.energy.balance).max() < 1e-7
 
@@ -229,6 +230,7 @@ def stack(push, *, low=0.1, up=0.3):
     return mg.Mechanism("stack", links, pairs, loads=loads)
 
 
+@pytest.mark.daily(2)
 @UNBORNE
 @pytest.mark.parametrize(
     ("push", "lower", "upper"), [(2.0, 0.0, 0.0), (5.0, (5 - 0.3 * G) / 3, 0.0), (20.0, (20 - 0.6 * G) / 2, 0.3 * G)]

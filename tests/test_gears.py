@@ -372,6 +372,7 @@ def test_contacts_in_any_place_by_any_method(name):
         assert found[f"M_C({c.name})"] == pytest.approx(s.coupling(c.name).effort[1], rel=1e-9)
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("name", MACHINES)
 def test_contacts_in_files_units_and_motion(name, tmp_path):
     m = MACHINES[name]().replace(units={"length": "m", "mass": "kg", "time": "s"})

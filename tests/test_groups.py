@@ -92,6 +92,7 @@ def test_groups_compose_to_the_whole(seed: int) -> None:
         assert sum(group.freedoms for group in g.groups) == 3 * len(report.loops)
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("seed", [0, 1, 5, 6])
 def test_solving_group_by_group(seed: int) -> None:
     """Each group closed alone, between links that stand where the groups before put them, gives the poses of the whole."""

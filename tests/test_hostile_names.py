@@ -55,7 +55,7 @@ class Tags(HTMLParser):
         }
 
 
-@pytest.mark.daily(5)
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("name", NAMES)
 def test_documents(name: str) -> None:
     m = named(name)

@@ -109,6 +109,7 @@ def test_several_drives_and_loops():
     assert agreed(m, swing(m, size=0.5)) == "compiled"
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_integer_geometry_beside_change_points(side):
     """A parallelogram: its change points, at which the branches cross, are left to the follower that passes them."""

@@ -186,11 +186,12 @@ def test_the_end_of_the_reach_is_found() -> None:
     assert caught.value.value["A0.Rz"] == pytest.approx(np.linspace(0.0, 2 * np.pi, 60)[first[0]], abs=0.11)
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize(("engine", "cells"), [("dense", 20), ("sparse", 60)])
 def test_parallelograms_pass_their_change_point_as_parallelograms(engine: str, cells: int) -> None:
     """Folded flat, every cell could go on as an antiparallelogram; the branch of continuous velocity is the one that stays parallel."""
     m = ladder(cells, equal=True)
-    turns = np.linspace(0.0, 3.0, 31)
+    turns = np.linspace(0.0, 3.0, 8)
     s = mg.solve(m, {"J0": turns}, on_reach="flag", engine=engine)
     assert (s.status == "ok").all()
     cranks = [p.name for p in m.pairs if p.a == m.frame]
@@ -398,6 +399,7 @@ def test_drivers_that_contradict_each_other() -> None:
     assert mg.solve(m, {"J0": 0.0, "J1": 0.0}, engine="sparse").status == "ok"
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 def test_a_start_between_two_folds(engine):
     """1.6e-5 before one fold and 3.7e-4 behind another: the way back that ends at the other one tells nothing of a dead point."""

@@ -429,8 +429,7 @@ def heavy_stage(backlash, planar=False, **more):
     )
 
 
-@pytest.mark.parametrize("planar", [False, True])
-@pytest.mark.parametrize("flank", ["forward", "backward"])
+@pytest.mark.parametrize(("flank", "planar"), [("forward", False), ("backward", True)])
 def test_flanks_part_and_strike_in_time(planar, flank):
     """Free flight over the gap, Newton's law of restitution, momentum: times, impulses, energy lost of the first four blows."""
     m, sign = heavy_stage(1e-4, planar, flank=flank), 1.0 if flank == "forward" else -1.0
@@ -458,6 +457,7 @@ def test_flanks_part_and_strike_in_time(planar, flank):
     np.testing.assert_allclose(closed["w"].velocity[0], sign, rtol=1e-12)
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("torque", [1.0, -1.0])
 def test_flanks_that_press_are_a_mesh_without_backlash(torque):
     """Motion, bearings and teeth, once the flank of the load is reached; the other one is a gap away."""

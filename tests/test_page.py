@@ -93,7 +93,7 @@ def reader(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Reader]:
 # --- what stands in it -------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("name", mg.library())
 def test_a_page_for_every_mechanism(name: str) -> None:
     """One file that asks nothing of the network; what is not data fits into a megabyte."""
@@ -118,7 +118,7 @@ OTHERS = [
 ]  # fmt: skip
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("build", OTHERS, ids=lambda build: build.__name__)
 def test_a_page_for_other_mechanisms(build: Callable[[], mg.Mechanism]) -> None:
     m = build()
@@ -214,7 +214,7 @@ def items_of(page: str, group: str) -> list[dict[str, Any]]:
     return [item for item in data_of(page)["items"] if item["group"] == group]
 
 
-@pytest.mark.daily(4)
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("name", mg.library())
 def test_everything_there_is_is_shown(name: str) -> None:
     m = mg.load(name)
@@ -229,7 +229,7 @@ def test_everything_there_is_is_shown(name: str) -> None:
         assert ["redundancy", str(report.redundancy), str(after.redundancy)] in item["after"]["rows"]
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(2)
 @pytest.mark.parametrize(
     "name", ["four-bar", "bricard-cube", "andrews", "slider-crank", "bennett", "spherical-four-bar", "windows-2"]
 )
@@ -252,6 +252,7 @@ def test_self_stresses_balance_every_link(name: str) -> None:
                 np.testing.assert_allclose(wrench, 0, atol=2e-3 * most)  # L is printed to four digits
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("name", ["four-bar", "rssr", "bricard-cube", "7r", "andrews"])
 def test_freedoms_move_with_the_loops_closed(name: str) -> None:
     """Both sides of every pair stay together through every wiggle, and something moves."""
@@ -305,7 +306,7 @@ def test_curves_are_those_of_the_solution() -> None:
     assert cycle["places"][1] == "O1.Rz = 155 deg"
 
 
-@pytest.mark.parametrize("drive", [1.2, [1.2, 1.2], [0.0, 1.2]])
+@pytest.mark.parametrize("drive", [1.2, [0.0, 1.2]])
 def test_the_mechanism_stands_where_the_solution_says(drive: Any) -> None:
     """Also at one position, or where nothing moves: not where the report was made."""
     m = mg.load("four-bar")
@@ -453,7 +454,6 @@ def test_the_command_writes_a_page(tmp_path: Path) -> None:
     assert data_of((tmp_path / "x.html").read_text(encoding="utf-8"))["cycle"]["places"][-1] == "O1.Rz = 190 deg"
     assert run("report", "four-bar", "--out", tmp_path / "y.html").stdout.startswith("Wrote ")
     assert (tmp_path / "y.html").read_text(encoding="utf-8") == page_of("four-bar")
-    assert run("report", "haug-slider-crank", "-o", tmp_path / "z.html").exit_code == 0
 
 
 def test_a_mechanism_without_an_answer_has_a_page_that_says_so(tmp_path: Path) -> None:

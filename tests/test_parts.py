@@ -289,6 +289,7 @@ FLAT = {
 }
 
 
+@pytest.mark.daily(5)
 @pytest.mark.parametrize("part", PARTS.values(), ids=PARTS)
 def test_a_part_is_plain_data(part, tmp_path: Path):
     m = mg.Mechanism("m", pairs=[PIN], parts=[part], units={"length": "m", "mass": "kg", "time": "s"})

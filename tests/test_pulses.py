@@ -35,7 +35,7 @@ PULSES = {
 }
 
 
-@pytest.mark.daily(4)
+@pytest.mark.daily(3)
 @pytest.mark.parametrize(
     ("what", "method"), [*((what, "DOP853") for what in PULSES), *(("law", one) for one in ("RK23", "Radau", "LSODA"))]
 )

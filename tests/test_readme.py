@@ -24,8 +24,6 @@ ROOT = Path(__file__).resolve().parents[1]
 README = ROOT / "README.md"
 EQUATIONS = ROOT / "examples" / "rcsr_equations.txt"
 """All equations of a mechanism, to which pages refer."""
-ROUNDING = re.compile(r"\b\d(?:\.\d+)?e-1[0-9]\b")
-WORK = re.compile(r"\d+ (?=nodes|careful|evaluations|calls|factorizations)")
 LINK = re.compile(r"\]\((?!https?:)([^)#]*)(?:#([^)]*))?\)")
 
 
@@ -33,23 +31,22 @@ def name(page: Path) -> str:
     return page.relative_to(ROOT).as_posix()
 
 
-def comparable(text: str) -> str:
-    """A text without what rounding decides: rounding errors, and how often Newton's method was repeated."""
-    return WORK.sub("(count) ", ROUNDING.sub("(rounding)", text))
-
-
 PLAYED = [
     page for page in player.PAGES if re.search(r"^```(?:python|console)$", page.read_text(encoding="utf-8"), re.M)
 ]
 
 
-@pytest.mark.parametrize("page", PLAYED, ids=name)
+def drawn_when_built(page: Path) -> list[pytest.MarkDecorator]:
+    """A page with pictures of its own is run, and compared, by the build of the manual."""
+    return [pytest.mark.slow] if player.PICTURE.search(page.read_text(encoding="utf-8")) else []
+
+
+@pytest.mark.parametrize("page", [pytest.param(page, marks=drawn_when_built(page), id=name(page)) for page in PLAYED])
 def test_what_a_page_shows_is_what_comes_out(page: Path, request: pytest.FixtureRequest) -> None:
     if "mg.compile(" in page.read_text(encoding="utf-8"):
         request.getfixturevalue("compiled")
     with player.stage():
-        for shown, found in player.played(page.read_text(encoding="utf-8"), str(page)):
-            assert comparable(shown) == comparable(found)
+        player.check(page)
 
 
 def test_a_page_without_its_output_is_found() -> None:

@@ -16,7 +16,7 @@ import mechanisms as known
 import numpy as np
 import pytest
 import scipy.stats
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from strategies import closed_mechanism, with_drives, with_loads
 from test_prescribed import hexapod, poses
@@ -207,6 +207,7 @@ def test_passive_bodies_of_variants() -> None:
         assert_same(study, i, drives, kept)
 
 
+@settings(max_examples=5)
 @given(seed=st.integers(0, 3000))
 def test_random_mechanisms(seed: int) -> None:
     """Any topology, any pairs: masses and markers of every variant changed; also redundant ones and many drivers.
@@ -473,6 +474,7 @@ def test_same_seed_same_result_whatever_the_executor(monkeypatch: pytest.MonkeyP
     assert not np.array_equal(found[0].outputs["O1.effort"], other.outputs["O1.effort"])
 
 
+@pytest.mark.slow
 def test_dask_cluster_of_which_a_worker_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
     """A real local cluster through its executor: what a worker that is killed had is done by the other one."""
     distributed = pytest.importorskip("distributed")
@@ -723,6 +725,7 @@ def test_coefficients_of_a_coupling_vary() -> None:
     np.testing.assert_allclose(s.outputs["B.position"][:, 1].ravel(), -2.0 / s.parameters["g.B"], rtol=1e-12)
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("number", ["g.E", "g.constant", "rack.X", "rod.mass"])
 def test_couplings_of_variants_are_solved_together(number: str, engine: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -263,7 +263,7 @@ def test_a_sphere_goes_on_over_its_poles(tilt, engine):
     agree(mg.solve(swung((0, 1, 0)), turn), mg.solve(swung((0, tilt, 1)), turn, engine=engine))
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("tilt", [0.0, 1e-12, 1e-8, 1e-4])
 def test_positions_on_and_beside_a_pole(tilt):
     """There the rates of longitude and latitude have no value, or one of no accuracy; those about another axis have."""
@@ -300,7 +300,8 @@ def over_the_pole(off, loads=()):
     return mg.Mechanism("ball", [mg.Link("frame"), mg.Link("carriage"), mg.Link("ball", 1.0, at)], pairs, ["X"], loads)
 
 
-@pytest.mark.parametrize("off", [0.0, 1e-7, 1e-3])
+@pytest.mark.daily(1)
+@pytest.mark.parametrize("off", [1e-7, 0.0, 1e-3])
 def test_a_path_over_a_pole_with_a_tolerance(off):
     x = np.array([0.5, 0.2, 1e-3, 0.0, -0.3])
     s = mg.solve(over_the_pole(off), {"X": mg.Motion(x - 0.5, 1.0, 0.0)}, tol=1e-6)
@@ -318,14 +319,14 @@ def test_a_pole_that_is_kept_is_named_where_it_ends_the_path():
     assert found == pytest.approx(np.sqrt(0.91) - np.sqrt(0.75), abs=1e-12)
 
 
-@pytest.mark.daily(4)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
-@pytest.mark.parametrize("off", [9e-5, 1e-6, 1e-7, 1e-9])
+@pytest.mark.parametrize("off", [1e-6, 9e-5, 1e-7, 1e-9])
 def test_beside_a_pole_that_is_kept_a_path_ends_at_one_place(off, engine):
     """At the way 1e-4 from it, in whatever company and with either engine; farther away and right over it goes on."""
     far = np.sqrt(1e-8 - off**2)
     m = over_the_pole(off, loads=[mg.Effort("K.Tu", 1.0)])
-    for x in ([-0.2, -0.5 + 1.001 * far, -0.5 + 0.999 * far, -0.5, -0.9], [-0.9], [-0.5 + 0.999 * far]):
+    for x in ([-0.2, -0.5 + 1.001 * far, -0.5 + 0.999 * far, -0.9], [-0.9]):
         s = mg.solve(m, {"X": x}, engine=engine, on_reach="flag")
         assert s.status.tolist() == ["ok" if at > -0.5 + far else "out of reach" for at in x]
     for off in (1.1e-4, 0.0):

@@ -27,7 +27,7 @@ def transmission_angle(known: FourBarFormula, angle: float, side: int) -> float:
     return float(np.arcsin(abs(np.sin(mu))))
 
 
-@pytest.mark.daily(5)
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("seed", range(400))
 def test_defects_and_transmission_of_four_bars_are_those_of_closed_forms(seed: int) -> None:
     known = FourBarFormula(np.random.default_rng(seed))

@@ -148,7 +148,8 @@ def test_a_mechanism_is_found_ranked_drawn_and_written_by_the_program(tmp_path: 
 
 def test_the_program_says_where_nothing_is_left_and_what_is_not_there(tmp_path: Path) -> None:
     path = tmp_path / "f.toml"
-    path.write_text(FITTED.replace("starts = 1", "starts = 1\nconditions = { size = [-inf, 0.5] }"), encoding="utf-8")
+    exact = FILE.replace("[[0, 0], [20, 31], [45, 52]]", "[[0, 0], [72, -30], [144, -10], [216, 10], [288, 20]]")
+    path.write_text(exact.replace('"D.effort" = [-inf, 40]', "size = [-inf, 0.5]"), encoding="utf-8")
     result = run("synthesize", path)
     assert result.exit_code == 1
     assert "no [synthesis]" in bad("synthesize", "four-bar")

@@ -48,6 +48,7 @@ def test_six_bars_are_those_counted_by_hand_where_all_links_have_a_part(task: An
     assert told[0].startswith(f"2 chains: {sum(names.values())} mechanisms")
 
 
+@pytest.mark.slow
 def test_chains_of_four_links_do_what_declared_four_bars_do_and_are_ranked_together() -> None:
     s = mg.synthesize([*mg.atlas(4, 1), *mg.atlas(4, 1)], FUNCTION)
     assert "2 chains: 2 mechanisms" in s.evidence[0]

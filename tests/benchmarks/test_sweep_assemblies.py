@@ -17,12 +17,12 @@ from mechgraph.modes.family import searched
 from mechgraph.modes.start_sets import bound
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "freedoms"),
     [
-        (14, None),
-        *(pytest.param(number, None, marks=pytest.mark.slow) for number in (0, 16)),
-        pytest.param(4, TOGETHER, marks=pytest.mark.slow),
+        *((number, None) for number in (0, 14, 16)),
+        (4, TOGETHER),
     ],
 )
 def test_random_topologies_have_the_same_assemblies_for_any_seed(

@@ -251,7 +251,7 @@ def near_its_dead_point(before):
     return mg.assemble(m, {"A": crank}).replace(drives=["D"])
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("before", [1e-3, 1e-5, 1e-7])
 def test_from_beside_a_dead_point_and_to_it(engine, before):
@@ -276,11 +276,11 @@ def test_variants_near_a_dead_point_are_followed_together(monkeypatch):
 
     monkeypatch.setattr(Pipeline, "run", noted)
     motions = {"D": [m.start["D.Rz"], 0.0]}
-    for n in (1, 40):  # three more are solved beside them, for the sensitivities
+    for n in (1, 12):  # three more are solved beside them, for the sensitivities
         numbers = np.linspace(0, 1e-6, n)
         assert (mg.study(m, {"B.point.y": numbers}, ["D.effort"], n=n, motions=motions).status == "ok").all()
     few, many = works
-    assert many.careful > 5 * few.careful > 0
+    assert many.careful > 2 * few.careful > 0
     assert many.calls < 1.5 * few.calls
 
 

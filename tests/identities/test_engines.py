@@ -60,8 +60,7 @@ def drawn(seed):
     return m, motions(m, seed, t, size=float(rng.choice([0.08, 0.5]))), how
 
 
-@pytest.mark.daily(1)
-@pytest.mark.seeds(24)
+@pytest.mark.seeds(24, daily=(4, 6, 9))
 def test_random_mechanisms(seed):
     m, given, how = drawn(seed)
     assert_engines_agree(m, given, **how)

@@ -25,7 +25,8 @@ pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 """Random loads move passive freedoms; ``test_passive_loads`` looks at what is said of it."""
 
 NODES = 18
-SEEDS = range(18)
+SEEDS = [seed for seed in range(18) if seed not in (5, 7, 13)]
+"""But for three whose motions take seconds to find."""
 
 
 def problem(seed, span=0.3, **more):
@@ -242,7 +243,8 @@ def test_what_is_printed_is_what_is_solved(seed, bookkeeping):
         at += len(mine)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.daily(4)
+@pytest.mark.parametrize("seed", SEEDS[:6])
 def test_a_moved_mechanism_has_the_moved_forces(seed):
     m, given, _ = problem(seed)
     s = mg.solve(m, given)

@@ -122,7 +122,7 @@ def test_loops_nearly_folded_together_keep_their_branches(seed):
 @pytest.mark.parametrize("longer", [True, False])
 def test_slider_crank_with_rod_about_as_long_as_the_crank(exponent, longer):
     rod = 1.0 + (1 if longer else -1) * 10.0**-exponent
-    for start, n in ((0.3, 5), (-0.7, 36)):
+    for start, n in ((0.3, 5), (-0.7, 18)):
         along = np.cos(start) + np.sqrt((rod - np.sin(start)) * (rod + np.sin(start)))
         pairs = [
             mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=Z),
@@ -233,6 +233,7 @@ def rssr_on_a_slide():
     return mg.Mechanism("rssr on a slide", None, pairs, ["A", "P"])
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 def test_two_drivers_go_on_behind_a_gap_in_space(engine):
     """What can be reached behind a gap is solved, though the way straight along its edge does not lead there."""
@@ -297,8 +298,7 @@ def five_bar(rng):
     return mg.Mechanism("five-bar", None, pairs, ["A", "E"]), head
 
 
-@pytest.mark.daily(1)
-@pytest.mark.seeds(6)
+@pytest.mark.seeds(6, daily=(1, 2))
 def test_a_polygon_misses_nothing_that_is_reached_alone(seed):
     """Behind gaps of random polygons: on the branch of the closed form, nothing flagged that is reached by itself, the same for any
     further positions on the polygon."""
@@ -325,14 +325,14 @@ def test_a_polygon_misses_nothing_that_is_reached_alone(seed):
 
 
 @pytest.mark.daily(1)
-@pytest.mark.parametrize("seed", [3, 5])
+@pytest.mark.parametrize("seed", [5, 3])
 def test_both_engines_say_the_same_of_positions_out_of_reach(seed):
     """A five-bar with both cranks driven to random angles, most of them out of reach or behind a gap."""
     rng = np.random.default_rng((seed, 21))
     corners = np.array([[0, 0], [0.3, 1], [1.2, 1.6], [2.1, 0.9], [1.8, 0]]) + 0.3 * rng.normal(size=(5, 2))
     names = ["frame", "a", "b", "c", "d", "frame"]
     pairs = [mg.Pair("ABCDE"[i], "R", names[i], names[i + 1], point=(*corners[i], 0), axis=Z) for i in range(5)]
-    wanted = dict(zip("AE", rng.uniform(-2.5, 2.5, (2, 6)), strict=True))
+    wanted = dict(zip("AE", rng.uniform(-2.5, 2.5, (2, 4)), strict=True))
     m = mg.Mechanism("five-bar", None, pairs, ["A", "E"])
     dense, sparse = (mg.solve(m, wanted, on_reach="flag", engine=e) for e in ("dense", "sparse"))
     assert dense.status.tolist() == sparse.status.tolist()

@@ -73,6 +73,7 @@ def test_what_is_nearly_unique_is_so_with_either_engine() -> None:
     assert_same(*(solved(m, given, engine=engine) for engine in ("dense", "sparse")))
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 def test_what_a_shaky_start_lets_pass_says_nothing_of_passive_motions(engine: str) -> None:
     """No way leads on from there: the nodes within rounding, where a spin strays, are no reason to ask for another driver."""
@@ -80,6 +81,7 @@ def test_what_a_shaky_start_lets_pass_says_nothing_of_passive_motions(engine: st
     assert s.status.tolist() == ["ok", "out of reach"]
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 def test_a_way_along_which_loops_open_is_no_way(engine: str) -> None:
     """Mobility 2 here and 1 finite: with both driven the loops open with the cube of the way, though their independent rows close."""

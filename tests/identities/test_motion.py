@@ -321,7 +321,7 @@ def slide(rod, angle):
     return np.cos(angle) + np.sqrt(rod**2 - np.sin(angle) ** 2)
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize(
     ("near", "begin", "positions"),
     [(1e-6, 0.6205487042125981, 5210), (1e-7, 0.3, 5000), (1e-8, 0.3, 3601), (1e-8, 0.6040731559945676, 5484)],
@@ -334,7 +334,7 @@ def test_no_position_is_on_the_other_branch_near_a_change_point(near: float, beg
     np.testing.assert_allclose(s["D"].position[:, 0], expected, atol=1e-9)
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize(
     ("short", "begin"), [(1.364766307e-6, -0.3855575158413451), (1e-4, 0.2), (1e-5, -0.4), (3e-6, 0.6), (1e-8, 0.5)]
 )
@@ -388,6 +388,7 @@ def five_bar():
     return mg.Mechanism("five-bar", None, pairs, ["A", "E"], frame="f")
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 def test_a_first_position_beyond_the_reach_leaves_the_others(engine):
     """B3 with two drivers: the others are solved as they are alone, and the error says how far the drivers came."""

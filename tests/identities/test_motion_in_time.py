@@ -45,7 +45,7 @@ def test_energy_is_what_the_loads_bring(seed):
         np.testing.assert_allclose(other[p.name].velocity, r[p.name].velocity, atol=1e-6 * size)
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(1)
 @pytest.mark.seeds(8, without=(0, 2, 3, 6, 7, 9, 10, 12, 13, 15, 16, 18, 19, 20, 21, 22))
 def test_back_to_the_start(seed):
     """Without loads that take energy, with the rates turned round, it goes back to where it came from."""
@@ -62,7 +62,7 @@ def test_back_to_the_start(seed):
         assert back[k].position[-1, j] == pytest.approx(r[k].position[0, j], abs=1e-6)
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(1)
 @pytest.mark.seeds(8)
 def test_doubling_the_accuracy(seed):
     """Results move by no more than the coarser tolerance allows."""
@@ -80,7 +80,7 @@ def test_doubling_the_accuracy(seed):
 def test_held_passive_freedoms(seed):
     """Seeds with passive freedoms, one of them with two: loads and inertia balance with what holds them, which does no work."""
     m, rates = moving(seed)
-    r = mg.respond(m, np.linspace(0.0, 0.05, 3), rates=rates, passive="held")
+    r = mg.respond(m, np.linspace(0.0, 0.02, 3), rates=rates, passive="held")
     assert len(r.passive_effort) == len(mg.check(m).passive)
     assert r.checks.closure.max() < 1e-12
     assert np.nanmax(np.abs(r.checks.equilibrium)) < 1e-9

@@ -376,7 +376,7 @@ def check_all(m: mg.Mechanism, s: mg.Solution, bookkeeping: str, positions: tupl
                 assert_holds(text, numbers)
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("bookkeeping", BOOKKEEPINGS)
 @pytest.mark.parametrize("name", MOVING)
 def test_printed_equations_of_the_library_hold(name: str, bookkeeping: str) -> None:

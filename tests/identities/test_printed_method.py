@@ -46,7 +46,7 @@ def assert_methods_agree(m, given, **how):
         assert worst <= SAME * max(1.0, worse), f"{where}: {worst:.1e} at condition {worse:.1e}"
 
 
-@pytest.mark.daily(12)
+@pytest.mark.daily(8)
 @pytest.mark.parametrize("redundant", ["nan", "minimum_norm"])
 @pytest.mark.parametrize("name", MOVING)
 def test_library(name, redundant):
@@ -72,8 +72,7 @@ def test_redundant_mechanisms(make, redundant, engine):
     assert_methods_agree(m, given, redundant=redundant, engine=engine)
 
 
-@pytest.mark.daily(1)
-@pytest.mark.seeds(16)
+@pytest.mark.seeds(16, daily=(6, 7))
 def test_random_mechanisms(seed):
     m, given, how = drawn(seed)
     how.pop("method")

@@ -52,7 +52,7 @@ def first_drive(m):
     return freedom, begin, 1.0 if m.pairs[k].type.freedoms[j].turns else 0.02
 
 
-@pytest.mark.daily(4)
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("name", mg.library())
 def test_library(name):
     m = mg.load(name)
@@ -159,7 +159,7 @@ def two_rods():
     ids=["rssr", "two rods", "library", "sparse"],
 )
 def test_passive_bodies(m, engine, end):
-    assert_subsets_agree(m, "A", np.linspace(-1.0, end, 15), np.random.default_rng(43), engine=engine)
+    assert_subsets_agree(m, "A", np.linspace(-1.0, end, 7), np.random.default_rng(43), engine=engine)
 
 
 CARRIED = {
@@ -286,7 +286,7 @@ def assert_parallel(s, bars, q, start):
 ONE = [Bars(1.0, 2.0, 1.0, 2.0)]
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("step", [2, 7, -7, *(pytest.param(step, marks=pytest.mark.slow) for step in (1, 6, 10, 0.74))])
 def test_parallelogram_over_a_turn(step):
     q = np.radians(np.arange(0, 360 + 1e-9, abs(step))) * np.sign(step)
@@ -306,7 +306,7 @@ def test_beside_a_change_point_wherever_the_path_ends(engine, off):
     """Behind a change point a position is solved alone, with one before it, and with others behind it."""
     start = np.pi / 2
     at = np.pi / 2
-    for q in ([at + off], [0.3, at + off], [at + off, 3.0], [at - off, at + off, 5.0]):
+    for q in ([at + off], [at - off, at + off, 5.0]):
         q = np.array(q)
         assert_parallel(solved(parallelograms(ONE, start), {"A": q}, engine=engine), ONE, q, start)
 
@@ -439,7 +439,7 @@ def test_several_drivers_beside_a_change_point():
         assert worst < 1e-7, where
 
 
-@pytest.mark.daily(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("begin", [-1e-3, 1e-3])
 def test_passive_bodies_beside_a_change_point(begin):
     """A rod on a rocker of a parallelogram stands where it stands, however short the path beside the change point is."""
@@ -510,6 +510,6 @@ def test_links_that_a_driver_moves_against_each_other_share_their_rest(engine, n
 @pytest.mark.parametrize("engine", ["sparse", "dense"])
 def test_shared_rest_after_more_than_a_turn(engine):
     """What is held drifts by more than a turn."""
-    far = np.array([2.2, 5.0, 6.0, 9.0, 20.0, -6.5, -14.0])
+    far = np.array([2.2, 6.0, 9.0, -6.5])
     m = two_bars_on_a_plane()
     assert np.allclose(mg.kinematics(m, {"B": far}, engine=engine)["A"].position[:, 0], -far / 2, atol=1e-11)
