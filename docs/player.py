@@ -91,7 +91,7 @@ def stage(folder: Path | None = None) -> Iterator[None]:
     from mechgraph import by_kernel
 
     matplotlib.use("agg")
-    numpy = unittest.mock.patch.object(by_kernel, "at_hand", lambda: None)
+    numpy = unittest.mock.patch.object(by_kernel, "at_hand", return_value=None)
     with tempfile.TemporaryDirectory() as temporary, contextlib.chdir(folder or temporary), numpy:
         yield
 
