@@ -59,6 +59,12 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         metafunc.parametrize("seed", [*daily, *late, *range(FURTHER, FURTHER + more)])
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
+    """Tests of one file run in one worker, so that what they share is made once."""
+    return importlib.import_module("xdist.scheduler").LoadFileScheduling(config, log)
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Cases that stand for many others: of a test marked ``daily(n)`` all but n are slow; before they are chosen by markers."""

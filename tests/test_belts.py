@@ -198,7 +198,7 @@ def tensioner(loads=(), drives=("p",), radii=(0.1, 0.04, 0.05), **belt):
     )
 
 
-@pytest.mark.daily(4)
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("method", ["loop_wrench", "newton_euler", "printed"])
 @pytest.mark.parametrize("load", [6.0, -6.0])

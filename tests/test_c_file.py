@@ -149,6 +149,7 @@ def test_a_name_is_an_identifier(name, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("name", ["int", "mgk", "MGK"])
 def test_names_do_not_meet_those_of_the_kernel(name, compiled, tmp_path):
     write_c(tabled(mg.load("four-bar")), tmp_path / "press.c", name)

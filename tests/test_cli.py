@@ -160,6 +160,7 @@ def test_messages_name_the_options_of_the_command(tmp_path: Path) -> None:
     assert "--redundant minimum_norm" in run("loads", "four-bar", "coupler", "--out", tmp_path / "x.inp").stderr
 
 
+@pytest.mark.slow
 def test_a_page_lacks_nothing_silently(tmp_path: Path) -> None:
     """What could not be solved is said, and how a mechanism without a stored motion is set in motion."""
     page = tmp_path / "page.html"
@@ -574,15 +575,6 @@ def test_no_file_is_left_where_writing_fails(tmp_path: Path, monkeypatch: pytest
 # --- as a program ------------------------------------------------------------------------------------------------------
 
 
-def test_as_a_program() -> None:
-    same = ("solve", "7r", "--engine", "dense")  # a program of its own takes the kernel where one was installed
-    done = process(*same, COLUMNS="30")
-    assert done.returncode == 0
-    assert not done.stderr
-    assert "\x1b" not in done.stdout
-    assert done.stdout == run(*same).stdout
-
-
 def test_without_typer(tmp_path: Path) -> None:
     _written(tmp_path / "typer.py", "raise ModuleNotFoundError('No module named typer', name='typer')")
     done = process("list", PYTHONPATH=os.pathsep.join([str(tmp_path), str(ROOT)]))
@@ -657,13 +649,16 @@ def test_outputs_that_fail(command: str, status: int, message: str) -> None:
 def test_outputs_that_cannot_show_every_character(tmp_path: Path) -> None:
     text = (ROOT / "library" / "four-bar.toml").read_text(encoding="utf-8")
     _written(tmp_path / "m.toml", text.replace('"crank"', '"\N{GREEK SMALL LETTER ALPHA}"'))
-    done = process("check", "--full", str(tmp_path / "m.toml"), PYTHONIOENCODING="ascii", PYTHONUTF8="0")
+    told = ("check", "--full", tmp_path / "m.toml", "--engine", "dense")
+    done = process(*map(str, told), PYTHONIOENCODING="ascii", PYTHONUTF8="0", COLUMNS="30")
     assert done.returncode == 0
+    assert not done.stderr
+    assert "\x1b" not in done.stdout
+    assert done.stdout == run(*told).stdout.encode("ascii", "backslashreplace").decode()
     assert r"\u03b1" in done.stdout
-    assert "Traceback" not in done.stderr
 
 
-@pytest.mark.daily(10)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("command", ["check", "equations", "solve"])
 @pytest.mark.parametrize(
     "name", ["x" * 300, "x" * 100_000, "a\0b", "\udcff", "x/" * 5000, "", " ", "\x1b[2J", "~", "."]

@@ -82,7 +82,18 @@ def test_a_public_name_has_an_example(name: str) -> None:
     assert examples[0].source == "import mechgraph as mg\n"
 
 
-@pytest.mark.parametrize("name", [name for name in ALL if ">>>" in (inspect.getdoc(ALL[name]) or "")])
+FILMS = {"Response.film", "show.film_orbit"}
+"""Examples that take as long as that of ``Solution.film``: seconds."""
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] if name in FILMS else [])
+        for name in ALL
+        if ">>>" in (inspect.getdoc(ALL[name]) or "")
+    ],
+)
 def test_an_example_runs(name: str, request: pytest.FixtureRequest) -> None:
     test = example_of(name)
     if any("mg.compile(" in one.source for one in test.examples):

@@ -464,7 +464,7 @@ def too_wide(log: str) -> list[float]:
     return [float(points) for points in re.findall(r"Overfull \\hbox \(([\d.]+)pt too wide", log)]
 
 
-@pytest.mark.daily(6)
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("name", mg.library())
 def test_the_equations_of_the_library_fit_the_page(name: str, tmp_path: Path) -> None:
     f = mg.formulate(mg.load(name), unknowns="response" if name == "rcsr" else "kinetostatics")

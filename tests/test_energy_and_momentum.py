@@ -110,6 +110,7 @@ def test_momentum_is_kept_where_nothing_acts(symbol):
         np.testing.assert_allclose(kept, np.broadcast_to(kept[0], kept.shape), atol=1e-8 * np.abs(kept).max())
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize(
     ("name", "more", "end"),
     [("windows-2", {"rates": {"A0": -1.0}}, 10.0), ("bricard-cube", {}, 10.0), ("andrews", {}, 0.03)],

@@ -87,6 +87,7 @@ def test_parquet_comes_back(solution: mg.Solution, tmp_path: Path) -> None:
     assert read.attrs["mechanism"] == "crank"
 
 
+@pytest.mark.daily(3)
 def test_all_formats_hold_the_same_numbers(solution: mg.Solution, tmp_path: Path) -> None:
     pd, xr = pytest.importorskip("pandas"), pytest.importorskip("xarray")
     pytest.importorskip("pyarrow")

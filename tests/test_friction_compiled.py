@@ -61,6 +61,7 @@ def same(one: mg.Solution, other: mg.Solution, within: float = 1e-10) -> None:
         np.testing.assert_allclose(other.losses[name], lost, rtol=within, atol=within * np.nanmax(lost, initial=1e-300))
 
 
+@pytest.mark.daily(11)
 @pytest.mark.usefixtures("compiled")
 @pytest.mark.parametrize("many", [False, True])
 @pytest.mark.parametrize("name", NAMES)

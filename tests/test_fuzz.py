@@ -8,7 +8,7 @@ from public import every_door, functions, methods, results
 
 import mechgraph as mg
 
-PER_SEED = 10
+PER_SEED = 5
 """Inputs of a seed."""
 MECHANISMS = 1002
 """First mechanism of the suite: in these none of the assemblies is a long one (some of ``--attack`` take more than the ten seconds)."""

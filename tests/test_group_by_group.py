@@ -17,6 +17,7 @@ def with_random_driver(seed: int) -> tuple[mg.Mechanism, str]:
     return m.replace(drives=[]), str(np.random.default_rng(seed).choice(drivable))
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("seed", [1, 2, 6, 7, 8, 10, 12, 19, 22, 26])
 def test_group_by_group_is_all_at_once(seed: int) -> None:
     """Poses, rates, accelerations, reactions of random planar mechanisms with random drivers: by groups, as a whole, one by one."""

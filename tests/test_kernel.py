@@ -187,6 +187,7 @@ def washer():
     return mg.Mechanism("washer", links, pairs, ["A"], loads=[mg.Gravity((1.0, -9.81, 0.5))])
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize(
     ("make", "size"),
     [(uneven_rod, 4.0), (bars_on_a_plane, 1.5), (washer, 4.0), (lambda: hexapod("SPS"), 0.8), (five_rods, 0.8)],

@@ -162,7 +162,7 @@ def test_verdicts_are_those_of_the_dense_check(name: str) -> None:
 
 
 def test_independent_cases_and_flagged_positions() -> None:
-    m = ladder(120)
+    m = ladder(60)
     motion = mg.Motion(np.array([[0.0, 0.1, 0.2], [0.0, -0.1, -0.2]]), velocity=1.0)
     assert_same(solved(m, motion, "sparse"), solved(m, motion, "dense"))
 
@@ -296,7 +296,7 @@ def test_deep_trees_by_pointer_doubling(monkeypatch: pytest.MonkeyPatch) -> None
     assert_allclose(deep.carried(loads), shallow.carried(loads), atol=1e-11)
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("name", LONG)
 def test_five_thousand_links(name: str) -> None:
     m = LATTICES[name](5000)

@@ -53,7 +53,7 @@ def test_a_change_point_is_leapt_over(engine, bars):
     np.testing.assert_allclose(np.abs(cranks), np.broadcast_to(at, (bars + 1, 5)), atol=1e-12)
 
 
-@pytest.mark.daily(4)
+@pytest.mark.daily(2)
 @pytest.mark.usefixtures("compiled")
 @pytest.mark.parametrize("engine", ["dense", "compiled"])
 @pytest.mark.parametrize("lower", [1e-3, 1e-6, 1e-9, 1e-10])

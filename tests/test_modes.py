@@ -89,6 +89,7 @@ def test_at_its_fold_the_two_assemblies_of_a_four_bar_are_a_double_point() -> No
     assert np.isinf(modes.condition[0])
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("away", [0.0, 1e-6])
 def test_where_a_single_rod_can_just_reach_there_is_a_double_point(away: float) -> None:
     """One row has one singular value, which says nothing by comparison with the largest."""
@@ -180,6 +181,7 @@ def test_beside_the_continuum_of_a_singular_wrist_isolated_postures_are_counted_
     assert start["A3.Rz"] == pytest.approx(0.35)  # of A3 + A5 = 0.7 what is nearest to the start
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("away", [1e-10, 1e-11, -1e-11])
 def test_beyond_a_fold_there_is_no_assembly_and_before_it_are_two(away: float) -> None:
     a, b, c, d = 2.0, 1.5, 2.5, 3.0
@@ -189,6 +191,7 @@ def test_beyond_a_fold_there_is_no_assembly_and_before_it_are_two(away: float) -
     assert modes.completeness == "proved"
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("longer", [1e-6, 1e-8])
 def test_an_ill_conditioned_assembly_is_not_double(longer: float) -> None:
     """A rhombus of which one side is longer: with the crank on the frame two assemblies are left of a continuum, far apart."""

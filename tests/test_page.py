@@ -56,6 +56,12 @@ def numbers(packed: dict[str, Any]) -> np.ndarray:
     return np.frombuffer(base64.b64decode(packed["f32"]), "<f4").reshape(packed["shape"])
 
 
+@pytest.fixture
+def bare(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages without their still pictures, which take half of the time, where only data are read."""
+    monkeypatch.setattr(write, "stills", lambda m, s: [])
+
+
 def data_of(page: str) -> dict[str, Any]:
     return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page)[1])  # type: ignore[index]
 
@@ -118,6 +124,7 @@ OTHERS = [
 ]  # fmt: skip
 
 
+@pytest.mark.usefixtures("bare")
 @pytest.mark.daily(1)
 @pytest.mark.parametrize("build", OTHERS, ids=lambda build: build.__name__)
 def test_a_page_for_other_mechanisms(build: Callable[[], mg.Mechanism]) -> None:
@@ -306,6 +313,7 @@ def test_curves_are_those_of_the_solution() -> None:
     assert cycle["places"][1] == "O1.Rz = 155 deg"
 
 
+@pytest.mark.usefixtures("bare")
 @pytest.mark.parametrize("drive", [1.2, [0.0, 1.2]])
 def test_the_mechanism_stands_where_the_solution_says(drive: Any) -> None:
     """Also at one position, or where nothing moves: not where the report was made."""
@@ -320,6 +328,7 @@ def test_the_mechanism_stands_where_the_solution_says(drive: Any) -> None:
         np.testing.assert_allclose(pose.reshape(3, 4), found, atol=1e-6)
 
 
+@pytest.mark.usefixtures("bare")
 @pytest.mark.parametrize("redundant", ["nan", "minimum_norm"])
 def test_what_is_not_unique_is_never_drawn_as_known(redundant: Any) -> None:
     m = mg.load("four-bar")
@@ -346,6 +355,7 @@ def test_friction_has_its_table_and_its_pictures() -> None:
     assert "Power lost by friction" not in report_page(m, mg.solve(m, {"A": [0.3]}))
 
 
+@pytest.mark.usefixtures("bare")
 def test_declaration_and_its_hash_stand_in_the_page(tmp_path: Path) -> None:
     m = mg.load("four-bar")
     mg.save(m, tmp_path / "m.toml")
@@ -356,6 +366,7 @@ def test_declaration_and_its_hash_stand_in_the_page(tmp_path: Path) -> None:
     assert "none: it holds functions" in report_page(held, mg.solve(held, {"A": np.array([0.0, 0.1])}))
 
 
+@pytest.mark.usefixtures("bare")
 def test_without_geometry_and_without_closed_loops() -> None:
     page = report_page(mg.chain("RPRHRRR"))
     assert 'id="data"' not in page
@@ -369,6 +380,7 @@ def test_without_geometry_and_without_closed_loops() -> None:
     assert "No solution" in page
 
 
+@pytest.mark.usefixtures("bare")
 def test_what_is_too_large_is_left_out_and_said(monkeypatch: pytest.MonkeyPatch) -> None:
     m = mg.load("four-bar")
     monkeypatch.setattr(content, "MOST_ITEMS", 2)
@@ -421,6 +433,7 @@ def test_colours_are_told_apart(sight: str) -> None:
     assert min(np.linalg.norm(a - b) for i, a in enumerate(found) for b in found[:i]) > 12
 
 
+@pytest.mark.usefixtures("bare")
 def test_a_response_and_a_study_have_pages() -> None:
     scipy_stats = pytest.importorskip("scipy.stats")
     m = mg.load("windows-2")
@@ -456,6 +469,7 @@ def test_the_command_writes_a_page(tmp_path: Path) -> None:
     assert (tmp_path / "y.html").read_text(encoding="utf-8") == page_of("four-bar")
 
 
+@pytest.mark.usefixtures("bare")
 def test_a_mechanism_without_an_answer_has_a_page_that_says_so(tmp_path: Path) -> None:
     m = mg.load("rssr")
     free = m.replace(loads=[], pairs=[p.replace(type="C") if p.name == "D" else p for p in m.pairs])

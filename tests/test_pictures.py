@@ -186,7 +186,7 @@ def test_margins_are_those_of_the_report() -> None:
     assert "nearly singular below" in labels(ax)
 
 
-@pytest.mark.daily(4)
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("name", mg.library())
 def test_graphs_and_structures_of_the_library(name: str) -> None:
     m = mg.load(name)

@@ -143,7 +143,7 @@ def test_forces_of_a_slider_crank(engine: str) -> None:
     assert np.abs(s["D"].moment).max() < 1e-9
 
 
-@pytest.mark.daily(12)
+@pytest.mark.daily(6)
 @pytest.mark.parametrize("name", PLANAR)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_the_planar_twin_has_the_forces_of_the_spatial_one(name: str, engine: str) -> None:

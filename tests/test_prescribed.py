@@ -172,7 +172,7 @@ def poses(t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return out, np.concatenate([w, v], axis=1), np.concatenate([dw, dv], axis=1)
 
 
-@pytest.mark.daily(5)
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("second", ["U", "S"])
 @pytest.mark.parametrize(("engine", "method"), WAYS)
 def test_a_platform_goes_through_poses(second: str, engine: str, method: str) -> None:

@@ -265,9 +265,9 @@ def refused(value):
 
 def test_values_in_messages_are_short():
     assert len(refused(10**5000)) < 100
-    assert len(refused([list(range(10**5))] * 100)) < 2000
+    assert len(refused([list(range(10**4))] * 100)) < 2000
     deep = []
-    for _ in range(10**5):
+    for _ in range(10**4):
         deep = [deep]
     assert len(refused(deep)) < 100
     assert "2 pound" in refused(2 * U.lb)

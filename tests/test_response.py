@@ -101,6 +101,7 @@ def exact_windows(n, t):
     return exact.y[0] - np.pi / 2
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("n", [1, 3])
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 def test_windows_pass_their_change_points(n, engine):

@@ -21,7 +21,7 @@ def parts(found: Scene, role: str, owner: str = "") -> list[DrawnPart]:
     return [p for p in found.parts if p.role == role and p.owner.startswith(owner)]
 
 
-@pytest.mark.daily(12)
+@pytest.mark.daily(5)
 @pytest.mark.parametrize("name", mg.library())
 def test_scenes_of_the_library(name: str) -> None:
     """Every pair has a symbol, every moving link a body; polygons and lines name vertices that are there, and rigid frames are rigid."""

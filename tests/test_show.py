@@ -115,7 +115,7 @@ def test_links_and_traces_are_where_the_motion_takes_them() -> None:
     assert space.elev == pytest.approx(90.0)
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("name", mg.library())
 def test_skeleton_of_the_library(name: str) -> None:
     """Every pair and link is named, with no text on another or cut, whatever the size, with forces, and after a turn."""

@@ -43,6 +43,7 @@ def square(loads=()):
     )
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("loads", [(), (mg.Effort("A", pushed),)])
 def test_a_ball_bounces_less_and_less_and_comes_to_rest(loads):
     """Dropped from h it strikes at sqrt(2 h / g) (1 + 2 e + 2 e^2 + ...) and rests from (1 + e) / (1 - e) times the first time on."""

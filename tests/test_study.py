@@ -393,6 +393,7 @@ def deadly(ground: float, once: str = "") -> mg.Mechanism:
     return four_bar(ground)
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("again", [True, False])
 def test_a_process_that_is_killed_takes_only_what_kills_it_again(
     again: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -772,6 +773,7 @@ def test_shares_of_couplings_that_say_the_same_are_those_of_every_variant() -> N
         )
 
 
+@pytest.mark.daily(2)
 @pytest.mark.filterwarnings(
     "ignore::mechgraph.MechgraphWarning"
 )  # the center of mass does not move with the varied point

@@ -28,6 +28,7 @@ def two_motors() -> mg.Mechanism:
     ], drives=["A", "B"], loads=[mg.Effort("A", -3.0)])  # fmt: skip
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("redundant", ["nan", "minimum_norm"])
 @pytest.mark.parametrize("name", ["four-bar", "7r", "rssr"])
 def test_python_says_what_the_command_line_says(name: str, redundant: str) -> None:

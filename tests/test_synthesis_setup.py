@@ -50,7 +50,7 @@ def four_bar() -> mg.Mechanism:
 
 
 def test_a_file_is_read_with_its_degrees_and_keeps_the_schema(tmp_path: Path) -> None:
-    jsonschema.validate(tomllib.loads(FILE), schema("mechanism"))
+    jsonschema.Draft202012Validator(schema("mechanism")).validate(tomllib.loads(FILE))
     path = tmp_path / "function.toml"
     path.write_text(FILE, encoding="utf-8")
     asked = mg.load(path).synthesis
@@ -85,7 +85,7 @@ def test_what_is_written_is_read_again(name: str, tmp_path: Path) -> None:
     m = four_bar().replace(synthesis=ASKED[name])
     mg.save(m, tmp_path / "m.toml")
     text = (tmp_path / "m.toml").read_text(encoding="utf-8")
-    jsonschema.validate(tomllib.loads(text), schema("mechanism"))
+    jsonschema.Draft202012Validator(schema("mechanism")).validate(tomllib.loads(text))
     assert mg.load(tmp_path / "m.toml") == m == pickle.loads(pickle.dumps(m))
     assert mg.load(tmp_path / "m.toml").replace(synthesis=None) != m
     assert type(m.synthesis).__name__ in str(m)
@@ -133,7 +133,7 @@ def test_a_mechanism_is_found_ranked_drawn_and_written_by_the_program(tmp_path: 
     assert "Completeness: searched" in result.output
     assert picture.read_text(encoding="utf-8").startswith("<?xml")
     told = json.loads(run("synthesize", path, "--json").output)
-    jsonschema.validate(told, schema("output"))
+    jsonschema.Draft202012Validator(schema("output")).validate(told)
     assert told["fitness"][0]["error"] < 0.02
     # what was written does what was asked of it, to the error that is told
     m = mg.load(best)

@@ -243,12 +243,14 @@ def _closed_start(m: Mechanism, preferred: Mapping[str, float], tol: float) -> C
         known[asked] = _search(m, system, x, preferred, tol)
     x, error = known[asked]
     if error > max(CLOSED, tol):
-        turned = _opposite_axis(m, preferred, error)
+        words = m.once(_opposite)
+        if asked not in words:
+            words[asked] = _opposite_axis(m, preferred, error)
         best = dict(zip(m.freedom_names(), system.coordinates_of(x[:, None])[:, 0].tolist(), strict=True))
         raise AssemblyError(
             f"mechanism {m.name!r}: no closed configuration near start; best closure residual {error:.3g} "
             f"(largest angle [rad] or length / L over all loops, L = {system.par.L:.4g}). "
-            f"{turned or _belts_off(m) or 'Check the dimensions, or give another start'}",
+            f"{words[asked] or _belts_off(m) or 'Check the dimensions, or give another start'}",
             error,
             best,
         )
@@ -257,6 +259,11 @@ def _closed_start(m: Mechanism, preferred: Mapping[str, float], tol: float) -> C
 
 def _searched(m: Mechanism) -> dict[bytes, tuple[Array, float]]:
     """By the start from which the last search began: the best state that it found, and its closure error."""
+    return {}
+
+
+def _opposite(m: Mechanism) -> dict[bytes, str]:
+    """What ``_opposite_axis`` says, by the start from which a search failed."""
     return {}
 
 

@@ -113,6 +113,7 @@ def redundant_cases():
     ]
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("i", range(4))
 def test_blocks_of_redundant_loops(monkeypatch, i):
     m, name, span = redundant_cases()[i]

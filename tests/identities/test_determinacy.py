@@ -116,6 +116,7 @@ def test_overconstrained_four_bars_have_mobility_one_and_redundancy_three(build)
             assert row["effort"]
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("build", OVERCONSTRAINED.values(), ids=OVERCONSTRAINED)
 @pytest.mark.parametrize("method", ["loop_wrench", "newton_euler", "printed"])
 def test_components_that_are_not_unique_are_nan_and_those_that_are_do_not_change(build, method):

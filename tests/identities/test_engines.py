@@ -66,14 +66,14 @@ def test_random_mechanisms(seed):
     assert_engines_agree(m, given, **how)
 
 
-@pytest.mark.daily(11)
+@pytest.mark.daily(6)
 @pytest.mark.parametrize("name", mg.library())
 def test_library(name):
     m = mg.load(name)
     assert_engines_agree(m, {d.freedom: d.motion.position[:5] for d in m.drives if d.motion is not None})
 
 
-@pytest.mark.daily(4)
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("method", ["loop_wrench", "newton_euler", "printed"])
 @pytest.mark.parametrize("kind", LATTICES)
 def test_lattices_around_the_crossover(kind, method):

@@ -54,7 +54,7 @@ def test_library(name, redundant):
     assert_methods_agree(m, library_motion(m), redundant=redundant)
 
 
-@pytest.mark.daily(10)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("redundant", ["nan", "minimum_norm"])
 @pytest.mark.parametrize("make", REDUNDANT.values(), ids=REDUNDANT)
@@ -114,7 +114,7 @@ def moves_as_held(s: mg.Solution, m: mg.Mechanism, unknown: mg.equations.terms.U
     return not s.passive_effort or unknown.freedom == m.full_name(m.drives[0].freedom)
 
 
-@pytest.mark.daily(15)
+@pytest.mark.daily(6)
 @pytest.mark.parametrize("bookkeeping", ["lee", "minimal"])
 @pytest.mark.parametrize("name", MOVING)
 def test_given_the_efforts_of_a_solution_the_response_is_its_motion(name, bookkeeping):

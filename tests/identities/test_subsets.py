@@ -52,7 +52,7 @@ def first_drive(m):
     return freedom, begin, 1.0 if m.pairs[k].type.freedoms[j].turns else 0.02
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("name", mg.library())
 def test_library(name):
     m = mg.load(name)
@@ -152,7 +152,7 @@ def two_rods():
     return mg.Mechanism("two rods", links, pairs, ["A"], [mg.Gravity((0, 0, -9.81))])
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize(
     ("m", "engine", "end"),
     [(rssr(), "dense", 6.0), (two_rods(), "dense", 6.0), (mg.load("rssr"), "dense", 6.0), (two_rods(), "sparse", 1.0)],
@@ -210,7 +210,7 @@ def carried_ring(kind):
     return mg.Mechanism("ring", None, pairs, ["A"], couplings=gears)
 
 
-@pytest.mark.daily(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "engine"), [("C", "dense"), ("E", "sparse")])
 def test_links_with_several_passive_motions(kind, engine):
     """At rest in all of them, at the same place for any positions, far ones too; no spin, and no slide of the point on the axis."""
@@ -294,6 +294,7 @@ def test_parallelogram_over_a_turn(step):
         assert_parallel(solved(parallelograms(ONE, start), {"A": q}), ONE, q, start)
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize(
     ("off", "engine"),
     [
@@ -324,7 +325,7 @@ def drawn_parallelograms(rng):
             return bars, start
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(1)
 @pytest.mark.seeds(6)
 def test_several_parallelograms_on_one_crank(seed):
     """Change points of their own, or all at one crank angle; and any subset of the positions."""
@@ -385,7 +386,7 @@ def test_change_points_near_each_other():
         assert_parallel(solved(m, {"A": [off - begin, 0.9]}), bars, np.array([off - begin, 0.9]), begin)
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
 @pytest.mark.parametrize("lean", [1e-4, 3e-3])
 def test_change_points_that_are_passed_together(lean, engine):
@@ -397,7 +398,7 @@ def test_change_points_that_are_passed_together(lean, engine):
         assert_parallel(solved(m, {"A": q}, engine=engine), bars, q, begin)
 
 
-@pytest.mark.daily(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("begin", [4.935e-6, 6.329e-6, 2e-5])
 def test_a_start_right_behind_a_change_point_and_before_another(begin):
     """The way back over the first change point, which rounding would lead to its other branch, tells nothing of the second one."""
