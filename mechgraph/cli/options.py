@@ -398,9 +398,9 @@ def option(flag: str, help: str, metavar: str | None = None, complete: Callable[
 SELECTS = "the extension selects the format:"
 
 
-def file_option(what: str, formats: Sequence[Format], flag: str = "--out") -> Any:
+def file_option(what: str, formats: Sequence[Format]) -> Any:
     """The option that names the file to write, whose extension selects one of ``formats``."""
-    return option(flag, f"{what}{SELECTS} {formats_text(formats)}.", "FILE")
+    return option("--out", f"{what}{SELECTS} {formats_text(formats)}.", "FILE")
 
 
 Named = Annotated[

@@ -207,7 +207,7 @@ class Tabled:
         )
 
 
-def tabled(m: Mechanism, asked: str = "compile") -> Tabled:
+def tabled(m: Mechanism) -> Tabled:
     """The tables of a mechanism at its declared position.
 
     Raises
@@ -215,8 +215,8 @@ def tabled(m: Mechanism, asked: str = "compile") -> Tabled:
     DeclarationError
         which names what the kernel cannot carry; errors of the start as in ``solve``.
     """
-    subject = f"{asked} {m.name!r}"
-    own = meant(m, None, asked)
+    subject = f"compile {m.name!r}"
+    own = meant(m, None, "compile")
     drives = tuple(own.full_name(drive.freedom) for drive in own.drives)
     if not drives or not own.has_geometry:
         missing = "geometry" if drives else "drives: expected the freedoms that are driven, e.g. drives=['A']"

@@ -650,9 +650,9 @@ class LinearSystem:
         A, b = self.assemble(state, position)
         return unique_solution(A.tocsc(), b)
 
-    def number_rows(self, state: State, position: int = 0) -> Iterator[tuple[str, int, int, str]]:
+    def number_rows(self, state: State) -> Iterator[tuple[str, int, int, str]]:
         """The entries of ``coefficient_rows`` with numbers, right sides first."""
-        A, b = self.assemble(state, position)
+        A, b = self.assemble(state, 0)
         for i, equation in enumerate(self.equations, 1):
             if equation.known:
                 yield f"C({i})", i, 0, f"{b[i - 1]:.10g}"

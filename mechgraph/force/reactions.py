@@ -371,13 +371,10 @@ def _by_sparse(f: Formulation, state: State, T: int) -> tuple[Array, None]:
     return out, None
 
 
-def chosen_for_all(A: Array, known: list[Choice], fixed: Index | None = None) -> ChosenSystem:
-    """Independent rows and columns for every position of a batch: one choice, and new ones where it fails.
-
-    Columns in ``fixed`` are left out.
-    """
+def chosen_for_all(A: Array, known: list[Choice]) -> ChosenSystem:
+    """Independent rows and columns for every position of a batch: one choice, and new ones where it fails."""
     T = A.shape[2]
-    nothing = np.zeros(0, dtype=np.intp) if fixed is None else fixed
+    nothing = np.zeros(0, dtype=np.intp)
     if not T:
         return ChosenSystem(A, known, np.zeros(0, dtype=np.intp))
     if not known:

@@ -49,26 +49,6 @@ class Factored(Protocol):
         """Whether no matrix on the parabola through those at ``ends`` ``a (n,)``, here and at ``b`` is singular or nearly so, ``(n,)``."""
 
 
-class Point(Protocol):
-    """The equations evaluated at a batch of points."""
-
-    x: Array
-
-    @property
-    def residual(self) -> Array:
-        """Residual of the equations, ``(m, n)``."""
-
-    @property
-    def rounding(self) -> Array:
-        """Rounding of the residual, ``(n,)``."""
-
-    def closure_rates(self, dq: Array) -> Array:
-        """Rates of the residual ``(m, n)`` for rates of the increments ``(F, n)``."""
-
-    def part(self, at: Index) -> Any:
-        """Some of the points."""
-
-
 class Problem(Protocol):
     """Equations along tracks: states ``x (nx, n)``, increments ``dq (F, n)``, path values ``drive (d, n)``, numbers of ``tracks (n,)``."""
 

@@ -27,6 +27,7 @@ from mechgraph.model.gears import Gear, planet_places
 from mechgraph.model.loads import Effort, Load, Spring
 from mechgraph.model.meshes import Mesh
 from mechgraph.model.pair import Link, Pair
+from mechgraph.model.plane import NORMAL
 from mechgraph.quantities import (
     Count,
     Index,
@@ -40,9 +41,6 @@ from mechgraph.quantities import (
 )
 
 P = ParamSpec("P")
-
-PLANE_NORMAL = (0.0, 0.0, 1.0)
-"""Axis of all pairs of planar parts."""
 
 
 class _Given:
@@ -106,11 +104,7 @@ class _Given:
 
     def pin(self, axis: Any, along: Array) -> Array | None:
         """The axis of the pins at both ends, None for balls; z where points have two numbers."""
-        return (
-            None
-            if axis is None and not self.flat
-            else self.across(PLANE_NORMAL if axis is None else axis, along, "p-q")
-        )
+        return None if axis is None and not self.flat else self.across(NORMAL if axis is None else axis, along, "p-q")
 
     def end(self) -> None:
         """Raise the faults, if there are any."""
@@ -681,7 +675,7 @@ def planetary(
     module: float,
     base: str = "frame",
     point: ArrayLike = (0.0, 0.0, 0.0),
-    axis: ArrayLike = PLANE_NORMAL,
+    axis: ArrayLike = NORMAL,
     pressure_angle: float = float(np.deg2rad(20.0)),
     helix_angle: float = 0.0,
 ) -> Parts:
@@ -762,7 +756,7 @@ def four_bar(
     name: str,
     base: str,
     points: Sequence[ArrayLike],
-    axis: ArrayLike = PLANE_NORMAL,
+    axis: ArrayLike = NORMAL,
     *,
     mass: ArrayLike = 0.0,
 ) -> Parts:
@@ -809,7 +803,7 @@ def slider_crank(
     base: str,
     points: Sequence[ArrayLike],
     direction: ArrayLike,
-    axis: ArrayLike = PLANE_NORMAL,
+    axis: ArrayLike = NORMAL,
     *,
     mass: ArrayLike = 0.0,
 ) -> Parts:

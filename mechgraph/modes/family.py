@@ -244,12 +244,12 @@ class Family:
         """For every marker the first one that moves with it."""
         return np.arange(2 * len(self.system.m.pairs))
 
-    def random_member(self, rng: np.random.Generator, size: float = 0.35) -> Member:
+    def random_member(self, rng: np.random.Generator) -> Member:
         """A random complex member."""
         moves = np.zeros((6, len(self.bearers), 1), dtype=complex)
         for k, basis in enumerate(self.bases):
             parts = rng.normal(size=(basis.shape[1], 2)) @ [1.0, 0.7j]
-            moves[:, k, 0] = size * (basis @ parts)
+            moves[:, k, 0] = 0.35 * (basis @ parts)
         moves = self.in_links(moves[:, self.moved_as])
         return Member(compose(pose_exp(moves), self.target), self.random_drive(rng)[:, None])
 

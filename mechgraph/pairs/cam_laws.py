@@ -490,9 +490,6 @@ class CamLaw(Described, Once, Shown):
             has_quantity(getattr(one, name)) for one in each if isinstance(one, Segment) for name in ("rise", "smooth")
         )
 
-    def _each(self, change: Callable[[Segment], Segment], made: CamLaw) -> Self:
-        return made.replace(segments=tuple(map(change, made.segments)))  # type: ignore[return-value]
-
     def in_units(self, base: tuple[float, float, float], turns: bool = False) -> Self:
         """See ``Described``; of the segments too."""
         with warnings.catch_warnings():

@@ -414,12 +414,12 @@ def _strokes(stage: DrawnPose, pair: Pair, lines: list[FreedomLine], size: float
     return out
 
 
-def freedom_arrow(line: FreedomLine, size: float, sign: float = 1.0) -> Shape:
+def freedom_arrow(line: FreedomLine, size: float) -> Shape:
     """An arrow about the line of a turn, or beside that of a slide."""
     turn = frame_along(line.direction)
     if line.turns:
-        return shapes.turn_arrow(sign).moved(size * turn, line.point)
-    lengthwise = turn @ np.diag([0.3 * size, 0.3 * size, sign * 2.2 * size])
+        return shapes.turn_arrow().moved(size * turn, line.point)
+    lengthwise = turn @ np.diag([0.3 * size, 0.3 * size, 2.2 * size])
     return shapes.arrow().moved(lengthwise, size * (turn[:, 0] - line.direction))
 
 

@@ -291,11 +291,10 @@ def thread(radius: float, low: float, high: float, hand: float, turns: int = 3) 
     return Shape(vertices, tuple((i, i + 1, n + 2 + i, n + 1 + i) for i in range(n)), (tuple(range(n + 1)),))
 
 
-def coil(turns: int = 7) -> Shape:
+def coil() -> Shape:
     """A helical spring of radius one from z = 0 to z = 1."""
-    n = 14 * turns
-    u = np.linspace(0.0, 1.0, n + 1)
-    angle = 2 * np.pi * turns * u
+    u = np.linspace(0.0, 1.0, 99)
+    angle = 14 * np.pi * u
     wound = np.stack([np.cos(angle), np.sin(angle), 0.12 + 0.76 * u], axis=1)
     ends = np.array([[0, 0, 0], [0, 0, 0.12]]), np.array([[0, 0, 0.88], [0, 0, 1.0]])
     return polyline(np.concatenate([ends[0], wound, ends[1]]))
@@ -334,12 +333,11 @@ def arrow() -> Shape:
     return together([polyline([[0, 0, 0], [0, 0, 0.8]]), head])
 
 
-def turn_arrow(hand: float = 1.0) -> Shape:
-    """An arrow of radius one about z, by the right hand for ``hand > 0``."""
-    sign = np.copysign(1.0, hand)
-    angle = sign * np.linspace(-0.75 * np.pi, 0.6 * np.pi, 28)
+def turn_arrow() -> Shape:
+    """An arrow of radius one about z, by the right hand."""
+    angle = np.linspace(-0.75 * np.pi, 0.6 * np.pi, 28)
     arc = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    tip, ahead = angle[-1], sign * np.array([-np.sin(angle[-1]), np.cos(angle[-1]), 0.0])
+    tip, ahead = angle[-1], np.array([-np.sin(angle[-1]), np.cos(angle[-1]), 0.0])
     out = np.array([np.cos(tip), np.sin(tip), 0.0])
     sides = 0.19 * np.array([out, [0, 0, 1.0], -out, [0, 0, -1.0]])
     head = Shape(arc[-1] + np.array([*sides, 0.46 * ahead]), ((0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4), (0, 1, 2, 3)))

@@ -123,8 +123,6 @@ def _rows(
         yield "study", repr(study)
 
 
-PICTURE_DPI = 160
-"""Pixels per inch of what is no drawing in a picture of the page."""
 RC: dict[Any, Any] = {"svg.hashsalt": "mechgraph", "svg.fonttype": "none", "text.parse_math": False}
 """The same file at every call; names as text in the reader's fonts, none of them a formula."""
 
@@ -185,7 +183,7 @@ def _picture(draw: Callable[[], Any]) -> str:
     with rc_context(RC), warnings.catch_warnings():
         # the reader's fonts may have the letters of a name; a name as long as the picture leaves the curves no room
         warnings.filterwarnings("ignore", "Glyph|constrained_layout not applied", UserWarning)
-        draw().figure.savefig(buffer, format="svg", dpi=PICTURE_DPI, metadata={"Date": None, "Creator": None})
+        draw().figure.savefig(buffer, format="svg", dpi=160, metadata={"Date": None, "Creator": None})
     return f"data:image/svg+xml,{quote(visible(buffer.getvalue().decode()), safe=' =:/,.;()-')}"
 
 
