@@ -74,8 +74,8 @@ from mechgraph.outcome import FollowedPositions, Options, Outcome, Starts
 from mechgraph.quantities import door, wrong
 from mechgraph.result.contacts import with_other_flanks
 from mechgraph.result.solution import Solution
-from mechgraph.result.values import OK, ranges
-from mechgraph.result.views import CouplingResult, PositionLabels
+from mechgraph.result.values import OK, PositionLabels, ranges
+from mechgraph.result.views import CouplingResult
 
 Made = TypeVar("Made")
 

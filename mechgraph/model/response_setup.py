@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import field, replace
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, Self, get_args
 
@@ -98,6 +98,25 @@ class Event(Described):
             raise DeclarationError("to_units", [f"event {self.text}: watches a function; convert it yourself"])
         dimension = (0 if turns else 1, 0, -WHATS.index(self.what))
         return self.replace(value=self.value * factor_of(dimension, base))
+
+
+@dataclass(frozen=True)
+class Occurrence:
+    """An event that happened at time ``t``; ``rising`` or falling.
+
+    Where a stop or a contact is struck: the ``impulse`` that it exerts, the ``energy_lost`` in all at that time, and the ``impulses`` in
+    the pairs, by name: wrenches ``(6,)``, (M, F) about the global origin, of link a on link b, NaN where not unique.
+    """
+
+    event: Event
+    t: float
+    rising: bool
+    impulse: float = 0.0
+    energy_lost: float = 0.0
+    impulses: Mapping[str, Array] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        return f"{self.event.text} at t = {self.t:.6g}"
 
 
 @dataclass(frozen=True)

@@ -30,9 +30,8 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Array, Index, cross
 from mechgraph.maths.tolerances import RESPONSE
 from mechgraph.memo import dataclass
-from mechgraph.model.response_setup import Event, Stop
+from mechgraph.model.response_setup import Event, Occurrence, Stop
 from mechgraph.response.charts import Task
-from mechgraph.response.integration import Occurrence
 from mechgraph.response.motion_equations import NO_INERTIA, ClosedChart, Moved, Stopped, accelerations, moved
 
 

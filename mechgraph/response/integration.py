@@ -17,7 +17,7 @@ done since the start.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import field, replace
 from functools import partial
 from typing import Any, Protocol
@@ -30,7 +30,7 @@ from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import RESPONSE
 from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.response_setup import WHATS, Event
+from mechgraph.model.response_setup import WHATS, Event, Occurrence
 from mechgraph.quantities import items_of, real_array, shown, wrong
 from mechgraph.response.charts import Task
 from mechgraph.response.motion_equations import ClosedChart, Stopped, stopping
@@ -66,25 +66,6 @@ WATCHED_IN_STEP = np.union1d(np.linspace(0.0, 1.0, 9), [1e-5, 1.0 - 1e-5])
 """Places of looks at events in a step of length 1; so close to its ends that a height that turns in the first or last part is seen to."""
 LOOKS_IN_STEP = np.union1d(WATCHED_IN_STEP, 0.5 ** np.arange(4, 20))
 """Parts of a step at which stops are looked at: closely behind its beginning, where a freedom may have just left its stop."""
-
-
-@dataclass(frozen=True)
-class Occurrence:
-    """An event that happened at time ``t``; ``rising`` or falling.
-
-    Where a stop or a contact is struck: the ``impulse`` that it exerts, the ``energy_lost`` in all at that time, and the ``impulses`` in
-    the pairs, by name: wrenches ``(6,)``, (M, F) about the global origin, of link a on link b, NaN where not unique.
-    """
-
-    event: Event
-    t: float
-    rising: bool
-    impulse: float = 0.0
-    energy_lost: float = 0.0
-    impulses: Mapping[str, Array] = field(default_factory=dict)
-
-    def __str__(self) -> str:
-        return f"{self.event.text} at t = {self.t:.6g}"
 
 
 class Watched(Protocol):

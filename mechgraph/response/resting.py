@@ -31,13 +31,13 @@ from mechgraph.maths.tolerances import MOTIONS, RESPONSE
 from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair
-from mechgraph.model.response_setup import Event, Stop
+from mechgraph.model.response_setup import Event, Occurrence, Stop
 from mechgraph.pairs.contact_types import pressing
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.quantities import items_of, wrong
 from mechgraph.response.charts import Prescribed, Task, no_force
 from mechgraph.response.impact import FreeEquations, FrictionCone, Limit, evaluated
-from mechgraph.response.integration import LOOKS_IN_STEP, Occurrence, first_root, with_turns
+from mechgraph.response.integration import LOOKS_IN_STEP, first_root, with_turns
 from mechgraph.response.motion_equations import Moved, Stopped
 from mechgraph.response.rough import Rough, rough_freedoms
 

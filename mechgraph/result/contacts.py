@@ -39,8 +39,7 @@ from mechgraph.pairs.contact_types import (
 from mechgraph.pairs.factors import Touching
 from mechgraph.quantities import FORCE, LENGTH, PRESSURE, TIME, unit_of, wrong
 from mechgraph.result.trajectory import Trajectory
-from mechgraph.result.values import OK, Mask, bracket, driver_value, number, ranges, with_unit
-from mechgraph.result.views import Fact, PositionLabels, couplings_of
+from mechgraph.result.values import OK, Fact, Mask, PositionLabels, bracket, driver_value, number, ranges, with_unit
 
 
 class ContactGeometry:
@@ -607,12 +606,9 @@ def overlaps(values: Trajectory) -> tuple[Overlap, ...]:
 
 
 def contact_columns(values: Trajectory) -> Iterator[Fact]:
-    """Columns of the table: ``B path on plane:x``, ``B normal force``, ``B sliding speed``, ...; of gears force and sliding speed, of
-    belts spans and wraps.
+    """Columns of the table: ``B path on plane:x``, ``B normal force``, ``B sliding speed``, ...
 
     Paths are seen in the frames of the markers of the pair on these links.
     """
     for name, contact in contacts_of(values).items():
         yield from ((f"{name} {fact}", value, dimension) for fact, value, dimension in contact.columns())
-    for name, of in couplings_of(values).items():
-        yield from ((f"{name} {fact}", value, dimension) for fact, value, dimension in of.geometry())

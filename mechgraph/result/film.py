@@ -20,8 +20,7 @@ from mechgraph.maths.se3 import Array
 from mechgraph.pairs.journal import Journal
 from mechgraph.quantities import FORCE, LENGTH, MOMENT, POWER, PRESSURE, PURE, unit_of
 from mechgraph.result.trajectory import Trajectory
-from mechgraph.result.values import bracket, ranges
-from mechgraph.result.views import PositionLabels
+from mechgraph.result.values import PositionLabels, bracket, ranges
 
 FILM_DIMENSIONS = {
     "orbit": PURE, "eccentricity": PURE, "film": LENGTH, "min": LENGTH, "pressure": PRESSURE, "torque": MOMENT, "power": POWER,

@@ -40,6 +40,7 @@ from mechgraph.result.trajectory import Trajectory
 from mechgraph.result.values import (
     OK,
     Checks,
+    Fact,
     Inaccurate,
     LoadBearing,
     LoadResult,
@@ -47,19 +48,19 @@ from mechgraph.result.values import (
     MaterialPoint,
     MisfitsLeftOut,
     PassedCrossing,
+    PositionLabels,
     Unbalanced,
 )
 from mechgraph.result.views import (
     BeltResult,
     CouplingResult,
-    Fact,
     FrictionNote,
     LinkResult,
     PairResult,
-    PositionLabels,
     couplings_of,
     forces_of_couplings,
     friction_notes,
+    geometry_of_couplings,
     losses,
     misfits_left_out,
 )
@@ -189,8 +190,15 @@ def _loads(s: Trajectory) -> Iterator[Fact]:
 
 
 Include = Literal["points", "links", "centers", "loads", "contacts"]
+
+
+def _contacts(s: Trajectory) -> Iterator[Fact]:
+    yield from contact_columns(s)
+    yield from geometry_of_couplings(s)
+
+
 MORE: dict[str, Callable[[Trajectory], Iterator[Fact]]] = {
-    "points": _points, "links": _links, "centers": _centers, "loads": _loads, "contacts": contact_columns,
+    "points": _points, "links": _links, "centers": _centers, "loads": _loads, "contacts": _contacts,
 }  # fmt: skip
 """What a table may have beside the pairs, on request."""
 

@@ -24,6 +24,7 @@ from mechgraph.result.values import (
     LoadBearing,
     Mask,
     PassedCrossing,
+    PositionLabels,
     bracket,
     coupling_unit,
     number,
@@ -31,7 +32,6 @@ from mechgraph.result.values import (
 )
 from mechgraph.result.views import (
     UNASKED,
-    PositionLabels,
     forces_of_couplings,
     friction_notes,
     losses,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -335,3 +336,62 @@ def unique_sizes(states: Array) -> Array:
     along = np.einsum("tij,it->tj", ways, vectors) * loose
     left = vectors - np.einsum("tij,tj->it", ways, along)
     return np.where(solved & (loose.sum(axis=-1) < len(vectors)), np.linalg.norm(left, axis=0), np.nan)
+
+
+Fact = tuple[str, Array, tuple[int, ...]]
+"""Name, values ``(...)`` and dimension of a column; no exponents for a number without a unit."""
+
+
+class PositionLabels:
+    """The positions of a solution, the ``Trajectory`` ``values``, laid out flat."""
+
+    def __init__(self, values: Any) -> None:
+        self.values = values
+        self.m: Mechanism = values.mechanism
+        self.status = np.asarray(values.status()).reshape(-1)
+        self.solved = self.status == OK
+        self.drivers = values.prescribed
+
+    @cached_property
+    def driver_values(self) -> list[Array]:
+        """Coordinates of the drivers."""
+        return [self.coordinates(name)[0] for name in self.drivers]
+
+    def coordinates(self, name: str) -> tuple[Array, Array]:
+        """Coordinate and rate of a freedom, one value a position."""
+        k, j = self.values.whole.freedom(name)
+        position, velocity = (self.values.coordinates(k, rank) for rank in (0, 1))
+        return self.flat(position[..., j]), self.flat(velocity[..., j])
+
+    def flat(self, values: Any) -> Array:
+        """One value a position."""
+        return np.asarray(values, dtype=float).reshape(self.status.size)
+
+    def runs(self) -> list[tuple[int, int]]:
+        """First and last index of every run of equal statuses."""
+        cuts = np.flatnonzero(self.status[1:] != self.status[:-1])
+        starts = [0, *(int(c) + 1 for c in cuts)]
+        ends = [*(int(c) for c in cuts), self.status.size - 1]
+        return list(zip(starts, ends, strict=True)) if self.status.size else []
+
+    def coordinate(self, name: str, value: float) -> str:
+        """A driver's value with its unit."""
+        return coordinate(self.values.whole, name, value)
+
+    def name(self, index: int) -> str:
+        """The driver values of a position; where these are not known its time, or its number."""
+        found = [
+            self.coordinate(n, v[index])
+            for n, v in zip(self.drivers, self.driver_values, strict=True)
+            if np.isfinite(v[index])
+        ]
+        if not found and self.values.t is not None:
+            t = np.broadcast_to(np.asarray(self.values.t, dtype=float), self.values.batch).reshape(-1)[index]
+            return f"t = {with_unit(number(t), unit_of(self.m.units, (0, 0, 1)))}"
+        return ", ".join(found) or f"position {index}"
+
+    def full_name(self, index: int) -> str:
+        """The same with the names of the drivers, ``A.Rz = 30 deg``."""
+        values = zip(self.drivers, self.driver_values, strict=True)
+        found = [driver_value(self.values.whole, n, v[index]) for n, v in values if np.isfinite(v[index])]
+        return ", ".join(found) or self.name(index)

@@ -17,79 +17,11 @@ from mechgraph.memo import dataclass
 from mechgraph.model.belts import BeltCourse, BeltDrive
 from mechgraph.model.couplings import Belt
 from mechgraph.model.friction import WAYS, Friction, coupling_of
-from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.quantities import FORCE, LENGTH, MOMENT, POWER, ByName, is_numeric, unit_of
 from mechgraph.result.trajectory import Trajectory
-from mechgraph.result.values import (
-    OK,
-    MaterialPoint,
-    MisfitsLeftOut,
-    bracket,
-    coordinate,
-    coupling_unit,
-    driver_value,
-    number,
-    ranges,
-    with_unit,
-)
-
-
-class PositionLabels:
-    """The positions of a solution laid out flat."""
-
-    def __init__(self, values: Trajectory) -> None:
-        self.values = values
-        self.m: Mechanism = values.mechanism
-        self.status = np.asarray(values.status()).reshape(-1)
-        self.solved = self.status == OK
-        self.drivers = values.prescribed
-
-    @cached_property
-    def driver_values(self) -> list[Array]:
-        """Coordinates of the drivers."""
-        return [self.coordinates(name)[0] for name in self.drivers]
-
-    def coordinates(self, name: str) -> tuple[Array, Array]:
-        """Coordinate and rate of a freedom, one value a position."""
-        k, j = self.values.whole.freedom(name)
-        position, velocity = (self.values.coordinates(k, rank) for rank in (0, 1))
-        return self.flat(position[..., j]), self.flat(velocity[..., j])
-
-    def flat(self, values: Any) -> Array:
-        """One value a position."""
-        return np.asarray(values, dtype=float).reshape(self.status.size)
-
-    def runs(self) -> list[tuple[int, int]]:
-        """First and last index of every run of equal statuses."""
-        cuts = np.flatnonzero(self.status[1:] != self.status[:-1])
-        starts = [0, *(int(c) + 1 for c in cuts)]
-        ends = [*(int(c) for c in cuts), self.status.size - 1]
-        return list(zip(starts, ends, strict=True)) if self.status.size else []
-
-    def coordinate(self, name: str, value: float) -> str:
-        """A driver's value with its unit."""
-        return coordinate(self.values.whole, name, value)
-
-    def name(self, index: int) -> str:
-        """The driver values of a position; where these are not known its time, or its number."""
-        found = [
-            self.coordinate(n, v[index])
-            for n, v in zip(self.drivers, self.driver_values, strict=True)
-            if np.isfinite(v[index])
-        ]
-        if not found and self.values.t is not None:
-            t = np.broadcast_to(np.asarray(self.values.t, dtype=float), self.values.batch).reshape(-1)[index]
-            return f"t = {with_unit(number(t), unit_of(self.m.units, (0, 0, 1)))}"
-        return ", ".join(found) or f"position {index}"
-
-    def full_name(self, index: int) -> str:
-        """The same with the names of the drivers, ``A.Rz = 30 deg``."""
-        values = zip(self.drivers, self.driver_values, strict=True)
-        found = [driver_value(self.values.whole, n, v[index]) for n, v in values if np.isfinite(v[index])]
-        return ", ".join(found) or self.name(index)
-
+from mechgraph.result.values import Fact, MaterialPoint, MisfitsLeftOut, PositionLabels, bracket, coupling_unit, ranges
 
 UNASKED = 1_000_000
 """Links, or pairs, times positions up to which they are looked through without being asked for: a second, about."""
@@ -381,10 +313,6 @@ def pair_units(units: Mapping[str, str], row: PairType) -> dict[str, Any]:
         if row.reactions is not None
         else dict.fromkeys(row.component_names, force and f"{force}, M/L"),
     }
-
-
-Fact = tuple[str, Array, tuple[int, ...]]
-"""Name, values ``(...)`` and dimension of a column; no exponents for a number without a unit."""
 
 
 class CouplingResult(Shown):
@@ -698,6 +626,12 @@ def forces_of_couplings(values: Trajectory) -> Iterator[Fact]:
     """What acts in all couplings along lines, by names such as ``g normal force``, ``belt tension p1-p2``."""
     for name, of in couplings_of(values).items():
         yield from ((f"{name} {fact}", value, dimension) for fact, value, dimension in of.forces())
+
+
+def geometry_of_couplings(values: Trajectory) -> Iterator[Fact]:
+    """Of gears force and sliding speed, of belts spans and wraps, by the same names."""
+    for name, of in couplings_of(values).items():
+        yield from ((f"{name} {fact}", value, dimension) for fact, value, dimension in of.geometry())
 
 
 def couplings_of(values: Trajectory) -> dict[str, CouplingResult | BeltResult]:
