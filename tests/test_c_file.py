@@ -206,6 +206,12 @@ def test_the_controller_loop_of_the_manual(tmp_path):
     assert printed == pytest.approx(expected, abs=5e-7)
 
 
+@pytest.fixture
+def plainly(monkeypatch):
+    """Units compiled without the optimizations that take the compiler seconds."""
+    monkeypatch.setattr(compiler, "FLAGS", ("-O0", *compiler.FLAGS[1:]))
+
+
 def entered(file, folder):
     """A unit that is valid, in its initialization, with the numbers of its variables."""
     fmpy = pytest.importorskip("fmpy")
@@ -225,7 +231,7 @@ def entered(file, folder):
     return slave, places
 
 
-@pytest.mark.usefixtures("compiled")
+@pytest.mark.usefixtures("compiled", "plainly")
 def test_a_unit_runs_in_fmpy(tmp_path):
     m = mg.load("rcsr")
     c, file = mg.compile(m), tmp_path / "press.fmu"
@@ -275,7 +281,7 @@ def test_a_unit_of_hostile_names(tmp_path):
     assert (tmp_path / "press.fmu").read_bytes() == again
 
 
-@pytest.mark.usefixtures("compiled")
+@pytest.mark.usefixtures("compiled", "plainly")
 def test_a_unit_under_efforts_runs_in_fmpy(tmp_path):
     """Efforts that change from step to step: the motion that ``respond`` gives with them as loads, its reactions too."""
     m, file, h, efforts = mg.load("rcsr"), tmp_path / "press.fmu", 0.05, (0.1, -0.2, 0.3)

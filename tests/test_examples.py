@@ -62,6 +62,7 @@ def test_a_worked_example_draws_only_on_request() -> None:
     assert ".png:" not in run(script)
 
 
+@pytest.mark.slow
 def test_the_worked_machine_has_its_page(tmp_path: Path) -> None:
     """Written on request from what is declared, so that it is always current."""
     script = next(script for script in EXAMPLES if script.stem == "12_excavator")

@@ -56,8 +56,7 @@ def at_a_dead_point(seed):
     return None
 
 
-@pytest.mark.daily(1)
-@pytest.mark.seeds(9, without=(0, 1, 2, 6, 9, 10, 11, 12, 13, 14, 15, 17))
+@pytest.mark.seeds(9, without=(0, 1, 2, 6, 9, 10, 11, 12, 13, 14, 15, 17), daily=(7,))
 def test_started_next_to_a_dead_point(seed: int) -> None:
     """``d = d* + a (s - s*)^2 / 2``: away from it the state is that which the regular driver gives, behind it nothing is."""
     found = at_a_dead_point(seed)

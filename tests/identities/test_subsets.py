@@ -155,8 +155,8 @@ def two_rods():
 @pytest.mark.daily(1)
 @pytest.mark.parametrize(
     ("m", "engine", "end"),
-    [(rssr(), "dense", 6.0), (two_rods(), "dense", 6.0), (mg.load("rssr"), "dense", 6.0), (two_rods(), "sparse", 1.0)],
-    ids=["rssr", "two rods", "library", "sparse"],
+    [(mg.load("rssr"), "dense", 6.0), (rssr(), "dense", 6.0), (two_rods(), "dense", 6.0), (two_rods(), "sparse", 1.0)],
+    ids=["library", "rssr", "two rods", "sparse"],
 )
 def test_passive_bodies(m, engine, end):
     assert_subsets_agree(m, "A", np.linspace(-1.0, end, 7), np.random.default_rng(43), engine=engine)
