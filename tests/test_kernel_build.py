@@ -32,6 +32,8 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 INSTALLED = build.installed
 """As it is, whatever other tests put in its place."""
 REAL = {"SOURCES": compiler.SOURCES, "INCLUDED": compiler.INCLUDED}
+FLAGS = compiler.FLAGS
+"""Of an installation, whatever tests build with."""
 
 
 def scripted(folder: Path, name: str, text: str) -> Path:
@@ -158,6 +160,7 @@ def test_pip_installs_with_a_compiler_and_without_one(version, found, compiled, 
         assert data["tag"].startswith("py3-none-")
         assert "manylinux" not in data["tag"]
         monkeypatch.setattr(build, "PACKAGED", libraries[0].parent)
+        monkeypatch.setattr(compiler, "FLAGS", FLAGS)
         for what in ("SOURCES", "INCLUDED"):
             files = [root / FOLDER / file.name for file in REAL[what]]
             monkeypatch.setattr(compiler, what, files)
