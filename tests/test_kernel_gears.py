@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+import scipy
 from attack import differences
 from strategies import body, pose, unit
-from test_c_file import library_of
+from test_c_file import entered, library_of
 from test_c_file import solved as run_c
 from test_compile import beside
 from test_gears import planetary
@@ -167,3 +168,58 @@ def test_other_couplings_of_the_same_graph():
             m.replace(couplings=[mg.Coupling(terms, name="g"), last]), {"p": mg.Motion(0.5, 1.0)}, engine="compiled"
         )
         assert s["w"].velocity[0] == pytest.approx(w)
+
+
+def test_bearings_that_rub():
+    """Friction of all bearings beside forces between teeth, whose flanks it may change."""
+    m = random_train(303)
+    rough = [
+        mg.Friction(p.name, mu=0.08, **({"radius": 0.01, "length": 0.05} if p.type.symbol == "R" else {}))
+        for p in m.pairs
+    ]
+    m = m.replace(loads=[*m.loads, *rough])
+    tabled(m)
+    assert differ(m, turning(m)) < 1e-10
+
+
+@pytest.mark.parametrize("names", [("g0.pressure_angle", "l1.mass"), ("g1.spiral_angle",)])
+def test_studies_over_numbers_of_gears(names):
+    m = random_train(1, ("spur", "bevel"))
+    c = mg.compile(m)
+    ways = {name: scipy.stats.uniform(c.parameters[name], 0.01) for name in names}
+    outputs, given = ["S0.effort", "S1.force", "g0.normal_force"], {"S0": mg.Motion([0.1, 0.3], 2.0, 1.0)}
+    one, other = (mg.study(m, ways, outputs, n=5, seed=1, motions=given, engine=e) for e in ("compiled", "dense"))
+    for name in outputs:
+        np.testing.assert_allclose(one.outputs[name], other.outputs[name], rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.slow
+def test_a_unit_runs_in_fmpy(tmp_path):
+    m = random_train(3, ("spur", "worm"))
+    mg.compile(m).write(tmp_path / "train.fmu")
+    unit_, places = entered(tmp_path / "train.fmu", tmp_path)
+    unit_.exitInitializationMode()
+    s = mg.solve(m, {"S0": mg.Motion([0.1, 0.3], 2.0, 0.5)}, engine="dense")
+    for i, q in enumerate((0.1, 0.3)):
+        unit_.setReal([places[f"S0.Rz.{kind}"] for kind in "qva"], [q, 2.0, 0.5])
+        unit_.doStep(0.1 * i, 0.1)
+        found = unit_.getReal([places[f"S1.reaction.{part}"] for part in ("Mx", "My", "Mz", "Fx", "Fy", "Fz")])
+        np.testing.assert_allclose(found, s["S1"].reaction[i], atol=1e-9 * np.abs(s["S1"].reaction[i]).max())
+    unit_.terminate()
+    unit_.freeInstance()
+
+
+def test_what_is_not_carried_is_named():
+    """Belts with a pretension and friction of teeth, which numpy solves."""
+    pulleys = [mg.Pulley(k, k, (x, 0, 0), (0, 0, 1), radius=0.05) for k, x in (("p", 0.0), ("w", 0.5))]
+    pairs = [mg.Pair(g.link, "R", "frame", g.link, point=g.point, axis=(0, 0, 1)) for g in pulleys]
+    belt = [mg.BeltDrive("b", over=["p", "w"], pretension=300.0)]
+    m = mg.Mechanism("belt", pairs=pairs, gears=pulleys, couplings=belt, drives=["p"])
+    with pytest.raises(mg.DeclarationError, match="tensions of belts with a pretension"):
+        mg.compile(m)
+    train = random_train(1, ("spur",))
+    with pytest.raises(
+        mg.DeclarationError, match=r"load .* is friction of teeth, of a belt, or of a pair that may open"
+    ):
+        mg.compile(train.replace(loads=[mg.Friction("g0", mu=0.1)]))
+    assert mg.solve(m, {"p": 0.2}, loads=[mg.Effort("w", -2.0)]).coupling("b").tension["p-w"] == pytest.approx(280.0)

@@ -547,7 +547,7 @@ def why_not_load(load: Load, m: Mechanism) -> str | None:
     if isinstance(load, Law) and load.in_freedom is None and load.along is not None:
         return f"{where} acts along a fixed direction"
     if isinstance(load, Friction) and (load.of not in m.pair_index or m.pair(load.of).type.opens):
-        return f"{where} is not of a pair that stays closed"
+        return f"{where} is friction of teeth, of a belt, or of a pair that may open"
     return None
 
 
