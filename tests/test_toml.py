@@ -173,7 +173,7 @@ def test_degrees_are_radians_and_the_end_of_a_sweep_is_excluded() -> None:
     ("old", "new", "words"),
     [
         ('description = "', 'descripton = "', "unknown field 'descripton'"),
-        ("schema = 1", "schema = 99", "this version reads schema 1"),
+        ("schema = 1", "schema = 99", "this version of mechgraph reads schemas 1 to 2; a file of a later one needs a newer version"),
         ("schema = 1\n", "", "schema missing"),
         ('name = "crank"\nmass', 'name = "crank"\nweight', "unknown field 'weight'"),
         ('name = "crank"\nmass = ', 'name = "crank"\nmass = "heavy" # ', "expected a finite number"),
@@ -203,7 +203,7 @@ def test_a_fault_is_named(tmp_path: Path, old: str, new: str, words: str) -> Non
 
 def test_several_faults_come_at_once(tmp_path: Path) -> None:
     text = (
-        FOUR_BAR.replace("schema = 1", "schema = 2")
+        FOUR_BAR.replace("schema = 1", "schema = 3")
         .replace('kind = "gravity"', 'kind = "levity"')
         .replace("value = 1.0", "vallue = 1.0")
     )
@@ -316,13 +316,13 @@ def test_a_file_that_never_ends_is_refused(tmp_path: Path) -> None:
 
 
 def test_faults_of_the_format_and_of_the_mechanism_come_at_once(tmp_path: Path) -> None:
-    text = FOUR_BAR.replace("schema = 1", "schema = 2").replace('kind = "gravity"', 'kind = "gravity"\nbad = 3')
+    text = FOUR_BAR.replace("schema = 1", "schema = 3").replace('kind = "gravity"', 'kind = "gravity"\nbad = 3')
     text = text.replace('freedom = "A"', 'freedom = "Z"').replace("axis = [0.0, 0.0, 1.0]", "axis = [0.0, 0.0, 0.0]", 1)
     path = written(tmp_path, re.sub(r'(name = "crank"\nmass = )([\d.]+)', r'\1"\2"', text))
     with pytest.raises(mg.ContentError) as caught:
         mg.load(path)
     assert isinstance(caught.value, mg.FileError)
-    for words in ("schema = 2", "'bad'", "'Z'", "length 0", "mass = '"):
+    for words in ("schema = 3", "'bad'", "'Z'", "length 0", "mass = '"):
         assert words in str(caught.value)
     # where a thing is left out for its faults, what refers to it is not blamed
     text = text.replace('name = "rocker"', 'nam = "rocker"', 1)
@@ -366,6 +366,23 @@ def test_an_existing_file_survives_a_failed_save(tmp_path: Path, monkeypatch: py
     assert [p.name for p in tmp_path.iterdir()] == ["m.toml"]
 
 
+def test_a_file_has_the_least_number_that_serves_it_and_a_newer_one_is_refused_by_name(tmp_path: Path) -> None:
+    plain = mg.load("four-bar")
+    law = mg.CamLaw([mg.Segment("cycloidal", rise=0.01, over=np.pi), mg.Segment("cycloidal", rise=-0.01, over=np.pi)])
+    groove = mg.Pair("K", "Rg", "cam", "f", curve=mg.Curve.barrel(law=law, radius=0.05), on_b=mg.Marker((0, 0, 0), (1, 0, 0)))
+    later = [plain.to_planar(), plain.replace(gears=[mg.Pulley("w", "crank", (0, 0, 0), (0, 0, 1), radius=0.01)])]
+    for m, number in [(plain, 1), *((one, 2) for one in later)]:
+        mg.save(m, tmp_path / "m.toml")
+        text = (tmp_path / "m.toml").read_text()
+        assert f"schema = {number}\n" in text
+        assert mg.load(tmp_path / "m.toml") == m
+        (tmp_path / "m.toml").write_text(text.replace(f"schema = {number}", "schema = 1"))
+        assert mg.load(tmp_path / "m.toml") == m  # as versions before the number 2 wrote it
+    cam = mg.Mechanism("cam", pairs=[mg.Pair("A", "R", "frame", "cam", point=(0, 0, 0), axis=(0, 0, 1)), groove])
+    mg.save(cam, tmp_path / "m.toml")
+    assert "schema = 2\n" in (tmp_path / "m.toml").read_text()
+
+
 # --- the JSON Schema for editors -----------------------------------------------------------------------------------------
 
 
@@ -397,12 +414,12 @@ def test_the_tables_of_the_readme_are_those_of_the_code(golden: Callable[[str, s
     text = (library_path() / "README.md").read_text(encoding="utf-8")
     assert text.count("<!-- fields: ") == 14
     golden("../../library/README.md", with_field_tables(text))
-    assert SCHEMA["properties"]["schema"]["const"] == NUMBER
+    assert SCHEMA["properties"]["schema"]["enum"][-1] == NUMBER
 
 
 @pytest.mark.parametrize(
     ("old", "new"),
-    [("mass = ", "weight = "), ("schema = 1", "schema = 2"), ('kind = "gravity"', 'kind = "levity"'), ('a = "frame"', ""),
+    [("mass = ", "weight = "), ("schema = 1", "schema = 3"), ('kind = "gravity"', 'kind = "levity"'), ('a = "frame"', ""),
      ("sweep_deg = [0.0, 360.0, 1.0]", "sweep_deg = [0.0, 360.0]")],
 )  # fmt: skip
 def test_the_schema_finds_what_the_loader_finds(tmp_path: Path, old: str, new: str) -> None:

@@ -140,12 +140,14 @@ def write_curve(
     curve: Curve,
     path: str | os.PathLike[str],
     *,
-    error: float,
+    error: float | None = None,
     cutter: float | None = None,
     form: str = "spline",
     unit: str | None = None,
 ) -> None:
     """See ``Curve.write``."""
+    if error is None:
+        error = float(np.ptp(_drawn(curve, _start(curve)), axis=0).max()) / 10000
     faults = [] if is_numeric(error, ()) and error > 0 else [wrong(error, "error", "a length above 0")]
     if form not in FORMS:
         faults.append(wrong(form, "form", "'spline' or 'polyline'"))

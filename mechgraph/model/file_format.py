@@ -50,8 +50,10 @@ KINDS: dict[str, Mapping[str, Any]] = {
 """Tables of which the field ``kind`` says what stands in them: its values, and the classes."""
 USUAL = {"coupling": "linear"}
 """What is meant where ``kind`` is left out."""
-SCHEMA = 1
-"""Number of the file format."""
+SCHEMA = 2
+"""Number of the file format; a file that holds nothing that came with it has the number 1."""
+OF_SCHEMA_2 = frozenset({"planar", "gear", "synthesis", "segment", "barrel", "globoid", "friction"})
+"""Tables, fields and kinds that came with schema 2."""
 DEGREES = "_deg"
 """Ending of the name of an angle that is given in degrees."""
 
@@ -134,7 +136,7 @@ _PITCHES = {
     "anyOf": [{"type": "number"}, NUMBERS.schema, {"type": "object", "additionalProperties": {"type": "number"}}]
 }
 _FILE = {
-    "schema": INTEGER("number of the format: 1", default="needed", rules={"const": SCHEMA}),
+    "schema": INTEGER("number of the format, 1 or 2", default="needed", rules={"enum": [*range(1, SCHEMA + 1)]}),
     "pair_type": TABLES("pair types of your own", table="pair_type", default="none"),
     "chain": TABLE("a single loop by numbers; excludes `[[pair]]`", table="chain"),
 }
@@ -145,7 +147,7 @@ TABLES_OF_FILE: dict[str, FileTable] = {
         Mechanism,
         _FILE,
         needed=("schema", "name"),
-        words="A mechanism file of mechgraph (TOML), schema number 1. Described field by field in README.md beside this file.",
+        words="A mechanism file of mechgraph (TOML), schema numbers 1 and 2. Described field by field in README.md beside this file.",
         rules={"not": {"required": ["chain", "pair"]}},
     ),
     "units": FileTable(

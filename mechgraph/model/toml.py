@@ -31,7 +31,7 @@ from mechgraph.fields import (
 )
 from mechgraph.files import text_of, toml_of, write_whole
 from mechgraph.maths.se3 import Array
-from mechgraph.model.file_format import DEGREES, KINDS, SCHEMA, TABLES_OF_FILE, USUAL
+from mechgraph.model.file_format import DEGREES, KINDS, OF_SCHEMA_2, SCHEMA, TABLES_OF_FILE, USUAL
 from mechgraph.model.mechanism import Mechanism, chain
 from mechgraph.model.motion import Motion
 from mechgraph.model.plane import in_file
@@ -312,8 +312,9 @@ def parse(data: Mapping[str, Any], subject: str) -> Mechanism:
     """
     reader, table = _Reader(), TABLES_OF_FILE["file"]
     top = reader.fields("file", data, "file")
-    if top.get("schema", SCHEMA) != SCHEMA:
-        reader.faults.append(f"schema = {shown(top['schema'])}: this version reads schema {SCHEMA}")
+    if top.get("schema", SCHEMA) not in range(1, SCHEMA + 1):
+        why = f"this version of mechgraph reads schemas 1 to {SCHEMA}; a file of a later one needs a newer version"
+        reader.faults.append(f"schema = {shown(top['schema'])}: {why}")
     reader.pair_types |= {row.symbol: row for row in reader.items("pair_type", top.get("pair_type", []))}
     arguments: dict[str, Any] = {}
     for key, attribute in table.attributes.items():
@@ -429,7 +430,7 @@ def _as_sweep(out: dict[str, Any], motion: Motion) -> dict[str, Any]:
 
 def to_data(m: Mechanism, path: str = "") -> dict[str, Any]:
     """The content of the TOML file of a mechanism."""
-    data: dict[str, Any] = {"schema": SCHEMA}
+    data: dict[str, Any] = {"schema": 1}
     rows = [p.type.spatial or p.type for p in m.pairs]
     own = {row.symbol: row for row in rows if not travels(row) and PAIR_TABLE.get(row.symbol) != row}
     if own:
@@ -443,7 +444,14 @@ def to_data(m: Mechanism, path: str = "") -> dict[str, Any]:
             ]
         if value:
             data[key] = _plain(value, key, path)
-    return data
+    return data | {"schema": SCHEMA if _is_new(data) else 1}
+
+
+def _is_new(data: Any) -> bool:
+    """Whether tables hold what came with the last schema."""
+    if isinstance(data, Mapping):
+        return not OF_SCHEMA_2.isdisjoint((*data, data.get("kind", ""))) or any(map(_is_new, data.values()))
+    return isinstance(data, list | tuple) and any(map(_is_new, data))
 
 
 def _item_data(key: str, item: Any, path: str) -> dict[str, Any]:

@@ -258,7 +258,7 @@ class Curve(Described, Once):
         self,
         path: Any,
         *,
-        error: float,
+        error: float | None = None,
         cutter: float | None = None,
         form: Literal["spline", "polyline"] = "spline",
         unit: str | None = None,
@@ -272,8 +272,8 @@ class Curve(Described, Once):
         ----------
         path : path
             ``"cam.dxf"`` or ``"cam.csv"``.
-        error : float
-            Largest distance of splines or chords from the curve [length].
+        error : float, optional
+            Largest distance of splines or chords from the curve [length]. Default: a ten thousandth of its greatest extent.
         cutter : float, optional
             Radius of a cutter whose path is added [length].
         form : {"spline", "polyline"}

@@ -66,7 +66,10 @@ def _pair_rows(values: Trajectory, pair: Pair, k: int) -> Iterator[Row]:
         if np.nan_to_num(applied[..., j]).any():
             yield f"{freedom.name} applied effort{unit}", applied[..., j]
     wrench = values.reaction_at_pair(k)
-    yield f"force{bracket(force)}", np.linalg.norm(wrench[..., 3:], axis=-1)
+    size, unique = np.linalg.norm(wrench[..., 3:], axis=-1), values.magnitude(k)
+    yield f"force{bracket(force)}", size
+    if (np.isnan(size) & ~np.isnan(unique)).any():
+        yield f"force, what is unique of it{bracket(force)}", unique
     yield f"moment{bracket(moment)}", np.linalg.norm(wrench[..., :3], axis=-1)
     if not _large(values):
         couples = {c.name: c.is_couple for c in pair.type.reactions or ()}
