@@ -173,7 +173,11 @@ def test_degrees_are_radians_and_the_end_of_a_sweep_is_excluded() -> None:
     ("old", "new", "words"),
     [
         ('description = "', 'descripton = "', "unknown field 'descripton'"),
-        ("schema = 1", "schema = 99", "this version of mechgraph reads schemas 1 to 2; a file of a later one needs a newer version"),
+        (
+            "schema = 1",
+            "schema = 99",
+            "this version of mechgraph reads schemas 1 to 2; a file of a later one needs a newer version",
+        ),
         ("schema = 1\n", "", "schema missing"),
         ('name = "crank"\nmass', 'name = "crank"\nweight', "unknown field 'weight'"),
         ('name = "crank"\nmass = ', 'name = "crank"\nmass = "heavy" # ', "expected a finite number"),
@@ -369,7 +373,9 @@ def test_an_existing_file_survives_a_failed_save(tmp_path: Path, monkeypatch: py
 def test_a_file_has_the_least_number_that_serves_it_and_a_newer_one_is_refused_by_name(tmp_path: Path) -> None:
     plain = mg.load("four-bar")
     law = mg.CamLaw([mg.Segment("cycloidal", rise=0.01, over=np.pi), mg.Segment("cycloidal", rise=-0.01, over=np.pi)])
-    groove = mg.Pair("K", "Rg", "cam", "f", curve=mg.Curve.barrel(law=law, radius=0.05), on_b=mg.Marker((0, 0, 0), (1, 0, 0)))
+    groove = mg.Pair(
+        "K", "Rg", "cam", "f", curve=mg.Curve.barrel(law=law, radius=0.05), on_b=mg.Marker((0, 0, 0), (1, 0, 0))
+    )
     later = [plain.to_planar(), plain.replace(gears=[mg.Pulley("w", "crank", (0, 0, 0), (0, 0, 1), radius=0.01)])]
     for m, number in [(plain, 1), *((one, 2) for one in later)]:
         mg.save(m, tmp_path / "m.toml")

@@ -47,7 +47,6 @@ from mechgraph.model.gears import (
     Relation,
     angle,
     dot,
-    place_of,
     pose_along,
 )
 from mechgraph.quantities import FORCE, LENGTH, shown, unknown, wrong
@@ -209,7 +208,7 @@ class BeltDrive(LineCoupling):
     def _laid(self, m: Any) -> Laid:
         """Its pulleys at the start."""
         pulleys = self.pulleys(m)
-        places = [place_of(p) for p in pulleys]
+        places = [p.place for p in pulleys]
         poses = [pose_along(m, self._way(m, pulleys[0].link, p.link)) for p in pulleys]
         seen = [place.seen(pose) for place, pose in zip(places, poses, strict=True)]
         centers, axes = (np.concatenate([getattr(one, name) for one in seen], axis=1) for name in ("point", "axis"))
@@ -386,7 +385,7 @@ class BeltDrive(LineCoupling):
             return self._put(m, steps, dict.fromkeys(names, 1.0))
         laid = self._laid(m)
         own = k, (k + 1) % len(pulleys)
-        (a, b), numbers = (place_of(pulleys[i]) for i in own), tuple(float(laid.w[i]) for i in own)
+        (a, b), numbers = (pulleys[i].place for i in own), tuple(float(laid.w[i]) for i in own)
         steps = self._way(m, a.link, b.link)
         turns = _turns_of(m, steps, a, b)
         relation: Relation = tangent
@@ -411,7 +410,7 @@ class BeltDrive(LineCoupling):
         """The turns on the way along every span."""
         pulleys = self.pulleys(m)
         ends = zip(pulleys, (*pulleys[1:], pulleys[0]), strict=True)
-        return [_turns_of(m, self._way(m, a.link, b.link), place_of(a), place_of(b)) for a, b in ends]
+        return [_turns_of(m, self._way(m, a.link, b.link), a.place, b.place) for a, b in ends]
 
     def _fixed(self, m: Any) -> bool:
         """Whether all rows are linear: no center moves."""

@@ -546,26 +546,27 @@ def followed(
     for step in steps[: 1 if motion == "slide" else None]:
         pair: Pair = m.pairs[step.pair]
         before, behind = (pair.markers[int((step.sense > 0) == later)] for later in (False, True))
-        q, w = _line(before)
+        q, w = line_of(before)
         off = 0.0 if motion == "slide" else float(np.abs(cross(q - p, z)).max())
         lean = float(np.abs(cross(z, w)).max())
         if motion_of(pair) != motion or lean > fitting or off > fitting * max(1.0, float(np.abs(q - p).max())):
             return p, z, senses, off
         senses.append(float(np.sign(z @ w)))
-        along, (p, w) = (p - q) @ z, _line(behind)
+        along, (p, w) = (p - q) @ z, line_of(behind)
         z = senses[-1] * w
         p = p + along * z
     return p, z, senses, 0.0
 
 
-def _line(marker: Marker) -> tuple[Array, Array]:
+def line_of(marker: Marker) -> tuple[Array, Array]:
+    """The axis of a marker: a point and the unit direction."""
     z = np.array(marker.axis, dtype=float)
     return np.array(marker.point, dtype=float), z / np.linalg.norm(z)
 
 
 def _axis_behind(m: Any, step: MeshStep) -> tuple[Array, Array]:
     """The axis of a pair on the link behind it on the way."""
-    return _line(m.pairs[step.pair].markers[int(step.sense > 0)])
+    return line_of(m.pairs[step.pair].markers[int(step.sense > 0)])
 
 
 _TEETH = TWO_WHOLE("numbers of teeth of both gears")

@@ -54,6 +54,7 @@ from mechgraph.model.couplings import (
     BaseCoupling,
     MeshStep,
     fitting_of,
+    line_of,
     meeting,
     motion_of,
     plain_pairs,
@@ -272,16 +273,16 @@ CROSSING = {side: partial(between_axes, side) for side in (1.0, -1.0)}
 # --- gears ---------------------------------------------------------------------------------------------------------------
 
 
-class _Toothed(Described):
-    """What gears share: a place on a link."""
+class _Placed(Described):
+    """What gears and pulleys share: a place on a link."""
 
     kind: ClassVar[str]
+    mark: Any = None
     if TYPE_CHECKING:
         name: str
         link: str
         point: Any
         axis: Any
-        mark: Any
 
     def __post_init__(self) -> None:
         self.read_numbers()
@@ -300,6 +301,15 @@ class _Toothed(Described):
         found = super().value_faults(where)
         if self.axis is None:
             found.append(f"{where}axis: is missing; give a direction, e.g. (0, 0, 1) (planar=True needs none)")
+        return found
+
+
+class _Toothed(_Placed):
+    """Gears."""
+
+    def value_faults(self, where: str) -> list[str]:
+        """See ``Described``."""
+        found = super().value_faults(where)
         if not found and getattr(self, "teeth", 1) < 1:
             found.append(wrong(self.teeth, where + "teeth", "1 or more"))  # type: ignore[attr-defined]
         return found
@@ -476,7 +486,7 @@ class WormWheel(_Toothed):
 
 
 @dataclass(frozen=True)
-class Pulley(Described):
+class Pulley(_Placed):
     """Declare a pulley or sprocket: a place on a link, for ``Mechanism(gears=[...])`` and the belts over it.
 
     Give ``radius``, to the middle of the belt, or ``teeth`` and ``pitch``: ``r = teeth pitch / (2 pi)``.
@@ -502,9 +512,6 @@ class Pulley(Described):
     teeth: Annotated[int | None, INTEGER("number of teeth", default="none")] = None
     pitch: Annotated[float | None, POSITIVE("of the teeth, along the belt", LENGTH, default="none")] = None
 
-    def __post_init__(self) -> None:
-        self.read_numbers()
-
     @property
     def pitch_radius(self) -> float:
         """The radius to the middle of the belt."""
@@ -515,8 +522,6 @@ class Pulley(Described):
     def value_faults(self, where: str) -> list[str]:
         """See ``Described``."""
         found = super().value_faults(where)
-        if self.axis is None:
-            found.append(f"{where}axis: is missing; give a direction, e.g. (0, 0, 1) (planar=True needs none)")
         given = self.radius is not None, self.teeth is not None and self.pitch is not None
         if not found and (sum(given) != 1 or (self.teeth is None) != (self.pitch is None) or self.teeth == 0):
             found.append(
@@ -524,11 +529,6 @@ class Pulley(Described):
                 "expected the radius, or teeth (1 or more) and their pitch"
             )
         return found
-
-
-def place_of(p: Pulley) -> LinkPlace:
-    """The place of a pulley on its link."""
-    return LinkPlace(p.link, p.point, p.axis, second_direction(p.axis))
 
 
 TOOTHED: dict[str, type[_Toothed]] = {kind.kind: kind for kind in (Gear, GearRack, BevelGear, Worm, WormWheel)}
@@ -605,12 +605,10 @@ def off_axis(m: Any) -> Iterator[str]:
             continue
         away = {}
         for pair in pairs:
-            marker, z = pair.markers[int(pair.b == gear.link)], np.asarray(gear.axis) / np.linalg.norm(gear.axis)
-            d = np.subtract(marker.point, gear.point)
-            if motion_of(pair) == "turn" and np.abs(np.cross(z, marker.axis)).max() <= fitting * np.linalg.norm(
-                marker.axis
-            ):
-                away[pair.name] = float(np.linalg.norm(np.cross(d, z))), fitting * max(1.0, float(np.abs(d).max()))
+            (p, w), z = line_of(pair.markers[int(pair.b == gear.link)]), np.array(gear.place.axis)
+            d = p - gear.point
+            if motion_of(pair) == "turn" and np.abs(cross(z, w)).max() <= fitting:
+                away[pair.name] = float(np.linalg.norm(cross(d, z))), fitting * max(1.0, float(np.abs(d).max()))
         if away and all(off > least for off, least in away.values()):
             name = min(away, key=away.__getitem__)
             yield (

@@ -19,7 +19,7 @@ from mechgraph.maths.se3 import Array
 from mechgraph.memo import dataclass
 from mechgraph.model.belts import BeltDrive, course
 from mechgraph.model.couplings import Axes, Belt, BevelGears, Contact, Rack, SpurGears, WormGear
-from mechgraph.model.gears import Gear, GearRack, Pulley, place_of
+from mechgraph.model.gears import Gear, GearRack, Pulley
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.meshes import Mesh
 from mechgraph.show.shapes import Shape, polyline
@@ -388,9 +388,8 @@ def _mesh(a: int, b: int, P: Array, seat: WheelSeat) -> DrawnMesh:
 
 
 def _placed_seat(gear: Any, poses: Mapping[str, Array]) -> WheelSeat:
-    place = place_of(gear) if isinstance(gear, Pulley) else gear.place
+    place = gear.place
     pose, z, x = poses[place.link], np.asarray(place.axis), np.asarray(place.mark)
-    z = z / np.linalg.norm(z)
     axes = np.column_stack([x, np.cross(z, x), z])
     return WheelSeat(place.link, pose, pose[:, :3] @ np.asarray(place.point) + pose[:, 3], pose[:, :3] @ axes)
 
