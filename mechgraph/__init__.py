@@ -31,7 +31,7 @@ from mechgraph.maths.tolerances import Tolerances
 from mechgraph.memo import once_written
 from mechgraph.model import parts
 from mechgraph.model.belts import BeltDrive
-from mechgraph.model.couplings import Belt, BevelGears, Coupling, Rack, SpurGears, WormGear
+from mechgraph.model.couplings import Coupling
 from mechgraph.model.friction import Friction
 from mechgraph.model.gears import BevelGear, Gear, GearRack, Pulley, Worm, WormWheel, planet_places
 from mechgraph.model.loads import Damper, Effort, ForceLaw, ForceTable, Gravity, Spring, TorsionSpring, Wrench
@@ -40,6 +40,7 @@ from mechgraph.model.meshes import Mesh
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Misfit, Pair, Stiffness
 from mechgraph.model.response_setup import Event, ResponseSetup, Stop
+from mechgraph.model.short_forms import Belt, BevelGears, Rack, SpurGears, WormGear
 from mechgraph.model.synthesis_setup import SynthesisSetup
 from mechgraph.model.toml import library_names as library
 from mechgraph.pairs.cam_laws import CamLaw, Segment, cam_laws

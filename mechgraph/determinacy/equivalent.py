@@ -31,8 +31,8 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.touching import ContactLines
 from mechgraph.maths.se3 import Array
 from mechgraph.memo import dataclass
-from mechgraph.model.couplings import Contact
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.meshes import Meshing
 from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.quantities import door, wrong
 
@@ -200,10 +200,10 @@ def _in_place_of_gears(parts: _Parts) -> list[str]:
     faults = [
         f"coupling {c.name}: has no line of contact; give gears, a rack or a belt"
         for c in m.couplings
-        if not isinstance(c, Contact)
+        if not isinstance(c, Meshing) or not c.linear
     ]
     for (_, contact), (G, *_) in zip(lines.contacts, lines.wrenches, strict=True):
-        if not isinstance(contact, Contact):
+        if not isinstance(contact, Meshing):
             continue
         first, last = contact.steps[0], contact.steps[-1]
         one, other = m.pairs[first.pair], m.pairs[last.pair]
@@ -215,7 +215,7 @@ def _in_place_of_gears(parts: _Parts) -> list[str]:
         link, name_a, name_b = (name.format(contact.name) for name in NAMES)
         parts.links.append(Link(link))
         parts.join(name_a, "R", wheel_a, link, feet[0], z)
-        symbol, point, axis = ("P", feet[0], np.cross(z, n)) if contact.slides else ("R", feet[1], z)
+        symbol, point, axis = ("P", feet[0], np.cross(z, n)) if not contact.turning[1] else ("R", feet[1], z)
         parts.join(name_b, symbol, link, wheel_b, point, axis)
     return faults
 

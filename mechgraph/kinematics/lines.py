@@ -26,7 +26,7 @@ class LineRows:
     """Rows of the line couplings at some places among the couplings of a system; lengths over L, so that rows are forces over ``1 / L``."""
 
     def __init__(self, system: Any, which: Index) -> None:
-        m, self.system = system.m, system
+        m, self.system, self.which = system.m, system, which
         self.couplings: list[LineCoupling] = [m.couplings[g] for g in which]
         self.links = np.array([[m.place_of_link(end.link) for end in c.ends] for c in self.couplings], dtype=np.intp).T
         steps = [(i, step) for i, c in enumerate(self.couplings) for step in c.steps]
@@ -42,24 +42,31 @@ class LineRows:
         self._terms = rows.astype(np.intp), columns.astype(np.intp), senses.astype(float)
 
     @cached_property
-    def _groups(self) -> list[tuple[Relation, Index]]:
-        """The rows of every relation."""
-        found: dict[int, tuple[Relation, list[int]]] = {}
+    def _groups(self) -> list[tuple[Relation, Relation, Index, Array]]:
+        """The relations of both flanks, the rows that have them, and their numbers ``(k, n, B)`` over L."""
+        found: dict[tuple[Relation, Relation], list[int]] = {}
         for i, c in enumerate(self.couplings):
-            found.setdefault(hash((id(c.relation), id(c.other))), (c.relation, []))[1].append(i)
-        return [(relation, np.array(rows)) for relation, rows in found.values()]
+            found.setdefault((c.relation, c.other or c.relation), []).append(i)
+        numbers = [np.array([[c.numbers for c in own] for own in self._items[rows]]) for rows in found.values()]
+        return [
+            (*both, np.array(rows), own.transpose(2, 0, 1) / self.system.par.L)
+            for (both, rows), own in zip(found.items(), numbers, strict=True)
+        ]
 
     @cached_property
     def _local(self) -> list[tuple[Array, Array, Array]]:
-        """Points from the origins of the internal link frames over L, axes and marks there ``(3, n, 1)``, on links a and on links b."""
+        """Points from the origins of the internal link frames over L, axes and marks there ``(3, n, B)``, on links a and on links b."""
         par, out = self.system.par, []
         for side in (0, 1):
-            ends = [c.ends[side] for c in self.couplings]
-            point, axis, mark = (np.array([getattr(end, name) for end in ends]).T for name in ("point", "axis", "mark"))
-            axis, mark = (v / np.sqrt((v * v).sum(axis=0)) for v in (axis, mark))
-            local = (point - par.offset[:, self.links[side]]) / par.L
-            out.append((local[..., None], axis[..., None], mark[..., None]))
+            places = np.array([[c.ends[side][1:] for c in own] for own in self._items])
+            point, axis, mark = places.transpose(2, 3, 0, 1)
+            out.append(((point - par.offset[:, self.links[side], None]) / par.L, axis, mark))
         return out
+
+    @property
+    def _items(self) -> Any:
+        """The couplings of every variant ``(n, B)``, of which gears have numbers of their own."""
+        return self.system.par.items[self.which]
 
     def _places(self, poses: Array, side: int, rows: Index) -> LinePlaces:
         """The places on links a (side 0) or b of some rows, where all links have the poses ``(3, 4, N, T)``."""
@@ -74,11 +81,8 @@ class LineRows:
             return self._last[2]
         n, T = len(self.couplings), poses.shape[-1]
         value, point, along = (np.zeros((*shape, T), dtype=poses.dtype) for shape in ((n,), (3, n), (3, n)))
-        for relation, rows in self._groups:
-            numbers = np.array([self.couplings[i].numbers for i in rows]).T[..., None] / self.system.par.L
-            made = ((self.couplings[rows[0]].other or relation) if other else relation)(
-                self._places(poses, 0, rows), self._places(poses, 1, rows), numbers
-            )
+        for relation, behind, rows, numbers in self._groups:
+            made = (behind if other else relation)(self._places(poses, 0, rows), self._places(poses, 1, rows), numbers)
             value[rows], point[:, rows], along[:, rows] = made
         found = LinesAt(value, point, along)
         self._last = poses, other, found  # the same poses are asked for several times

@@ -21,9 +21,9 @@ import numpy as np
 from mechgraph.kinematics.lines import LineRows
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
-from mechgraph.maths.se3 import Array, Index, Mask, compose, cross, identity, inverse, rotate, rotate_back
+from mechgraph.maths.se3 import Array, Mask, compose, cross, identity, inverse, rotate, rotate_back
 from mechgraph.maths.tolerances import MOTIONS
-from mechgraph.model.couplings import Axes, BaseCoupling, Contact, Lines, fitting_of
+from mechgraph.model.couplings import BaseCoupling, fitting_of
 from mechgraph.model.gears import LineCoupling, moving_lines
 from mechgraph.pairs import pair_type as evaluation
 
@@ -80,7 +80,7 @@ def on_carrier(system: System, g: int) -> tuple[int, Array] | None:
     if coupling.name in system.m.once(moving_lines):
         return None
     ways = [_OnTheWay(system, coupling, coordinate) for coordinate in (0.0, 0.7)]
-    lines = [ContactLines(way).wrenches_of(g, coupling)[0] for way in ways]
+    lines = [ContactLines(way).wrenches_of([g])[0][0] for way in ways]
     for link in ways[0].links:
         one, other = (way.seen_from(link, G) for way, G in zip(ways, lines, strict=True))
         if np.abs(one - other).max() <= MOTIONS.rounding * np.abs(one).max():
@@ -99,60 +99,37 @@ class ContactLines:
     def __bool__(self) -> bool:
         return bool(self.contacts)
 
-    def _columns(self, contact: BaseCoupling) -> Index:
-        return np.array([self.here.system.first_column[step.pair] for step in contact.steps], dtype=np.intp)
-
     @cached_property
     def wrenches(self) -> list[tuple[Array, Array, Array]]:
         """For every contact the wrench on gear b for a unit multiplier ``(6, 2, T)``, of a positive and of a negative one, the points
         ``(3, 2, T)`` at which it acts, and its normal force ``(2, T)``.
         """
-        return [self.wrenches_of(g, contact) for g, contact in self.contacts]
+        return self.wrenches_of([g for g, _ in self.contacts]) if self.contacts else []
 
-    def wrenches_of(self, g: int, contact: BaseCoupling) -> tuple[Array, Array, Array]:
-        """Those of one contact."""
-        if not isinstance(contact, Contact):
-            return self._of_line(g)
-        here, columns = self.here, self._columns(contact)
-        first, last = contact.steps[0].pair, contact.steps[-1].pair
-        S = self.screws(g)
-        along = S[1][3:] if contact.slides else S[1][:3]
-        axes = Axes(here.pair_points[:, first], S[0][:3], here.pair_points[:, last], along, here.system.par.L)
-        P, n = self._lines(g, axes)
-        line = np.concatenate([cross(P, n), n])
-        if here.system.m.planar:  # of gears with a helix the axial force leaves the plane
-            line[np.delete(np.arange(6), here.system.graph.span)] = 0.0
-        power = contact.steps[0].sense * (line * S[0][:, None]).sum(axis=0)
-        size = here.system.coupling_matrix[g, columns[0]] / power
+    def wrenches_of(self, contacts: Sequence[int]) -> list[tuple[Array, Array, Array]]:
+        """Those of some, by their numbers among the couplings."""
+        here, s, which = self.here, self.here.system, np.array(contacts, dtype=np.intp)
+        rows, own = LineRows(s, which), [s.m.couplings[g] for g in contacts]
+        lines = [rows.lines(here.poses, other) for other in (False, True)]
+        P, n = (np.stack([getattr(at, name) for at in lines], axis=2) for name in ("point", "along"))
+        G = np.concatenate([cross(P, n), n])
+        if s.m.planar:  # of gears with a helix the axial force leaves the plane
+            G[np.delete(np.arange(6), s.graph.span)] = 0.0
+        first = [(s.first_column[c.steps[0].pair], c.steps[0].sense) for c in own]
+        columns, senses = np.array(first, dtype=np.intp).T
+        power = senses[:, None, None] * (G * here.S[:, columns, None]).sum(axis=0)
+        forces = np.array([c.is_force for c in own])[:, None, None]
+        scales = (np.broadcast_to(s.row_scale, (s.n_rows, here.T))[s.graph.loop_rows + which] * s.par.L)[:, None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            size = np.where(forces, scales, s.coupling_matrix[which, columns][:, None] / power)
         # the first line serves the multipliers that make its force push, the second the others
-        turned = size[0] < 0.0
-        pick = np.where(turned, [[1], [0]], [[0], [1]])
-        places = np.arange(here.T)
-        G = np.stack([(line * size)[:, pick[i], places] for i in range(2)], axis=1)
-        points = np.stack([P[:, pick[i], places] for i in range(2)], axis=1)
-        return G, points, np.stack([np.abs(size[pick[i], places]) for i in range(2)])
+        turned = size[:, :1] < 0.0
+        G, P, size = (np.where(turned, part[..., ::-1, :], part) for part in (G * size, P, np.abs(size)))
+        return [(G[:, i], P[:, i], size[i]) for i in range(len(which))]
 
     def screws(self, g: int) -> tuple[Array, Array]:
         """Screws ``(6, T)`` of gears a and b in their turns (of a rack its slide) against their carrier."""
-        here, contact = self.here, self.here.system.m.couplings[g]
-        if isinstance(contact, Contact):
-            first, last = (here.S[:, column] for column in self._columns(contact)[[0, -1]])
-            return first, last
-        return LineRows(here.system, np.array([g])).screws(here.poses)
-
-    def _of_line(self, g: int) -> tuple[Array, Array, Array]:
-        """The same of a coupling along a line that the poses tell."""
-        here, row = self.here, self.here.system.graph.loop_rows + g
-        rows, coupling = LineRows(here.system, np.array([g])), here.system.m.couplings[g]
-        at = rows.lines(here.poses)
-        P, n = (np.repeat(part, 2, axis=1) for part in (at.point, at.along))
-        if isinstance(coupling, LineCoupling) and coupling.other is not None:
-            n[:, 1] = rows.lines(here.poses, other=True).along[:, 0]
-        per = np.broadcast_to(here.system.row_scale[row] * here.system.par.L, (2, here.T))
-        G = np.concatenate([cross(P, n), n]) * per
-        if here.system.m.planar:
-            G[np.delete(np.arange(6), here.system.graph.span)] = 0.0
-        return G, P, per
+        return LineRows(self.here.system, np.array([g])).screws(self.here.poses)
 
     def _acting(self, g: int, flank: Array) -> Mask:
         """Where the second line of a contact acts, by signs ``(n, T)`` of multipliers."""
@@ -209,18 +186,6 @@ class ContactLines:
                 for g in flips:
                     self.settled[g][t] = True
         return self.settled
-
-    def _lines(self, g: int, axes: Axes) -> Lines:
-        """Points and directions of the force; of variants with gears of their own those of each."""
-        own = self.here.system.par.items[g]
-        if len(own) == 1:
-            return own[0].lines(axes)
-        P, n = np.empty((3, 2, self.here.T)), np.empty((3, 2, self.here.T))
-        first, same = np.unique([id(gears) for gears in own], return_index=True, return_inverse=True)[1:]
-        for i, gears in enumerate(own[first]):
-            at = np.flatnonzero(same == i)
-            P[..., at], n[..., at] = gears.lines(axes.at(at))
-        return P, n
 
     def on_gear(self, multipliers: Array, flank: Array) -> list[Array]:
         """For every contact the wrench on gear b ``(6, ..., T)`` for multipliers ``(n, ..., T)`` of all couplings.

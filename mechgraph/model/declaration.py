@@ -37,7 +37,7 @@ from mechgraph.maths.inertia import physical
 from mechgraph.maths.se3 import IN_PLANE, IN_SPACE, Array
 from mechgraph.maths.tolerances import SHAPES
 from mechgraph.memo import Once, dataclass, of_graph
-from mechgraph.model.couplings import BaseCoupling, SpurGears, fitting_of
+from mechgraph.model.couplings import BaseCoupling, fitting_of
 from mechgraph.model.friction import LOADS
 from mechgraph.model.gears import GEARS
 from mechgraph.model.loads import Load
@@ -628,11 +628,10 @@ def _rim_faults(couplings: Iterable[BaseCoupling], m: Any) -> Iterator[str]:
 
     The meshes of one rim are compared with the first that leaves the module to the axes: the time is proportional to their number.
     """
-    rims: dict[tuple[str, float], list[tuple[SpurGears, str, float]]] = {}
+    rims: dict[tuple[str, float], list[tuple[Any, str, float]]] = {}
     for gears in couplings:
-        if isinstance(gears, SpurGears):
-            for q, teeth, helix in gears.rims:
-                rims.setdefault((m.full_name(q), teeth), []).append((gears, q, helix))
+        for q, teeth, helix in gears.rims:
+            rims.setdefault((m.full_name(q), teeth), []).append((gears, q, helix))
     for (_, teeth), meshes in rims.items():
         first = next((i for i, (gears, *_) in enumerate(meshes) if not gears.module), len(meshes))
         for i in range(len(meshes)) if first < len(meshes) else ():

@@ -15,7 +15,7 @@ from urllib.parse import quote
 
 from mechgraph.fields import FLAG, INTEGER, NUMBERS, OTHER, SIX, TABLE, TABLES, TEXT, FieldFormat, Formatted, Schema
 from mechgraph.model.belts import BeltDrive
-from mechgraph.model.couplings import COUPLINGS
+from mechgraph.model.couplings import BaseCoupling, Coupling
 from mechgraph.model.friction import LOADS
 from mechgraph.model.gears import GEARS
 from mechgraph.model.loads import ForceTable
@@ -24,6 +24,7 @@ from mechgraph.model.meshes import Mesh
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Misfit, Pair, Stiffness
 from mechgraph.model.response_setup import Event, ResponseSetup, Stop
+from mechgraph.model.short_forms import Belt, BevelGears, Rack, SpurGears, WormGear
 from mechgraph.model.synthesis_setup import SynthesisSetup, SynthesisTask
 from mechgraph.pairs.cam_laws import CamLaw, Segment
 from mechgraph.pairs.contact_types import Hertz
@@ -38,7 +39,9 @@ WRITABLE = {kind: curve for kind, curve in CURVES.items() if curve is not Functi
 """Curves that a file can hold."""
 WRITABLE_SURFACES = {kind: surface for kind, surface in SURFACES.items() if surface is not ByFunction}
 """The same of surfaces."""
-EVERY_COUPLING = {**COUPLINGS, Mesh.kind: Mesh, BeltDrive.kind: BeltDrive}
+EVERY_COUPLING: dict[str, type[BaseCoupling]] = {
+    one.kind: one for one in (Coupling, SpurGears, BevelGears, WormGear, Rack, Belt, Mesh, BeltDrive)
+}
 """Couplings by the names of their kinds."""
 KINDS: dict[str, Mapping[str, Any]] = {
     "load": LOADS,

@@ -14,9 +14,9 @@ import numpy as np
 
 from mechgraph.errors import DeclarationError
 from mechgraph.memo import dataclass
-from mechgraph.model.couplings import Axes, BaseCoupling, BevelGears, Rack, SpurGears
+from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.gears import Gear, GearRack, involute, tip_radius
-from mechgraph.model.meshes import Bevels, Mesh, Parallel, WithRack
+from mechgraph.model.meshes import Bevels, Mesh, Meshing, Parallel, WithRack
 from mechgraph.model.pair import Link, Pair
 from mechgraph.model.response_setup import Stop
 from mechgraph.quantities import door
@@ -71,7 +71,7 @@ class MeshFacts:
 
 @door
 def mesh_facts(m: Mechanism) -> dict[str, MeshFacts]:
-    """Return what every ``Mesh`` of a mechanism amounts to.
+    """Return what every mesh of a mechanism amounts to, of short forms too that say how many teeth there are.
 
     Parameters
     ----------
@@ -98,10 +98,10 @@ def mesh_facts(m: Mechanism) -> dict[str, MeshFacts]:
     """
     if not m.has_geometry:
         raise DeclarationError(f"mechanism {m.name!r}", ["has no geometry; meshes have facts at their places"])
-    return {c.name: _facts(m, c) for c in m.couplings if isinstance(c, Mesh)}
+    return {c.name: _facts(m, c) for c in m.couplings if isinstance(c, Meshing) and c.sized}
 
 
-def _facts(m: Mechanism, mesh: Mesh) -> MeshFacts:
+def _facts(m: Mechanism, mesh: Meshing) -> MeshFacts:
     met = mesh.seen(m)
     if isinstance(met, Parallel):
         return _parallel(met, mesh)
@@ -133,7 +133,7 @@ def _overlap(met: Any) -> float:
     return float(width * abs(sin(met.one.helix_angle)) / (pi * met.one.module))
 
 
-def _parallel(met: Parallel, mesh: Mesh) -> MeshFacts:
+def _parallel(met: Parallel, mesh: Meshing) -> MeshFacts:
     one, two, d, w = met.one, met.two, met.distance, met.working_angle
     inner = one.internal or two.internal
     tips, bases = _tips(met), (one.base_radius, two.base_radius)
@@ -208,7 +208,7 @@ def _inside(met: Parallel, tips: Any) -> Iterator[str]:
         )
 
 
-def _rack(met: WithRack, mesh: Mesh) -> MeshFacts:
+def _rack(met: WithRack, mesh: Meshing) -> MeshFacts:
     pinion, a = met.pinion, met.pinion.transverse_angle
     distance = -float((np.ravel(met.there.point - met.at.point)) @ np.ravel(met.there.mark))
     tip, contact = tip_radius(pinion), sum(_reaches_of_rack(met)) / (2 * pi * pinion.base_radius / pinion.teeth)
@@ -286,9 +286,11 @@ def mean_sliding(m: Mechanism, coupling: BaseCoupling) -> float | None:
     The same load on all teeth in contact. For contact ratios ``e = e_1 + e_2`` of 1 and more, no part above 1, it is ``p (1 - e + e_1^2 +
     e_2^2) / 2`` with the base pitch p: the loss of Niemann and Winter.
     """
-    of = coupling.seen(m) if isinstance(coupling, Mesh) else coupling
-    path = next((make for kind, make in PATHS.items() if isinstance(of, kind)), None)
-    return None if path is None else _mean_distance(*path(m, of))
+    met = coupling.seen(m) if isinstance(coupling, Meshing) else None
+    path = next((make for kind, make in PATHS.items() if isinstance(met, kind)), None)
+    if path is None or not isinstance(coupling, Meshing):
+        return None
+    return _mean_distance(*path(met)) if coupling.sized else float("nan")
 
 
 def _mean_distance(one: float, two: float, pitch: float) -> float:
@@ -308,45 +310,25 @@ Path = tuple[float, float, float]
 """How far both tips reach from the pitch point along the line of action, and the base pitch."""
 
 
-def _path_of_spur(m: Mechanism, c: SpurGears) -> Path:
-    """Of gears without profile shift."""
-    module, sides = c.module_in(m), [-1.0 if c.internal and z == max(c.teeth) else 1.0 for z in c.teeth]
-    w = atan(tan(c.pressure_angle) / cos(c.helix_angle))
-    radii = [module * z / (2 * cos(c.helix_angle)) for z in c.teeth]
-    return _standard(sides, radii, module, w, c.teeth[0])
-
-
-def _standard(sides: list[float], radii: list[float], module: float, w: float, teeth: float) -> Path:
-    bases = (sides[0] * radii[0] * cos(w), sides[1] * radii[1] * cos(w))
-    tips = (radii[0] + sides[0] * module, radii[1] + sides[1] * module)
-    return *_reaches(bases, tips, w), 2 * pi * radii[0] * cos(w) / teeth
-
-
-def _path_of_bevel(m: Mechanism, c: BevelGears, axes: Axes | None = None) -> Path:
+def _path_of_bevel(met: Bevels) -> Path:
     """Of the spur gears on the back cones (Tredgold), which turn against each other as the bevel gears do."""
-    axes = c.axes_in(m) if axes is None else axes
-    cones = c.cones(axes)
-    w = atan(tan(c.pressure_angle) / cos(c.spiral_angle))
+    one, cones = met.one, met.cones
+    w = atan(tan(one.pressure_angle) / cos(one.spiral_angle))
     sides = [float(np.sign(cos(cone))) for cone in cones]
-    radii = [c.module * z / (2 * abs(cos(cone))) for z, cone in zip(c.teeth, cones, strict=True)]
-    return _standard(sides, radii, c.module * cos(c.spiral_angle), w, c.teeth[0] / abs(cos(cones[0])))
+    radii = [one.module * gear.teeth / (2 * abs(cos(cone))) for gear, cone in zip((one, met.two), cones, strict=True)]
+    bases = (sides[0] * radii[0] * cos(w), sides[1] * radii[1] * cos(w))
+    tips = [r + side * one.module * cos(one.spiral_angle) for r, side in zip(radii, sides, strict=True)]
+    return *_reaches(bases, (tips[0], tips[1]), w), 2 * pi * radii[0] * cos(w) * abs(cos(cones[0])) / one.teeth
 
 
-def _path_of_parallel(m: Mechanism, met: Parallel) -> Path:
+def _path_of_parallel(met: Parallel) -> Path:
     bases = (met.one.base_radius, met.two.base_radius)
     return *_reaches(bases, _tips(met), met.working_angle), 2 * pi * abs(bases[0]) / met.one.teeth
 
 
-def _path_of_rack(m: Mechanism, met: WithRack) -> Path:
+def _path_of_rack(met: WithRack) -> Path:
     return *_reaches_of_rack(met), 2 * pi * met.pinion.base_radius / met.pinion.teeth
 
 
-PATHS: dict[type, Any] = {
-    SpurGears: _path_of_spur,
-    BevelGears: _path_of_bevel,
-    Rack: lambda m, c: (np.nan, np.nan, 1.0),
-    Parallel: _path_of_parallel,
-    WithRack: _path_of_rack,
-    Bevels: lambda m, met: _path_of_bevel(m, met.short, met.axes),
-}
+PATHS: dict[type, Any] = {Parallel: _path_of_parallel, WithRack: _path_of_rack, Bevels: _path_of_bevel}
 """Where teeth touch, of gears that do not slide at their pitch point."""

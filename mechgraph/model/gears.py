@@ -273,7 +273,7 @@ CROSSING = {side: partial(between_axes, side) for side in (1.0, -1.0)}
 # --- gears ---------------------------------------------------------------------------------------------------------------
 
 
-class _Placed(Described):
+class _OnLink(Described):
     """What gears and pulleys share: a place on a link."""
 
     kind: ClassVar[str]
@@ -304,7 +304,7 @@ class _Placed(Described):
         return found
 
 
-class _Toothed(_Placed):
+class _Toothed(_OnLink):
     """Gears."""
 
     def value_faults(self, where: str) -> list[str]:
@@ -486,7 +486,7 @@ class WormWheel(_Toothed):
 
 
 @dataclass(frozen=True)
-class Pulley(_Placed):
+class Pulley(_OnLink):
     """Declare a pulley or sprocket: a place on a link, for ``Mechanism(gears=[...])`` and the belts over it.
 
     Give ``radius``, to the middle of the belt, or ``teeth`` and ``pitch``: ``r = teeth pitch / (2 pi)``.

@@ -6,7 +6,7 @@ Source: G. Niemann and H. Winter, Maschinenelemente II, 2003, chapter 23 (planet
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 from math import atan, cos, pi, sin, tan
 from typing import Annotated, Any, ClassVar, Self
@@ -21,15 +21,11 @@ from mechgraph.maths.se3 import Array, cross, identity
 from mechgraph.memo import dataclass
 from mechgraph.model.couplings import (
     OF_TEETH,
-    Axes,
-    BevelGears,
     MeshStep,
-    WormGear,
     fitting_of,
     followed,
     meeting,
     plain_pairs,
-    teeth_lines,
     way,
 )
 from mechgraph.model.gears import (
@@ -58,8 +54,129 @@ from mechgraph.quantities import LENGTH, shown, unknown
 FLANKS = ("auto", "forward", "backward")
 
 
+class Meshing(LineCoupling):
+    """What meshes and the short forms of couplings share: two gears, or pulleys, where they meet.
+
+    The multiplier is the normal force, the relation one of freedoms where both turn on pairs R about their axes, on one carrier.
+    """
+
+    rubs: ClassVar[tuple[str, ...]] = OF_TEETH
+    held: ClassVar[tuple[bool, bool]] = (False, False)
+    """Which gears must not slide along their axes."""
+    sized: ClassVar[bool] = True
+    """Whether the sizes of its teeth are known."""
+    flank: str = "auto"
+    play: str = ""
+    backlash: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.read_numbers()
+        for name, value in (("terms", ()), ("constant", None), ("steps", ())):
+            object.__setattr__(self, name, value)
+
+    @abstractmethod
+    def _met(self, m: Any) -> Meeting:
+        """Both gears where they meet in a mechanism without faults."""
+
+    @abstractmethod
+    def _steps(self, m: Any) -> tuple[tuple[MeshStep, ...], bool]:
+        """The pairs on the way from a to b, and whether all of them are R or P."""
+
+    def seen(self, m: Any) -> Meeting:
+        """Both gears where they meet."""
+        known = m.once(_meetings)
+        if self not in known:
+            known[self] = self._met(m)
+        met: Meeting = known[self]
+        return met
+
+    def placed(self, m: Any) -> Self:
+        """See ``BaseCoupling``."""
+        steps, plain = self._steps(m)
+        if not m.has_geometry:
+            return self._put(m, steps, self._sketched(m, steps) if plain else None)
+        met = self.seen(m)
+        both = self.flank == "auto" or bool(self.play)
+        flanks = met.flanks(both or self.flank == "forward")
+        ends, coefficients = (met.one.place, met.two.place), None
+        if plain:
+            line = flanks[0](met.a, met.b, np.array(met.numbers)[:, None, None])
+            coefficients = self._coefficients(m, steps, line, ends)
+        if coefficients is not None and self.play:
+            coefficients[m.full_name(self.play)] = -1.0
+        known = {
+            "ends": ends,
+            "numbers": met.numbers,
+            "relation": flanks[0],
+            "period": met.period,
+            "held": met.held,
+            "other": flanks[1] if both else flanks[0],
+            "turning": tuple(not isinstance(gear, GearRack) for gear in (met.one, met.two)),
+        }
+        return self._put(m, steps, coefficients, **known)
+
+    def _sketched(self, m: Any, steps: tuple[MeshStep, ...]) -> dict[str, float]:
+        """Coefficients by freedom without geometry."""
+        return {name: 1.0 for step in steps for name in m.pairs[step.pair].freedom_names}
+
+    def _coefficients(
+        self, m: Any, steps: tuple[MeshStep, ...], line: LinesAt, ends: tuple[LinkPlace, LinkPlace]
+    ) -> dict[str, float] | None:
+        """Coefficients by freedom where every pair on the way turns about the axis of one of the gears, or slides along a rack."""
+        P, n = line.point[:, 0, 0], line.along[:, 0, 0]
+        met = self.seen(m)
+        racks = [isinstance(gear, GearRack) for gear in (met.one, met.two)]
+        forward, backward, _ = about_ends(m, steps, ends, racks)
+        if len(forward) + len(backward) < len(steps):
+            return None
+        powers = []
+        for place, rack in zip((met.a, met.b), racks, strict=True):
+            z, p = place.axis[:, 0, 0], place.point[:, 0, 0]
+            powers.append(float(n @ (z if rack else cross(z, P - p))))
+        powers[1] = float(np.copysign(powers[0] * met.ratio, powers[1]))
+        signs = [*((s, powers[0]) for s in forward), *((s, powers[1]) for s in reversed(backward))]
+        return {
+            m.pairs[step.pair].freedom_names[0]: step.sense * sign * power
+            for step, (sign, power) in zip(steps, signs, strict=True)
+        }
+
+    def strayed(self, a: LinePlaces, b: LinePlaces, a0: LinePlaces, b0: LinePlaces) -> Array:
+        """See ``LineCoupling``: the angle between the axes, and of those that cross their distance and where they are along them."""
+        if self.relation not in CROSSING.values():
+            lean = cross(a.axis, b.axis) if self.relation in CYLINDRICAL.values() else 0.0 * a.axis
+            return np.asarray(np.sqrt(dot(lean, lean)))
+        places = []
+        for p, q in ((a, b), (a0, b0)):
+            foot_a, foot_b, w = feet(p, q)
+            apart = dot(q.point - p.point, w)
+            places.append((dot(p.axis, q.axis), apart, dot(foot_a - p.point, p.axis), dot(foot_b - q.point, q.axis)))
+        found = [now - then for now, then, held in zip(*places, (True, True, *self.held), strict=True) if held]
+        return np.asarray(np.abs(found).max(axis=0))
+
+    def in_own_units(self, units: Any, turns: Any) -> Self:
+        """See ``BaseCoupling``."""
+        return self.without_quantities(units)
+
+    def converted(self, base: tuple[float, float, float], turns: Any) -> Self:
+        """See ``BaseCoupling``."""
+        return self.in_units(base)
+
+
+def about_ends(
+    m: Any, steps: tuple[MeshStep, ...], ends: tuple[LinkPlace, LinkPlace], racks: Sequence[bool]
+) -> tuple[list[float], list[float], float]:
+    """The senses of the pairs of a way that turn about the axis of its first place (slide along it, of a rack), and of those that do so
+    about its last one, this one first; by how much the next one is off the first axis.
+    """
+    axes = [(np.asarray(end.point, dtype=float), np.asarray(end.axis)) for end in ends]
+    motions = ["slide" if rack else "turn" for rack in racks]
+    _, _, forward, off = followed(m, steps, *axes[0], fitting_of(m), motions[0])
+    back = tuple(MeshStep(step.pair, -step.sense) for step in reversed(steps[len(forward) :]))
+    return forward, followed(m, back, *axes[1], fitting_of(m), motions[1])[2], off
+
+
 @dataclass(frozen=True)
-class Mesh(LineCoupling):
+class Mesh(Meshing):
     """Declare that two gears mesh: on parallel axes (also inside each other), crossing ones, intersecting ones, a worm, a rack.
 
     The relation is dual to the force, ``n . (v_b - v_a) = 0`` at the pitch point along the line of action, whatever the bearings are; its
@@ -81,7 +198,6 @@ class Mesh(LineCoupling):
     """
 
     kind: ClassVar[str] = "mesh"
-    rubs: ClassVar[tuple[str, ...]] = OF_TEETH
     name: Annotated[str, TEXT("name", default="g1, g2, ...")]
     a: Annotated[str, TEXT("the first gear")]
     b: Annotated[str, TEXT("the second gear")]
@@ -105,14 +221,6 @@ class Mesh(LineCoupling):
             default="none",
         ),
     ] = ""
-
-    held: ClassVar[tuple[bool, bool]] = (False, False)
-    """Which gears must not slide along their axes."""
-
-    def __post_init__(self) -> None:
-        self.read_numbers()
-        for name, value in (("terms", ()), ("constant", None), ("steps", ())):
-            object.__setattr__(self, name, value)
 
     # --- in a mechanism ----------------------------------------------------------------------------------------------
 
@@ -148,16 +256,10 @@ class Mesh(LineCoupling):
             "its flanks part where both gears turn on pairs R about their axes, or slide on P; leave backlash out, or hold the centers"
         ]
 
-    def seen(self, m: Any) -> Meeting:
-        """Both gears where they meet."""
-        known = m.once(_meetings)
-        if (self.a, self.b) not in known:
-            one, two = self.pair_of(m)
-            steps = self._steps(m)[0]
-            places = one.place.seen(identity()), two.place.seen(pose_along(m, steps))
-            known[self.a, self.b] = _KINDS[one.kind, two.kind](one, two, *places)
-        met: Meeting = known[self.a, self.b]
-        return met
+    def _met(self, m: Any) -> Meeting:
+        """See ``Meshing``."""
+        one, two = self.pair_of(m)
+        return met_at(one, two, pose_along(m, self._steps(m)[0]))
 
     def _steps(self, m: Any) -> tuple[tuple[MeshStep, ...], bool]:
         """The pairs on the way from a to b, and whether all of them are R or P."""
@@ -168,78 +270,6 @@ class Mesh(LineCoupling):
         found = way(m, m.once(meeting), one.link, two.link)
         assert found is not None
         return found, False
-
-    def placed(self, m: Any) -> Self:
-        """See ``BaseCoupling``."""
-        steps, plain = self._steps(m)
-        one, two = self.pair_of(m)
-        if not m.has_geometry:
-            names = [m.pairs[step.pair].freedom_names for step in steps]
-            ones = {name: 1.0 for some in names for name in some}
-            return self._put(m, steps, ones if plain else None, ends=(one.place, two.place))
-        met = self.seen(m)
-        both = self.flank == "auto" or bool(self.play)
-        flanks = met.flanks(both or self.flank == "forward")
-        ends, coefficients = (one.place, two.place), None
-        if plain:
-            line = flanks[0](met.a, met.b, np.array(met.numbers)[:, None, None])
-            coefficients = self._coefficients(m, steps, line, ends)
-        if coefficients is not None and self.play:
-            coefficients[m.full_name(self.play)] = -1.0
-        known = {
-            "ends": ends,
-            "numbers": met.numbers,
-            "relation": flanks[0],
-            "period": met.period,
-            "held": met.held,
-            "other": flanks[1] if both else flanks[0],
-            "turning": tuple(not isinstance(gear, GearRack) for gear in (one, two)),
-        }
-        return self._put(m, steps, coefficients, **known)
-
-    def _coefficients(
-        self, m: Any, steps: tuple[MeshStep, ...], line: LinesAt, ends: tuple[LinkPlace, LinkPlace]
-    ) -> dict[str, float] | None:
-        """Coefficients by freedom where every pair on the way turns about the axis of one of the gears, or slides along a rack."""
-        P, n = line.point[:, 0, 0], line.along[:, 0, 0]
-        racks = [isinstance(gear, GearRack) for gear in self.pair_of(m)]
-        axes = [(np.asarray(end.point, dtype=float), np.asarray(end.axis)) for end in ends]
-        motions = ["slide" if rack else "turn" for rack in racks]
-        forward = followed(m, steps, *axes[0], fitting_of(m), motions[0])[2]
-        back = tuple(MeshStep(step.pair, -step.sense) for step in reversed(steps[len(forward) :]))
-        backward = followed(m, back, *axes[1], fitting_of(m), motions[1])[2]
-        if len(forward) + len(backward) < len(steps):
-            return None
-        met, powers = self.seen(m), []
-        for place, rack in zip((met.a, met.b), racks, strict=True):
-            z, p = place.axis[:, 0, 0], place.point[:, 0, 0]
-            powers.append(float(n @ (z if rack else cross(z, P - p))))
-        signs = [*((s, powers[0]) for s in forward), *((s, powers[1]) for s in reversed(backward))]
-        return {
-            m.pairs[step.pair].freedom_names[0]: step.sense * sign * power
-            for step, (sign, power) in zip(steps, signs, strict=True)
-        }
-
-    def strayed(self, a: LinePlaces, b: LinePlaces, a0: LinePlaces, b0: LinePlaces) -> Array:
-        """See ``LineCoupling``: the angle between the axes, and of those that cross their distance and where they are along them."""
-        if self.relation not in CROSSING.values():
-            lean = cross(a.axis, b.axis) if self.relation in CYLINDRICAL.values() else 0.0 * a.axis
-            return np.asarray(np.sqrt(dot(lean, lean)))
-        places = []
-        for p, q in ((a, b), (a0, b0)):
-            foot_a, foot_b, w = feet(p, q)
-            apart = dot(q.point - p.point, w)
-            places.append((dot(p.axis, q.axis), apart, dot(foot_a - p.point, p.axis), dot(foot_b - q.point, q.axis)))
-        found = [now - then for now, then, held in zip(*places, (True, True, *self.held), strict=True) if held]
-        return np.asarray(np.abs(found).max(axis=0))
-
-    def in_own_units(self, units: Any, turns: Any) -> Self:
-        """See ``BaseCoupling``."""
-        return self.without_quantities(units)
-
-    def converted(self, base: tuple[float, float, float], turns: Any) -> Self:
-        """See ``BaseCoupling``."""
-        return self.in_units(base)
 
 
 def _reached(m: Any) -> set[str]:
@@ -252,7 +282,7 @@ def _reached(m: Any) -> set[str]:
     return out
 
 
-def _meetings(m: Any) -> dict[tuple[str, str], Meeting]:
+def _meetings(m: Any) -> dict[Meshing, Meeting]:
     """Where gears meet, as far as it was asked for."""
     return {}
 
@@ -293,14 +323,9 @@ class Meeting(ABC):
         return self.faults
 
     @property
-    def in_order(self) -> tuple[Any, Any]:
-        """Both gears as their short form names them."""
-        return self.one, self.two
-
-    @property
-    def short(self) -> Any:
-        """The short form of the coupling, where that says as much, else None."""
-        return None
+    def ratio(self) -> float:
+        """By what the motion of a is greater than that of b."""
+        return float(self.two.teeth / self.one.teeth)
 
     def _base_pitches(self, fitting: float) -> Iterator[str]:
         one, two = self.one, self.two
@@ -454,6 +479,11 @@ class WithRack(Meeting):
         self.numbers = (base, self.pinion.radius, base * self.pinion.base_lean, *halves)
         self.period = self.pinion.base_pitch
 
+    @property
+    def ratio(self) -> float:
+        """See ``Meeting``: of a turn and a slide."""
+        return float(self.pinion.radius**-self.sign)
+
     def flanks(self, forward: bool) -> tuple[Relation, Relation]:
         """See ``Meeting``."""
         order = (1.0, -1.0) if forward else (-1.0, 1.0)
@@ -488,27 +518,44 @@ class WithRack(Meeting):
         return [*found, *_apart(pinion, rack, float(dot(d, z)[0, 0]))]
 
 
+def teeth_lines(P: Array, away: Array, trace: Array, pressure_angle: float) -> tuple[Array, Array, Array]:
+    """A pitch point and the normals of both flanks there ``(3,)``, at the pressure angle to the pitch plane, across the ``trace`` of teeth.
+
+    ``away``: from gear a to gear b, at right angles to the pitch plane.
+    """
+    over = np.cross(away, trace)
+    over, out = cos(pressure_angle) * over / np.linalg.norm(over), sin(pressure_angle) * away
+    return P, out + over, out - over
+
+
 class Still(Meeting):
     """Axes that keep their places: the line stands still between them."""
 
     def __init__(self, one: Any, two: Any, a: LinePlaces, b: LinePlaces) -> None:
         super().__init__(one, two, a, b)
-        self.axes = Axes(a.point[:, 0], a.axis[:, 0], b.point[:, 0], b.axis[:, 0])
+        self.za, self.zb, self.pa, self.pb = (v[:, 0, 0] for v in (a.axis, b.axis, a.point, b.point))
+        n = cross(self.za, self.zb)
+        if n.any():
+            self.feet = [v[:, 0, 0] for v in feet(a, b)]
         if not self.faults and not self.misfits(1e-3):
             self._lay(*self.lines())
 
-    @abstractmethod
-    def lines(self) -> tuple[Array, Array]:
-        """Points and directions ``(3, 2, 1)`` of the force on b, for both flanks."""
+    @property
+    def apart(self) -> float:
+        """How far axis b passes axis a, along the direction across both."""
+        return float((self.pb - self.pa) @ self.feet[2])
 
-    def _lay(self, P: Array, n: Array) -> None:
-        za, (foot, w) = self.axes.za[:, 0], (part[:, 0] for part in self.axes.perpendicular[:2])
-        frame, at = np.stack([za, w, np.cross(za, w)]), P[:, 0, 0]
-        push = [n[:, i, 0] for i in range(2)]
-        powers = [float(v @ np.cross(za, at - foot)) for v in push]
+    @abstractmethod
+    def lines(self) -> tuple[Array, Array, Array]:
+        """A point and the directions ``(3,)`` of the force on b, for both flanks."""
+
+    def _lay(self, P: Array, *push: Array) -> None:
+        foot, _, w = self.feet
+        frame = np.stack([self.za, w, np.cross(self.za, w)])
+        powers = [float(v @ np.cross(self.za, P - foot)) for v in push]
         first = int(powers[1] > powers[0])
         both = push[first], -push[1 - first]
-        self.numbers = (1.0, *(frame @ (at - foot)), *(frame @ both[0]), *(frame @ both[1]))
+        self.numbers = (1.0, *(frame @ (P - foot)), *(frame @ both[0]), *(frame @ both[1]))
         self.period = abs(powers[first]) * 2 * pi / self.one.teeth
 
     def flanks(self, forward: bool) -> tuple[Relation, Relation]:
@@ -520,14 +567,12 @@ class Still(Meeting):
 class Crossed(Still):
     """Helical gears on axes that cross (screw gears)."""
 
-    def _laid(self) -> tuple[Array, float, Array, float]:
-        """From axis a to axis b, their distance, the teeth of a where they touch, and the helix angle of b that fits these."""
-        za, zb, (_, w, apart) = self.axes.za[:, 0], self.axes.zb[:, 0], self.axes.perpendicular
-        off = float(apart[0])
-        away = w[:, 0] * (1.0 if off >= 0 else -1.0)
-        trace = cos(self.one.helix_angle) * za + sin(self.one.helix_angle) * np.cross(za, away)
-        x, y = float(trace @ zb), float(trace @ np.cross(zb, -away))
-        return away, abs(off), trace, atan(y / x) if x else pi / 2
+    def _laid(self) -> tuple[Array, Array, float]:
+        """From axis a to axis b, the teeth of a where they touch, and the helix angle of b that fits these."""
+        away = self.feet[2] * (1.0 if self.apart >= 0 else -1.0)
+        trace = cos(self.one.helix_angle) * self.za + sin(self.one.helix_angle) * np.cross(self.za, away)
+        x, y = float(trace @ self.zb), float(trace @ np.cross(self.zb, -away))
+        return away, trace, atan(y / x) if x else pi / 2
 
     def misfits(self, fitting: float) -> list[str]:
         """See ``Meeting``."""
@@ -535,7 +580,7 @@ class Crossed(Still):
         if one.internal or two.internal:
             return ["gears on crossing axes have their teeth outside"]
         found = list(self._base_pitches(fitting))
-        _, distance, _, helix = self._laid()
+        helix, distance = self._laid()[2], abs(self.apart)
         if abs(helix - two.helix_angle) > fitting:
             found.append(
                 f"the axes of {one.name!r} and {two.name!r} cross; the teeth of {two.name!r} would need the helix angle {helix:.7g}, not "
@@ -548,11 +593,11 @@ class Crossed(Still):
             )
         return found
 
-    def lines(self) -> tuple[Array, Array]:
+    def lines(self) -> tuple[Array, Array, Array]:
         """See ``Still``."""
-        away, _, trace, _ = self._laid()
-        P = self.axes.perpendicular[0][:, 0] + away * (self.one.radius + self.one.module * self.one.shift)
-        return teeth_lines(P[:, None], away[:, None], trace[:, None], self.one.pressure_angle)
+        away, trace, _ = self._laid()
+        P = self.feet[0] + away * (self.one.radius + self.one.module * self.one.shift)
+        return teeth_lines(P, away, trace, self.one.pressure_angle)
 
 
 def _cylinders(one: Any, two: Any, a: LinePlaces, b: LinePlaces) -> Meeting:
@@ -578,14 +623,6 @@ class Bevels(Still):
 
     held = (True, True)
 
-    @property
-    def short(self) -> BevelGears:
-        """See ``Meeting``."""
-        one, two = self.one, self.two
-        return BevelGears(
-            "", one.name, two.name, (one.teeth, two.teeth), one.module, one.pressure_angle, one.spiral_angle
-        )
-
     def _unlike(self) -> Iterator[str]:
         one, two = self.one, self.two
         for name, wanted in (
@@ -596,26 +633,50 @@ class Bevels(Still):
             if abs(getattr(two, name) - wanted) > 1e-9 * (1.0 + abs(wanted)):
                 yield f"{two.name!r} has {name} = {getattr(two, name):.7g}; at {one.name!r} {wanted:.7g} meshes"
 
+    @property
+    def towards(self) -> tuple[Array, Array]:
+        """The axes from the apex towards both gears."""
+        sides = ((self.pa, self.za), (self.pb, self.zb))
+        ea, eb = (z * np.sign((p - self.feet[0]) @ z) for p, z in sides)
+        return ea, eb
+
+    @property
+    def cones(self) -> tuple[float, float]:
+        """Half the angles of both pitch cones."""
+        ea, eb = self.towards
+        shaft = float(np.arccos(np.clip(ea @ eb, -1.0, 1.0)))
+        first = float(np.arctan2(sin(shaft), self.two.teeth / self.one.teeth + cos(shaft)))
+        return first, shaft - first
+
     def misfits(self, fitting: float) -> list[str]:
         """See ``Meeting``."""
-        found = self.faults or self.short.misfits(self.axes, fitting)
-        if found:
-            return found
-        apex = self.axes.perpendicular[0]
-        ea, eb = (
-            z * np.sign(dot(p - apex, z)) for p, z in ((self.axes.pa, self.axes.za), (self.axes.pb, self.axes.zb))
-        )
-        shaft = float(np.arccos(np.clip(dot(ea, eb)[0], -1.0, 1.0)))
-        out = []
-        for gear, mate in ((self.one, self.two), (self.two, self.one)):
-            cone = float(np.arctan2(sin(shaft), mate.teeth / gear.teeth + cos(shaft)))
+        one, two = self.one, self.two
+        if self.faults:
+            return self.faults
+        if np.abs(cross(self.za, self.zb)).max() < 1e-3:
+            return ["the axes are parallel; bevel gears are on axes that intersect"]
+        away = [float(np.abs(p - self.feet[0]).max()) for p in (self.pa, self.pb)]
+        if abs(self.apart) > fitting * max(*away, one.module):
+            return [f"the axes pass each other at {abs(self.apart):.4g}; bevel gears are on axes that intersect"]
+        out = [
+            f"the point of {gear.name!r} is where the axes intersect; give one on the side of the apex on which the gear stands"
+            for gear, far in zip((one, two), away, strict=True)
+            if far <= fitting * one.module
+        ]
+        for gear, cone in zip((one, two), self.cones if not out else (), strict=not out):
             if gear.cone is not None and abs(gear.cone - cone) > fitting:
                 out.append(f"{gear.name!r} has the cone {gear.cone:.7g}; its teeth and axes ask for {cone:.7g}")
         return out
 
-    def lines(self) -> tuple[Array, Array]:
+    def lines(self) -> tuple[Array, Array, Array]:
         """See ``Still``."""
-        return self.short.lines(self.axes)
+        (ea, eb), (angle, _), spiral = self.towards, self.cones, self.one.spiral_angle
+        side = eb - ea * (ea @ eb)
+        side = side / np.linalg.norm(side)
+        line = cos(angle) * ea + sin(angle) * side
+        P = self.feet[0] + line * (self.one.module * self.one.teeth / 2 / sin(angle))
+        trace = cos(spiral) * line + sin(spiral) * np.cross(self.za, side) * np.sign(ea @ self.za)
+        return teeth_lines(P, cos(angle) * side - sin(angle) * ea, trace, self.one.pressure_angle)
 
 
 class Worms(Still):
@@ -632,29 +693,28 @@ class Worms(Still):
 
     @property
     def in_order(self) -> tuple[Any, Any]:
-        """See ``Meeting``."""
+        """The worm and its wheel."""
         return (self.one, self.two) if self._sign > 0 else (self.two, self.one)
-
-    @property
-    def short(self) -> WormGear:
-        """See ``Meeting``."""
-        worm, wheel = self.in_order
-        teeth = worm.teeth, wheel.teeth
-        return WormGear("", worm.name, wheel.name, teeth, worm.radius, worm.pressure_angle, worm.left_hand)
-
-    @property
-    def _ordered(self) -> Axes:
-        x = self.axes
-        return x if self._sign > 0 else Axes(x.pb, x.zb, x.pa, x.za)
 
     def misfits(self, fitting: float) -> list[str]:
         """See ``Meeting``."""
-        return self.short.misfits(self._ordered, fitting)
+        cosine, radius = abs(float(self.za @ self.zb)), self.in_order[0].radius
+        if cosine > fitting:
+            degrees = np.rad2deg(np.arccos(min(cosine, 1.0)))
+            return [f"the axes cross at {degrees:.5g} degrees; a worm and its wheel at 90"]
+        if abs(self.apart) <= radius:
+            return [f"the axes are {abs(self.apart):.7g} apart; expected more than the radius of the worm, {radius:g}"]
+        return []
 
-    def lines(self) -> tuple[Array, Array]:
+    def lines(self) -> tuple[Array, Array, Array]:
         """See ``Still``."""
-        P, n = self.short.lines(self._ordered)
-        return P, self._sign * n
+        worm, wheel = self.in_order
+        z, foot = (self.za, self.feet[0]) if self._sign > 0 else (self.zb, self.feet[1])
+        away, r = self.feet[2] * np.sign(self.apart) * self._sign, worm.radius
+        t = np.cross(z, away) * (-1.0 if worm.left_hand else 1.0)
+        lead = np.arctan2((abs(self.apart) - r) * worm.teeth, wheel.teeth * r)
+        P, *push = teeth_lines(foot + r * away, away, cos(lead) * t + sin(lead) * z, worm.pressure_angle)
+        return P, self._sign * push[0], self._sign * push[1]
 
 
 _KINDS: dict[tuple[str, str], Any] = {
@@ -665,6 +725,12 @@ _KINDS: dict[tuple[str, str], Any] = {
     ("worm", "worm_wheel"): Worms,
     ("worm_wheel", "worm"): Worms,
 }
+
+
+def met_at(one: Any, two: Any, pose: Array) -> Meeting:
+    """Two gears where they meet, the link of the second with a pose in the frame of that of the first."""
+    met: Meeting = _KINDS[one.kind, two.kind](one, two, one.place.seen(identity()), two.place.seen(pose))
+    return met
 
 
 def _words_of_kinds(kind: str) -> str:

@@ -15,9 +15,9 @@ from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import MOTIONS
 from mechgraph.memo import dataclass
 from mechgraph.model.belts import BeltCourse, BeltDrive
-from mechgraph.model.couplings import Belt
 from mechgraph.model.friction import WAYS, Friction, coupling_of
 from mechgraph.model.pair import Pair
+from mechgraph.model.short_forms import Belt
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.quantities import FORCE, LENGTH, MOMENT, POWER, ByName, is_numeric, unit_of
 from mechgraph.result.trajectory import Trajectory
@@ -401,7 +401,7 @@ class CouplingResult(Shown):
         if not isinstance(c, Belt):
             raise DeclarationError(f"coupling {c.name!r}", ["is no belt, which alone has a slip_margin"])
         load, force = friction_of(values, c.name), np.linalg.norm(self.force, axis=-1)
-        return margin_to_slip(load, c.wrap(c.axes_in(values.whole)), force, np.zeros_like(force))
+        return margin_to_slip(load, c.wrap_in(values.whole), force, np.zeros_like(force))
 
     @property
     def moment(self) -> Array:

@@ -18,18 +18,16 @@ import numpy as np
 from mechgraph.maths.se3 import Array
 from mechgraph.memo import dataclass
 from mechgraph.model.belts import BeltDrive, course
-from mechgraph.model.couplings import Axes, Belt, BevelGears, Contact, Rack, SpurGears, WormGear
-from mechgraph.model.gears import Gear, GearRack, Pulley
+from mechgraph.model.gears import BevelGear, Gear, GearRack, Pulley, Worm, WormWheel
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.meshes import Mesh
+from mechgraph.model.meshes import Mesh, Meshing
+from mechgraph.model.short_forms import Belt
 from mechgraph.show.shapes import Shape, polyline
 
 TIP, ROOT, RIM = 1.0, 1.25, 1.6
 """Heights of teeth over and below the pitch line, and thickness of what bears them, over the module."""
 FLANK, AROUND, ARC, TEETH_IN_A_ROW = 5, 64, 25, 24
 """Points along a flank, around a circle, and along a belt on a pulley; teeth of a rack that are drawn."""
-SHOWN_TEETH = 20
-"""Teeth of a pinion of which only the radius is declared."""
 READABLE = 8.0
 """Pixels from which on a tooth is drawn as one."""
 
@@ -349,35 +347,31 @@ def gears_of(m: Mechanism, poses: Mapping[str, Array]) -> tuple[list[Wheel], lis
         own.append(len(wheels) - 1)
         return own[-1]
 
-    named, seats = {}, {}
-    for gear in m.gears:
-        seats[gear.name] = _placed_seat(gear, poses)
-        if type(gear) in PLACED:
-            named[gear.name] = number(PLACED[type(gear)](gear, seats[gear.name]))
+    named = {
+        gear.name: number(PLACED[type(gear)](gear, _seat(gear, poses))) for gear in m.gears if type(gear) in PLACED
+    }
     for c in m.couplings:
         if isinstance(c, BeltDrive) and c.span == c.tight[0]:
             over = tuple(named[name] for name in c.over)
             belts.append(DrawnBelt(c.belt, over, tuple(c.senses.tolist()), c.span_names))
-        elif isinstance(c, Mesh):
-            one, two = c.pair_of(m)
-            ends = [end.seen(poses[end.link]) for end in c.ends]
+        elif isinstance(c, Meshing):
+            met, ends = c.seen(m), [end.seen(poses[end.link]) for end in c.ends]
             P = c.relation(ends[0], ends[1], np.array(c.numbers)[:, None, None]).point[:, 0, 0]
-            if (said := (met := c.seen(m)).short) is not None:  # the size of one follows from the other
-                drawn = DRAWN[type(said)](said, P, *(seats[gear.name] for gear in met.in_order))
-                for gear, wheel in zip(met.in_order, drawn, strict=True):
-                    named[gear.name] = number(replace(wheel, name=gear.name, marked=gear.mark is not None))
-            meshes.append(
-                _mesh(named[c.a], named[c.b], P, next(seats[g.name] for g in (one, two) if not isinstance(g, GearRack)))
-            )
-        elif isinstance(c, Contact):
-            own = [_seat(m, poses, q, link) for q, link in zip((c.a, c.b), c.gears(m), strict=True)]
-            p, z, q, w = (v[:, None] for seat in own for v in (seat.point, seat.axes[:, 2]))
-            P = c.lines(Axes(p, z, q, w))[0][:, 0, 0]
-            i, j = (number(wheel) for wheel in DRAWN[type(c)](c, P, *own))
+            both = {gear: _seat(gear, poses) for gear in (met.one, met.two)}
+            if isinstance(c, Mesh):
+                names = dict(zip(both, (c.a, c.b), strict=True))
+            else:
+                names = dict(zip(both, (f"{c.name}.a", f"{c.name}.b"), strict=True))
+            drawn = {gear: PLACED[type(gear)](gear, seat) for gear, seat in both.items() if type(gear) in PLACED}
+            if (made := SIZED.get(tuple(map(type, both)))) is not None:  # the size of one follows from the other
+                drawn = dict(zip(both, made(P, *both.items()), strict=True))
+            i, j = (number(replace(wheel, name=names[gear])) for gear, wheel in drawn.items())
             if isinstance(c, Belt):
                 belts.append(DrawnBelt(c.name, (i, j), (1.0, -1.0 if c.crossed else 1.0)))
             else:
-                meshes.append(_mesh(i, j, P, own[0]))
+                meshes.append(
+                    _mesh(i, j, P, next(seat for gear, seat in both.items() if not isinstance(gear, GearRack)))
+                )
     return interleaved(wheels, meshes, poses), meshes, belts
 
 
@@ -387,7 +381,7 @@ def _mesh(a: int, b: int, P: Array, seat: WheelSeat) -> DrawnMesh:
     return DrawnMesh(a, b, P, along / np.linalg.norm(along))
 
 
-def _placed_seat(gear: Any, poses: Mapping[str, Array]) -> WheelSeat:
+def _seat(gear: Any, poses: Mapping[str, Array]) -> WheelSeat:
     place = gear.place
     pose, z, x = poses[place.link], np.asarray(place.axis), np.asarray(place.mark)
     axes = np.column_stack([x, np.cross(z, x), z])
@@ -433,12 +427,6 @@ PLACED: dict[type[Any], Callable[[Any, WheelSeat], Wheel]] = {Gear: _cylindrical
 """Wheels of gears that say all of themselves."""
 
 
-def _seat(m: Mechanism, poses: Mapping[str, Array], freedom: str, link: str) -> WheelSeat:
-    pair = m.pairs[m.freedom(freedom)[0]]
-    X, pose = pair.markers[int(pair.b == link)].pose(), poses[link]
-    return WheelSeat(link, pose, pose[:, :3] @ X[:, 3] + pose[:, 3], pose[:, :3] @ X[:, :3])
-
-
 def _foot(seat: WheelSeat, P: Array) -> tuple[Array, float]:
     """The middle of the wheel that has a pitch point, and its radius."""
     z = seat.axes[:, 2]
@@ -446,69 +434,39 @@ def _foot(seat: WheelSeat, P: Array) -> tuple[Array, float]:
     return at, float(np.linalg.norm(P - at))
 
 
-def _spur(c: Any, P: Array, *seats: WheelSeat) -> Iterator[Wheel]:
-    for k, seat in enumerate(seats):
-        at, r = _foot(seat, P)
-        teeth, helix = c.teeth[k], c.rims[k][2]
-        more = {"pressure": c.pressure_angle, "helix": helix, "internal": c.internal and teeth == max(c.teeth)}
-        yield seat.wheel(f"{c.name}.{'ab'[k]}", at, seat.axes, teeth, r, 2 * r * np.cos(helix) / teeth, **more)
-
-
-def _bevel(c: Any, P: Array, *seats: WheelSeat) -> Iterator[Wheel]:
-    (p, z), (q, w) = ((seat.point, seat.axes[:, 2]) for seat in seats)
+def _bevels(P: Array, *of: tuple[Any, WheelSeat]) -> Iterator[Wheel]:
+    (p, z), (q, w) = ((seat.point, seat.axes[:, 2]) for _, seat in of)
     apex = p + np.linalg.lstsq(np.stack([z, -w], axis=1), q - p)[0][0] * z
-    for k, seat in enumerate(seats):
+    for gear, seat in of:
         at, r = _foot(seat, P)
         side = np.sign((at - apex) @ seat.axes[:, 2]) or 1.0
         cone = np.arctan2(r, abs((at - apex) @ seat.axes[:, 2]))
-        more = {"pressure": c.pressure_angle, "helix": (-1.0) ** k * c.spiral_angle, "cone": float(cone)}
-        yield seat.wheel(
-            f"{c.name}.{'ab'[k]}", at, seat.axes @ np.diag([1.0, side, side]), c.teeth[k], r, c.module, **more
-        )
+        more = {"pressure": gear.pressure_angle, "helix": gear.spiral_angle, "cone": float(cone)}
+        axes = seat.axes @ np.diag([1.0, side, side])
+        yield seat.wheel(gear.name, at, axes, gear.teeth, r, gear.module, marked=gear.mark is not None, **more)
 
 
-def _worm(c: Any, P: Array, worm: WheelSeat, wheel: WheelSeat) -> Iterator[Wheel]:
-    at, r = _foot(wheel, P)
-    axial, hand = 2 * r / c.teeth[1], -1.0 if c.left_hand else 1.0
-    lead = np.arctan2(axial * c.teeth[0], 2 * c.radius)
-    m, reach = (
-        axial * np.cos(lead),
-        2 * np.sqrt(2 * r * axial),
-    )  # as long as the tips of the wheel reach into it, and some more
-    more = {"pressure": c.pressure_angle, "helix": hand * (np.pi / 2 - lead), "length": reach + 2 * axial}
-    yield worm.wheel(f"{c.name}.a", _foot(worm, P)[0], worm.axes, c.teeth[0], c.radius, m, **more)
-    yield wheel.wheel(
-        f"{c.name}.b",
-        at,
-        wheel.axes,
-        c.teeth[1],
-        r,
-        m,
-        pressure=c.pressure_angle,
-        helix=hand * lead,
-        width=1.4 * c.radius,
+def _worm(P: Array, of_worm: tuple[Any, WheelSeat], of_wheel: tuple[Any, WheelSeat]) -> Iterator[Wheel]:
+    (worm, seat), (wheel, there) = of_worm, of_wheel
+    at, r = _foot(there, P)
+    axial, hand = 2 * r / wheel.teeth, -1.0 if worm.left_hand else 1.0
+    lead = np.arctan2(axial * worm.teeth, 2 * worm.radius)
+    m = axial * np.cos(lead)
+    long = 2 * np.sqrt(2 * r * axial) + 2 * axial  # as the tips of the wheel reach into it, and some more
+    more = {"pressure": worm.pressure_angle, "marked": worm.mark is not None}
+    helix = hand * (np.pi / 2 - lead)
+    yield seat.wheel(
+        worm.name, _foot(seat, P)[0], seat.axes, worm.teeth, worm.radius, m, helix=helix, length=long, **more
     )
+    more["marked"] = wheel.mark is not None
+    yield there.wheel(wheel.name, at, there.axes, wheel.teeth, r, m, helix=hand * lead, width=1.4 * worm.radius, **more)
 
 
-def _rack(c: Any, P: Array, pinion: WheelSeat, rack: WheelSeat) -> Iterator[Wheel]:
-    at, x = _foot(pinion, P)[0], rack.axes[:, 2]
-    y, module = (at - P) / np.linalg.norm(at - P), 2 * c.radius / SHOWN_TEETH
-    row = np.column_stack([x, y, np.cross(x, y)])
-    yield pinion.wheel(f"{c.name}.a", at, pinion.axes, SHOWN_TEETH, c.radius, module, pressure=c.pressure_angle)
-    yield rack.wheel(
-        f"{c.name}.b", P, row, 1, np.inf, module, pressure=c.pressure_angle, length=TEETH_IN_A_ROW * np.pi * module
-    )
+def _wheel_first(P: Array, *of: tuple[Any, WheelSeat]) -> Iterator[Wheel]:
+    return reversed([*_worm(P, *of[::-1])])
 
 
-def _pulleys(c: Any, P: Array, *seats: WheelSeat) -> Iterator[Wheel]:
-    for k, seat in enumerate(seats):
-        z = seat.axes[:, 2]
-        yield seat.wheel(
-            f"{c.name}.{'ab'[k]}", seat.point + ((P - seat.point) @ z) * z, seat.axes, 0, c.radii[k], 0.05 * c.radii[k]
-        )
-
-
-DRAWN: dict[type[Contact], Callable[..., Iterator[Wheel]]] = {
-    SpurGears: _spur, BevelGears: _bevel, WormGear: _worm, Rack: _rack, Belt: _pulleys,
+SIZED: dict[tuple[type, ...], Callable[..., Iterator[Wheel]]] = {
+    (BevelGear, BevelGear): _bevels, (Worm, WormWheel): _worm, (WormWheel, Worm): _wheel_first,
 }  # fmt: skip
-"""The wheels of a coupling from its pitch point and where both sit, by its class."""
+"""Wheels of gears whose size follows from those that they mesh with, from their pitch point and seats."""

@@ -35,6 +35,7 @@ from mechgraph.model.mechanism import NUMBERS_OF_CHAIN, Mechanism, chain_numbers
 from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.model.parameters import Declared, coupling_places, declared
 from mechgraph.model.plane import plane_faults
+from mechgraph.model.short_forms import ShortForm
 from mechgraph.quantities import is_numeric
 
 PLACED = (*Marker.formats, "pitch")
@@ -254,7 +255,10 @@ def _gears_about(m: Mechanism, pair: int | None = None) -> str:
     held = (
         c.name
         for c in m.couplings
-        if isinstance(c, LineCoupling) and c.linear and pair in (None, *(s.pair for s in c.steps))
+        if isinstance(c, LineCoupling)
+        and not isinstance(c, ShortForm)
+        and c.linear
+        and pair in (None, *(s.pair for s in c.steps))
     )
     if not (name := next(held, "")):
         return ""
@@ -499,14 +503,15 @@ def varied(m: Mechanism, fields: Mapping[str, AnyField], values: Array) -> Varia
             loads[field.index] = _varied_load(loads[field.index], field, row)
     own = tuple((field, row) for field, row in rows if isinstance(field, ItemField))
     made = Variants(m, Declared(**arrays), tuple(loads), count, own=own)
-    placed = any(
-        isinstance(field, ChainField) or (isinstance(field, Field) and field.array in MARKER) for field, _ in rows
-    )
-    if not own and not (placed and _rubbing_teeth(m)):
-        return made
-    if placed or _rubbing_teeth(m) or any(field.one_by_one for field, _ in own):
+    moved = {
+        place[-1] for field, _ in rows if isinstance(field, Field) and field.array in MARKER for place in field.places
+    }
+    geared = {step.pair for c in m.couplings if isinstance(c, ShortForm) for step in c.steps}
+    follows = bool(geared and chained) or not geared.isdisjoint(moved)
+    alone = any(field.one_by_one for field, _ in own) or (_rubbing_teeth(m) and (chained or moved or own))
+    if alone:
         return replace(made, missing=tuple(range(count)))
-    return _with_gears(made)
+    return _with_gears(made) if own or follows else made
 
 
 def _rubbing_teeth(m: Mechanism) -> bool:
@@ -515,23 +520,16 @@ def _rubbing_teeth(m: Mechanism) -> bool:
 
 
 def _with_gears(of: Variants) -> Variants:
-    """Variants with the gears that each has; those with faults are missing."""
-    n, m = of.numbers, of.mechanism
-    items: Any = np.repeat(n.items, of.count // n.items.shape[1], axis=1)
-    coefficients: Array = np.repeat(n.couplings, of.count // n.couplings.shape[1], axis=1)
+    """Variants with the gears that each has, where its pairs are; those with faults are missing."""
     missing = []
+    items: Any = np.repeat(of.numbers.items, of.count // of.numbers.items.shape[1], axis=1)
     for i in range(of.count):
-        changed = list(m.couplings)
-        for field, values in of.own:
-            changed[field.index] = field.changed(changed[field.index], float(values[i]))
         try:
-            items[:, i] = m.replace(couplings=changed).couplings
+            items[:, i] = of.one(i).couplings
         except DeclarationError:
             missing.append(i)
-            continue
-        for g in {field.index for field, _ in of.own}:
-            coefficients[coupling_places(m)[g], i] = items[g, i].coefficients
-    return replace(of, numbers=replace(n, items=items, couplings=coefficients), missing=tuple(missing))
+    couplings = np.array([[x for c in one for x in (*c.coefficients, c.constant or 0.0)] for one in items.T]).T
+    return replace(of, numbers=replace(of.numbers, items=items, couplings=couplings), missing=tuple(missing))
 
 
 def _chain_markers(
