@@ -364,6 +364,8 @@ class ChartStage:
             raise Stopped(
                 "the loops do not close any more to where a step led, as at positions where the mechanism locks"
             )
+        if self.trouble is not None:
+            raise self.trouble
         self._path = [self._last]
         # kinetic energy, and the work of the forces M v' over a unit of the coordinates
         columns = Columns(self.chart.start, self.chart.factors, self.n, self.chart.held)
@@ -435,8 +437,6 @@ class ChartStage:
         found = self._found(t, y) if np.isfinite(y).all() else None
         if found is None:
             return np.full(y.shape, np.nan)
-        if found.rubs is not None and (outcome := int(found.rubs.outcome[0])):
-            self.trouble = no_force(self.task, OUTCOMES[outcome], t)
         du = self.chart.rates_of_coordinates(found.rates.here.x, found.rates.dq)
         lost = found.lost[None]
         return np.concatenate([du, found.rates.ddq[self.chart.moving], lost, found.power[None]])
@@ -502,6 +502,8 @@ class ChartStage:
         if not closed.done.all():
             return None
         found = moved(closed, y[n:-2], p[1:], self._loads, at)
+        if found.rubs is not None and (outcome := int(found.rubs.outcome[0])):
+            self.trouble = no_force(self.task, OUTCOMES[outcome], t)
         rates = found.rates
         state = np.concatenate([closed.here.x[:, 0], rates.dq[:, 0], rates.ddq[:, 0]])
         self._last = _Known(t, state, *self._sizes)

@@ -472,7 +472,8 @@ class Rests:
                 ways[columns] = found.rates.ddq[columns, 0]
         self._rested = tuple(slow)
         sets = self._together(Z, slow, x)
-        if not sets and not resting:
+        acts = found.rubs is None or not found.rubs.outcome[0]
+        if acts and not sets and not resting:
             return _Holding(ways=ways), found.rates.dq[:, 0]
         # what is at rest is so exactly
         still = self._independent(_Holding(ways=ways), Z, sets)
