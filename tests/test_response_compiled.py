@@ -60,6 +60,16 @@ def parallelogram() -> mg.Mechanism:
     return mg.Mechanism("parallelograms", links, pairs, loads=[mg.Gravity((0, -9.81, 0)), spring, wound])
 
 
+def stage() -> mg.Mechanism:
+    """Two gears with a torque on each, of which the heavy one drives back."""
+    at = {"p": (0.0, 0.002), "w": (0.06, 0.02)}
+    links = [mg.Link("frame"), *(mg.Link(n, 1.0, (x, 0, 0), j * np.eye(3)) for n, (x, j) in at.items())]
+    pairs = [mg.Pair(n, "R", "frame", n, point=(x, 0, 0), axis=(0, 0, 1)) for n, (x, _) in at.items()]
+    loads = [mg.Gravity((0, -9.81, 0)), mg.Effort("w", 1.0)]
+    teeth = mg.SpurGears("t", "p", "w", teeth=(20, 40), module=0.002)
+    return mg.Mechanism("stage", links, pairs, couplings=[teeth], loads=loads)
+
+
 def agree(r: mg.Response, s: mg.Response, within: float) -> None:
     """The same at all output times, all reactions included."""
     for pair in r.mechanism.pairs:
@@ -71,9 +81,9 @@ def agree(r: mg.Response, s: mg.Response, within: float) -> None:
     np.testing.assert_allclose(r.energy.work, s.energy.work, atol=within * max(1.0, np.abs(s.energy.kinetic).max()))
 
 
-def rough(m: mg.Mechanism, mu: float = 0.1) -> mg.Mechanism:
-    """Friction in every pair, and what springs and gravity there is."""
-    numbers = {"R": {"radius": 0.01, "length": 0.05}, "P": {"length": 0.1, "width": 0.05}, "S": {"radius": 0.01}}
+def rough(m: mg.Mechanism, mu: float = 0.1, **length: float) -> mg.Mechanism:
+    """Friction in every pair, of journals with a length, and what springs and gravity there is."""
+    numbers = {"R": {"radius": 0.01, **length}, "P": {"length": 0.1, "width": 0.05}, "S": {"radius": 0.01}}
     dry = [mg.Friction(p.name, mu=mu, **numbers[p.type.symbol]) for p in m.pairs]
     return m.replace(loads=[*m.loads, *dry], drives=[])
 
@@ -90,12 +100,17 @@ MOTIONS = {
     "change points": (parallelogram, {"rates": {"A0": -2.0}}, 1.5),
     "one path": (lambda: mg.load("bricard-cube").replace(drives=[]), {}, 1.0),
     "event": (chain, {"events": [mg.Event("B", 0.02)], "rates": {"A": 1.0}}, 0.27),
-    "friction": (lambda: rough(chain()), {"rates": {"S.Rx": 3.0, "S.Rz": 0.5, "A": 1.0}, "rtol": 1e-8}, 0.02),
+    "friction": (
+        lambda: rough(chain(), length=0.05),
+        {"rates": {"S.Rx": 3.0, "S.Rz": 0.5, "A": 1.0}, "rtol": 1e-8},
+        0.02,
+    ),
     "friction of a prescribed loop": (
         lambda: rough(five_bar()),
         {"motions": {"J0": lambda t: (np.sin(t), np.cos(t), -np.sin(t))}},
         0.01,
     ),
+    "friction beside gears": (lambda: rough(stage()), {"rates": {"p": 5.0}}, 0.1),
     "stop": (chain, {"stops": [mg.Stop("B", upper=0.01, restitution=0.5)]}, 0.3),
 }
 
@@ -113,7 +128,7 @@ def test_it_is_the_motion_of_the_dense_engine(name):
     agree(r, s, 1e-6)
     assert [str(one.event) for one in r.events] == [str(one.event) for one in s.events]
     np.testing.assert_allclose([one.t for one in r.events], [one.t for one in s.events], atol=1e-7)
-    assert bool(s.events) == (name in ("event", "stop"))
+    assert bool(s.events) == (name in ("event", "stop", "friction beside gears"))
     np.testing.assert_allclose(r.energy.friction, s.energy.friction, atol=1e-7 * (1.0 + s.energy.friction.max()))
     assert (s.energy.friction.max() > 0.0) == name.startswith("friction")
 

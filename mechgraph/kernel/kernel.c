@@ -1203,6 +1203,18 @@ static void borne(const Model *m, Work *w, const double *on, const double *given
   at_points(m, w, w->reaction, 1.0);
 }
 
+/* The same with the self-stresses, the given efforts being w->given, on the flanks that press. */
+static int borne_on_flanks(const Model *m, Work *w, const double *on, double *record, const int *places) {
+  int turns = 0;
+  memset(w->flank, 0, m->lines * sizeof(int));
+  do {
+    if (turns++ > MOST_TURNED) return MGK_FLANKS;
+    if (m->stresses && self_stresses(m, w)) return MGK_STRAIN;
+    borne(m, w, on, w->given, record, places);
+  } while (turned_over(m, w));
+  return MGK_OK;
+}
+
 /* What is left of the equilibrium of links and of the power, and the largest terms, as the package measures them. */
 static void checks(const Model *m, Work *w, double *balance, double *power, magnitude *largest) {
   double *left = w->carried;
@@ -1532,14 +1544,9 @@ static int forces(const Model *m, Work *w, const double *x, double *record, cons
   if (efforts(m, w)) return MGK_SINGULAR;
   loads(m, w, x);
   inertia(m, w);
-  int turns = 0;
   FOR(i, 6 * m->links) w->bare[i] = w->applied[i] + w->inertial[i];
-  memset(w->flank, 0, m->lines * sizeof(int));
-  do {
-    if (turns++ > MOST_TURNED) return MGK_FLANKS;
-    if (m->stresses && self_stresses(m, w)) return MGK_STRAIN;
-    borne(m, w, w->bare, w->given, record, places);
-  } while (turned_over(m, w));
+  const int status = borne_on_flanks(m, w, w->bare, record, places);
+  if (status) return status;
   if (m->rubs) {
     memset(w->nothing, 0, (size_t)6 * m->links * sizeof(double));
     int unsure = directed(m, w) ? friction(m, w, w->nothing, 0, record, places) : 2;

@@ -194,8 +194,8 @@ static void slipping(const Model *m, Work *w, const int *head, const double *way
 static int rubbing(const Model *m, Work *w, Motion *at, int n, const int *head, const double *way) {
   const int d = m->drives, c = m->columns, links = 6 * m->links, places[MGK_PARTS + 1] = {0};
   if (efforts(m, w)) return MGK_SINGULAR;
-  if (m->stresses && self_stresses(m, w)) return MGK_STRAIN;
-  borne(m, w, w->inertial, w->given, w->record, places);
+  const int status = borne_on_flanks(m, w, w->inertial, w->record, places);
+  if (status) return status;
   slipping(m, w, head, way);
   double *more = at->off;
   memset(at->yields, 0, (size_t)links * c * sizeof(double));
@@ -209,7 +209,9 @@ static int rubbing(const Model *m, Work *w, Motion *at, int n, const int *head, 
   accelerated(n, d, at->mass, at->unit, at->force, more);
   add_accelerations(m, w, at, n, more);
   add_part(n, 1.0, more, at->a);
-  return MGK_OK;
+  add_part(c, 1.0, w->rubbed, w->given);
+  if (m->lines) borne(m, w, w->inertial, w->given, w->record, places);
+  return turned_over(m, w) ? MGK_FRICTION : MGK_OK; /* friction turns forces between teeth round */
 }
 
 /* Accelerations of the first n drives (at->a) at a closed state just factored, with rates v of all drives and accelerations p of the others.
@@ -244,7 +246,6 @@ static int accelerations(const Model *m, Work *w, Motion *at, int n, const doubl
     const int unsure = rubbing(m, w, at, n, head, way);
     if (unsure) return unsure;
     if (power) power[0] = -dot(w->dq, w->rubbed, c), power[1] -= power[0];
-    add_part(c, 1.0, w->rubbed, w->given);
   }
   if (power) for (int i = n; i < d; i++) power[1] -= v[i] * (dot(at->V + i * links, w->inertial, links) + dot(at->Z + i * c, w->given, c));
   return isfinite(size_of(w->ddq, c)) ? MGK_OK : MGK_NOT_FINITE;

@@ -62,6 +62,7 @@ from mechgraph.maths.linear import Factors
 from mechgraph.maths.se3 import Array, Index, cross, rotate, rotate_back
 from mechgraph.maths.tolerances import PATH, RESPONSE
 from mechgraph.memo import dataclass
+from mechgraph.model.belts import pretensions
 from mechgraph.model.friction import rubbing_loads
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
@@ -594,8 +595,8 @@ def cannot(system: System, loads: Loads, held: bool) -> str | None:
     """Why the kernel does not serve a motion; None where it does."""
     if held:
         return "passive freedoms are held at rest"
-    if loads.dry and any(coupling.steps for coupling in system.m.couplings):
-        return "friction beside gears, racks or belts follows forces at their contacts"
+    if loads.dry and system.m.once(pretensions):
+        return "friction follows the pretension of a belt"
     if system.n_freedoms * len(system.m.links) >= SPARSE_FROM:
         return f"it has {system.n_freedoms} freedoms and {len(system.m.links)} links; expected fewer than {SPARSE_FROM} of the product"
     whys = (why_not_load(load, system.m) for load in (*loads.stored, *loads.rest))
