@@ -578,6 +578,49 @@ def test_what_is_left_out_is_told() -> None:
     assert not mg.check(shaft()).friction
 
 
+def test_several_drives_lock_together_where_one_friction_holds_them() -> None:
+    """An arm of two rough pins, each with the couple of the load about it; a table of two slides on a slope; a block on a plane."""
+
+    def arm(first: float, second: float) -> mg.Mechanism:
+        pins = [
+            mg.Pair("A", "R", "frame", "arm", point=(0, 0, 0), axis=Z),
+            mg.Pair("B", "R", "arm", "hand", point=(1, 0, 0), axis=Z),
+        ]
+        dry = [mg.Friction(k, mu=mu, radius=r) for k, mu, r in (("A", first, 5.0), ("B", second, 0.2))]
+        load = mg.Wrench("hand", force=(0, -W, 0), point=(1.05, 0, 0))
+        return mg.Mechanism("arm", pairs=pins, drives=["A", "B"], loads=[load, *dry])
+
+    for first, second in ((0.5, 0.5), (0.5, 0.1), (0.2, 0.5), (0.2, 0.1)):
+        holds = 5.0 * np.sin(np.arctan(first)) > 1.05 and 0.2 * np.sin(np.arctan(second)) > 0.05
+        s = mg.solve(arm(first, second), {"A": [0.0, 0.0], "B": 0.0})
+        assert s.self_locking.tolist() == [holds, holds]
+    with pytest.raises(mg.DeclarationError, match="in motion"):
+        assert mg.solve(arm(0.5, 0.5), {"A": mg.Motion(0.0, velocity=1.0), "B": 0.0}).self_locking
+
+    def on_slope(pairs: list[mg.Pair], drives: list[str], *dry: mg.Friction) -> mg.Solution:
+        links = [mg.Link("frame"), *(mg.Link(p.b, 1.0, (0, 0, 0)) for p in pairs)]
+        m = mg.Mechanism("slope", links, pairs, drives, [mg.Gravity((0, 0, -9.81)), *dry])
+        return mg.solve(m, dict.fromkeys(drives, 0.0))
+
+    slope = 0.3
+    down = (np.cos(slope), 0, -np.sin(slope))
+    slides = [
+        mg.Pair("D", "P", "frame", "slide", point=(0, 0, 0), axis=down),
+        mg.Pair("E", "P", "slide", "table", point=(0, 0, 0), axis=Y),
+    ]
+    plate = [mg.Pair("E", "E", "frame", "plate", point=(0, 0, 0), axis=(np.sin(slope), 0, np.cos(slope)), second=Y)]
+    for part, holds in ((0.99, False), (1.01, True)):
+        mu = part * np.tan(slope)
+        for across in (0.0, 0.1):
+            s = on_slope(slides, ["D", "E"], mg.Friction("D", mu=mu), mg.Friction("E", mu=across))
+            assert bool(s.self_locking) == holds
+    freedoms = ["E.Tx", "E.Ty", "E.Rz"]
+    assert on_slope(plate, freedoms, mg.Friction("E", mu=1.01 * np.tan(slope), radius=0.1)).self_locking
+    assert not on_slope(plate, freedoms, mg.Friction("E", mu=0.5 * np.tan(slope), radius=0.1)).self_locking
+    with pytest.raises(mg.DeclarationError, match="no friction is found that holds all drives at once, nor proved"):
+        assert on_slope(plate, freedoms, mg.Friction("E", mu=0.9 * np.tan(slope), radius=0.1)).self_locking
+
+
 def test_efforts_at_rest_are_told_to_be_without_friction() -> None:
     m = shaft(force(0, -W, (0, 0, 0)))
     told = [str(note) for note in mg.solve(m, {"A": mg.Motion([0.0, 0.1], velocity=[0.0, 1.0])}).warnings]

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import scipy
 
 from mechgraph.errors import DeclarationError
 from mechgraph.force.elastic import LIFTS_OFF, component_values, elastic_split, openings, seats_of
-from mechgraph.force.friction import OUTCOMES, Rubbed, moving_rates, places_of, rubbed
+from mechgraph.force.friction import OUTCOMES, Rubbed, moving_rates, places_of, rests, rubbed
 from mechgraph.force.loads import Site, inertia_wrenches, kinetic_power
 from mechgraph.force.reactions import (
     METHODS,
@@ -128,7 +129,8 @@ class BlockForces:
     the loops with ``multiplier_stress (n, s, T)``, of which ``coupled_stress (F, s, T)`` are the efforts in freedoms.
     Where stiffness splits reactions: those that misfits lock in ``locked (6, P, T)``, and those of a misfit of one in every component
     that is not rigid ``of_misfit (6, P, k, T)``. With friction: what came about, ``rubs``, and at rest the least and greatest efforts
-    between which drives may be ``range (F, 2, T)``; ``unborne (T,)`` where feet that only push cannot bear the loads.
+    between which drives may be ``range (F, 2, T)``, and whether it ``holds_alone (T,)`` with several of them off;
+    ``unborne (T,)`` where feet that only push cannot bear the loads.
     """
 
     reactions: Array
@@ -152,6 +154,7 @@ class BlockForces:
     of_misfit: Array | None = None
     rubs: Rubbed | None = None
     range: Array | None = None
+    holds_alone: Array | None = None
     unborne: Mask | None = None
 
     @property
@@ -198,12 +201,13 @@ def forces_of_block(
     found, flank = _least_on_flanks(here, on_their_flanks(here, first, lines), f, task, lines)
     dry = [load.with_numbers(site.number) for load in rubbing_loads(here.system.m, task.loads)]
     ranges: Array | None = None
+    holds_alone: Array | None = None
     if rubs is not None:
         found = replace(found, reactions=found.reactions - rubs.taken)
     elif dry:
         dq = moving_rates(rates.dq, rates.ddq)
         solve = _FrictionProblem(here, task, f, first, lines, (found, flank), dry)
-        ranges = solve.at_rest(dq, given)
+        ranges, holds_alone = solve.at_rest(dq, given), solve.holds(dq, given)
         found, rubs, flank = solve.forces(dq)
         held, holds, hold_terms = _held(here, task, f, applied + inertia, given + rubs.efforts, site.largest)
         loads = loads if held is None else applied + inertia + held
@@ -247,6 +251,7 @@ def forces_of_block(
         rubs=rubs,
         range=ranges,
         unborne=found.unborne,
+        holds_alone=holds_alone,
     )
 
 
@@ -577,6 +582,32 @@ class _FrictionProblem:
                     effort = np.where(pulls, np.nan, effort)
                 out[column, side, rest] = effort[rest]
         return out
+
+    def holds(self, dq: Array, given: Array) -> Array:
+        """Whether friction holds it at rest with all drives off, where there are several ``(T,)``: see ``friction.rests``."""
+        driven, m, s = self.task.driven, self.here.system.m, self.here.system
+        out = np.full(self.here.T, np.nan)
+        if len(driven) < 2 or dq.any(axis=0).all():
+            return out
+        self._put_on(*self.smooth, self.lifted)
+        found, ways, count = self.found, [], 0
+        for load in self.dry:
+            columns = [c for k in pairs_of(m, load) for c in range(int(s.first_column[k]), int(s.first_column[k + 1]))]
+            for sense, column in product((-1.0, 1.0), columns):
+                one = np.zeros_like(dq)
+                one[column] = sense
+                places = places_of(self.here, one, found.reactions, [load], True, (self.lines, self.flank))
+                ways += [(count + i, place) for i, place in enumerate(places) if place.D.any() or place.K.any()]
+            count += len(places)
+        if not ways:
+            return np.where(dq.any(axis=0), np.nan, 0.0)
+        efforts = {
+            c: (one["efforts"] - one["coupled"])[driven] - (driven == c)[:, None] for c, one in self.unit.items()
+        }
+        own = (found.efforts - given - found.coupled)[driven]
+        reads = {column: self._read(one) for column, one in self.unit.items()}
+        out = rests(self.here, ways, self._read(vars(found)), reads, efforts, own)
+        return np.where(dq.any(axis=0), np.nan, out)
 
 
 def _elastic(here: Configuration, found: _FreeForces, lifted: Mask | None) -> _FreeForces:

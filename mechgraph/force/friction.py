@@ -14,12 +14,13 @@ Mathematical Programming 58, 1993; F. Pfeiffer and Ch. Glocker, Multibody Dynami
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import product
 from typing import Any
 
 import numpy as np
+import scipy
 
 from mechgraph.errors import DeclarationError
 from mechgraph.kinematics.state import Configuration
@@ -383,6 +384,72 @@ def rubbed(here: Configuration, places: Sequence[Place], base: Array, unit: dict
             rubbing[:, place.reads - P] += place.D * n[t] + np.einsum("cdt,dt->ct", place.K, mine)
     speeds, names = np.array([place.speed for place in places]), tuple(place.of for place in places)
     return Rubbed(efforts, taken, n, outcome, factor, teeth, beside, rubbing, growth, speeds, names)
+
+
+def rests(
+    here: Configuration,
+    ways: Sequence[tuple[int, Place]],
+    base: Array,
+    unit: dict[int, Array],
+    efforts: dict[int, Array],
+    own: Array,
+) -> Array:
+    """Where some friction holds a mechanism at rest whose drives, of efforts ``own (d, T)`` without friction, supply nothing: 1 where one
+    is found, 0 where none can be, NaN where neither is proved, ``(T,)``.
+
+    ``ways``: for every place, by number, the places that it is in motions of its pair each way, whose frictions it mixes: parts ``g >= 0``
+    of them with ``sum g <= |V|``. With the direction u of V from the last trial ``u . V`` is below ``|V|``, linear, and so is what is above
+    it, ``|a| + sum |B| g``: a state is found, or none there, by least squares under signs (Farkas). ``base``, ``unit``: see ``rubbed``;
+    ``efforts (d, T)`` of drives for a unit effort in a freedom, by column.
+    """
+    of, places = np.array([number for number, _ in ways]), [place for _, place in ways]
+    starts = np.concatenate([[0], np.cumsum([len(place.A) for place in places])]).astype(np.intp)
+    split = [[_passed_on(here, place.way, W) for W in (place.D[:, None], place.K)] for place in places]
+    a, B, C = _linear(places, split, starts, base, unit)
+    E = [
+        sum(np.einsum("dt,nt->dnt", efforts[c], row) for _, cols, rows, _ in part for c, row in _by_column(cols, rows))
+        for both in split
+        for part in both
+    ]
+    first = np.array([int(np.argmax(of == number)) for number in range(of.max(initial=-1) + 1)])
+    sums = (of == np.arange(len(first))[:, None]).astype(float)
+    # of what may slide in k independent ways frictions in these alone span a part 1 / sqrt(k) of all
+    span = np.sqrt(np.maximum(sums.sum(axis=1) / 2, 1.0))
+    out = np.full(here.T, np.nan)
+    for t in range(here.T):
+        part = [slice(starts[o], starts[o + 1]) for o in range(len(places))]
+        preload = np.array([np.broadcast_to(places[o].preload, here.T)[t] for o in first])
+        towards = [a[part[o], t] for o in first]
+        for trial in range(8):
+            u = [v / max(float(np.linalg.norm(v)), np.finfo(float).tiny) for v in towards]
+            per = np.array([B[:, o, t] + C[:, part[o], t] @ u[of[o]] for o in range(len(places))]).T
+            rates = np.array([E[2 * o][:, 0, t] + E[2 * o + 1][:, :, t] @ u[of[o]] for o in range(len(places))]).T
+            along = np.array([u[p] @ per[part[o]] for p, o in enumerate(first)])
+            limit = np.array([u[p] @ a[part[o], t] for p, o in enumerate(first)])
+            g, met = _mixed(rates, own[:, t], sums - along, limit + preload)
+            if met:
+                out[t] = 1.0
+                break
+            towards = [a[part[o], t] + per[part[o]] @ g for o in first]
+            if trial == 0:
+                above = np.array([np.linalg.norm(per[part[o]], axis=0) for o in first])
+                size = np.array([np.linalg.norm(v) for v in (a[part[o], t] for o in first)])
+                if not _mixed(rates, own[:, t], sums / span[:, None] - above, size + preload)[1]:
+                    out[t] = 0.0
+                    break
+    return out
+
+
+def _by_column(columns: slice, rows: Array) -> Iterable[tuple[int, Array]]:
+    return zip(range(columns.start, columns.stop), rows, strict=True)
+
+
+def _mixed(rates: Array, own: Array, sums: Array, limit: Array) -> tuple[Array, bool]:
+    """Parts ``g >= 0`` with ``rates g + own = 0`` and ``sums g <= limit`` as nearly as there are, and whether these are."""
+    size = max(float(np.abs(own).max(initial=0.0)), np.finfo(float).tiny), max(float(limit.max(initial=0.0)), 1e-300)
+    A = np.block([[rates / size[0], np.zeros((len(own), len(limit)))], [sums / size[1], np.eye(len(limit)) / size[1]]])
+    found, missed = scipy.optimize.nnls(A, np.concatenate([-own / size[0], limit / size[1]]))
+    return found[: rates.shape[1]], bool(missed <= STRESSES.unique)
 
 
 Passed = list[tuple[int, slice, Array, Array]]

@@ -616,33 +616,32 @@ class Solution(Shown):
 
     @property
     def self_locking(self) -> Array:
-        """Whether the mechanism stays at rest with all drives off ``(...)``: effort 0 is within the range of every drive.
+        """Whether the mechanism stays at rest with all drives off ``(...)``: effort 0 is within the range of a drive; of several, whose
+        ranges hold with the others held, friction is found that holds all of them at once, or proved not to be there.
 
         Raises
         ------
         DeclarationError
-            A position in motion, or without forces or ends: only what rests can stay. Several drives: each range holds with the other
-            drives held, so that the ranges do not tell whether all may be off together.
+            A position in motion, or without forces or ends: only what rests can stay. Of several drives, neither found nor proved.
         """
-        if len(self.actuated) > 1:
-            why = (
-                f"self_locking: {len(self.actuated)} drives, whose ranges hold with the others held; ask with one drive"
-            )
-            raise DeclarationError(f"solution of {self.mechanism.name!r}", [why])
-        rest = np.ones(self.batch, dtype=bool)
-        for k, j in map(self.whole.freedom, self.actuated):
-            pair = self[self.whole.pairs[k].name]
-            low, high = np.moveaxis(pair.effort_range[..., j, :], -1, 0)
+        rest, places = np.ones(self.batch, dtype=bool), [self.whole.freedom(name) for name in self.actuated]
+        pairs = [(self[self.whole.pairs[k].name], j) for k, j in places]
+        ends = [np.moveaxis(pair.effort_range[..., j, :], -1, 0) for pair, j in pairs]
+        alone = self._values.holds_alone if len(pairs) > 1 else rest
+        for (pair, j), (low, high) in zip(pairs, ends, strict=True):
             doubt = np.isnan(low) | np.isnan(high) | (pair.velocity[..., j] != 0)
-            if doubt.any():
-                place = self.place(int(np.argmax(doubt)))
+            if (doubt | np.isnan(alone)).any():
+                place = self.place(int(np.argmax(doubt | np.isnan(alone))))
                 why = (
                     f"self_locking: {place} is in motion, or has no forces or no known ends of its range; solve at rest, "
                     "with positions alone as motions"
+                    if doubt.any()
+                    else f"self_locking: at {place} no friction is found that holds all drives at once, nor proved not to be there; "
+                    "it is close, ask with one drive"
                 )
                 raise DeclarationError(f"solution of {self.mechanism.name!r}", [why])
             rest &= (low < high) & (low <= 0) & (high >= 0)
-        return rest
+        return rest if len(pairs) == 1 else np.asarray(alone > 0)
 
     def efficiency(self, out: str | Iterable[str], into: str | Iterable[str] | None = None) -> Array:
         """Return ``-power of out / power of into``, ``(...)``.

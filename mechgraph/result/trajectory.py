@@ -73,7 +73,7 @@ MOVED = ("x", "dq", "ddq", "closure")
 KEPT = (
     "reactions", "efforts", "given", "loads", "hold", "stress", "stress_efforts", "coupled", "multipliers", "multiplier_stress",
     "coupled_stress", "shaking", "balance", "power", "holds", "hold_terms",
-    "locked", "of_misfit", "range",
+    "locked", "of_misfit", "range", "holds_alone",
 )  # fmt: skip
 """Fields of ``BlockForces`` that are kept for every position."""
 KEPT_OF_FRICTION = ("normals", "factor", "teeth", "rubbing", "growth", "speeds")
@@ -119,15 +119,13 @@ class Trajectory:
         self.prescribed = self.actuated if prescribed is None else prescribed
         self.batch, self.t, self.driven, self._passive = batch, t, driven, passive
         self._system, self._system_at, self.least_norm = system, system_at, not mask_redundant
-        self._L = self.radius = float(system.par.L)
-        self._coordinates = coordinates
+        self._coordinates, self._L, self.radius = coordinates, float(system.par.L), float(system.par.L)
         self.loads: tuple[Load, ...] = self.whole.loads
         self._count = int(np.prod(batch))
         self._asked = batch, t, np.arange(self._count)
         self._status = np.full(self._count, Status.OK.value, dtype="U24")
         self._kept: dict[str, Array] = {}
-        self.largest = np.zeros(2)
-        self._solved = np.zeros(self._count, dtype=bool)
+        self.largest, self._solved = np.zeros(2), np.zeros(self._count, dtype=bool)
         self._motions: list[BlockMotion] = []
         self.passed: tuple[PassedCrossing, ...] = ()
         self.rubbing: tuple[str, ...] = ()
@@ -566,8 +564,7 @@ class Trajectory:
     def components(self, pair: int) -> dict[str, Array]:
         """Reaction components by name, ``(...)``."""
         row, values, stress = self._components(pair)
-        masked = self._masked(values, stress)
-        return {name: self._out(part) for name, part in zip(row.component_names, masked, strict=True)}
+        return {n: self._out(v) for n, v in zip(row.component_names, self._masked(values, stress), strict=True)}
 
     def directions(self, pair: int) -> Array:
         """Forces of the unit reaction components of a pair, global directions, ``(..., 3, components)``."""
@@ -579,14 +576,22 @@ class Trajectory:
         columns = self._columns(pair)
         driven = np.flatnonzero(self._driven(columns))
         loose = _touched(np.concatenate([self._components(pair)[2], self._stress_of_drives(columns)[driven]]))
-        labels = labels_of(self.whole.pairs[pair], driven)
-        return {name: self._out(~part) for (_, name), part in zip(labels, loose, strict=True)}
+        labelled = zip(labels_of(self.whole.pairs[pair], driven), loose, strict=True)
+        return {name: self._out(~part) for (_, name), part in labelled}
 
     def friction(self, pair: int) -> Array:
         """Its part of the applied efforts, ``(..., f)``."""
         columns = self._columns(pair)
-        unit = np.where(self._system.is_length[columns], self._L, self._L**2)[:, None]
-        return self._out(unit * self._kept.get("friction", 0.0 * self._force("efforts"))[columns])
+        return self._out(self._unit(columns) * self._kept.get("friction", 0.0 * self._force("efforts"))[columns])
+
+    def _unit(self, columns: slice) -> Array:
+        """What an effort of one is in the user's units ``(f, 1)``."""
+        return np.where(self._system.is_length[columns], self._L, self._L**2)[:, None]
+
+    @property
+    def holds_alone(self) -> Array:
+        """Where friction holds several drives that are off ``(...)``, 1 or 0; NaN where that is not proved. 0 where nothing rubs."""
+        return self._out(self._kept.get("holds_alone", np.zeros(self._count))[None])[..., 0]
 
     def friction_factor(self, place: int) -> tuple[float, tuple[str, ...]]:
         """By how much friction would have to fall at a flat position that jams, and the names of what jams."""
@@ -600,8 +605,8 @@ class Trajectory:
         columns = self._columns(pair)
         ends = np.repeat(self._efforts(columns)[0][:, None], 2, axis=1)
         if "range" in self._kept:
-            unit = np.where(self._system.is_length[columns], self._L, self._L**2)[:, None, None]
-            ends = np.where(self._driven(columns)[:, None], unit * self._kept["range"][columns], ends)
+            found = self._unit(columns)[:, None] * self._kept["range"][columns]
+            ends = np.where(self._driven(columns)[:, None], found, ends)
         return self._out(ends)
 
     def at_places(self, name: str, of: str) -> Array:
@@ -676,12 +681,10 @@ class Trajectory:
         """What drives supply in freedoms and what loads do there, ``(f, n)`` each, in the user's units."""
         total, given, coupled = (self._force(name)[columns, places] for name in ("efforts", "given", "coupled"))
         own = np.where(self._driven(columns), total - given - coupled, np.where(np.isnan(given), np.nan, 0.0))
-        unit = np.where(self._system.is_length[columns], self._L, self._L**2)[:, None]
-        return unit * own, unit * given
+        return self._unit(columns) * own, self._unit(columns) * given
 
     def _driven(self, columns: slice) -> Mask:
-        places = np.arange(*columns.indices(self._system.n_freedoms))
-        return np.asarray((places[:, None] == self.driven).any(axis=1)[:, None])
+        return np.isin(np.arange(self._system.n_freedoms)[columns], self.driven)[:, None]
 
     def _stress_of_drives(self, columns: slice, places: Place = EVERY) -> Array:
         """What self-stresses have in the efforts of drives, ``(f, s, n)``."""
@@ -719,8 +722,7 @@ class Trajectory:
     def efforts_at(self, places: Index) -> tuple[Array, Array, Mask]:
         """Own and applied efforts ``(F, n)``, and which of the former are not unique."""
         every = slice(None)
-        own, given = self._efforts(every, places)
-        return own, given, _touched(self._stress_of_drives(every, places))
+        return *self._efforts(every, places), _touched(self._stress_of_drives(every, places))
 
     def multiplier(self, coupling: int) -> Array:
         """Multiplier of a coupling, ``(...)``."""
