@@ -277,6 +277,35 @@ def press() -> mg.Solution:
     return mg.solve(m, {"A": mg.Motion(np.deg2rad(np.linspace(-120, -5, 73)), velocity=2.0)})
 
 
+def jack() -> mg.Solution:
+    """A scissor jack: its screw turns in a collar and pulls the knees together; thread, collar and pins rub."""
+    low, high, half = 0.05, 0.25, 0.16
+    middle, x, y, z = 0.5 * (low + high), (1, 0, 0), (0, 1, 0), (0, 0, 1)
+    sides = {"left": -1, "right": 1}
+    pairs = [
+        mg.Pair("guide", "P", "base", "top", point=(0, 0, high), axis=z),
+        *(mg.Pair(f"foot {k}", "R", "base", f"lower {k}", point=(0.02 * n, 0, low), axis=y) for k, n in sides.items()),
+        *(
+            mg.Pair(f"knee {k}", "R", f"lower {k}", f"upper {k}", point=(n * half, 0, middle), axis=y)
+            for k, n in sides.items()
+        ),
+        *(mg.Pair(f"head {k}", "R", f"upper {k}", "top", point=(0.02 * n, 0, high), axis=y) for k, n in sides.items()),
+        mg.Pair("bearing", "R", "lower left", "block", point=(-half, 0, middle), axis=y),
+        mg.Pair("collar", "R", "block", "screw", point=(-half, 0, middle), axis=x),
+        mg.Pair("thread", "H", "screw", "nut", point=(half, 0, middle), axis=x, lead=0.004),
+        mg.Pair("trunnion", "R", "lower right", "nut", point=(half, 0, middle), axis=y),
+    ]
+    dry = [mg.Friction(p.name, mu=0.1, radius=0.006) for p in pairs if p.name.split()[0] in ("foot", "knee", "head")]
+    dry += [
+        mg.Friction("thread", mu=0.12, radius=0.008, flank=np.deg2rad(15)),
+        mg.Friction("collar", mu=0.12, thrust_radius=0.01),
+    ]
+    about = "Scissor jack with friction in screw, collar and pins"
+    load = mg.Wrench("top", force=(0, 0, -8e3), point=(0, 0, high))
+    m = mg.Mechanism("jack", pairs=pairs, drives=["collar"], loads=[load, *dry], units=SI, description=about)
+    return mg.solve(m, {"collar": mg.Motion(np.linspace(0, 150, 61), velocity=6.0)})
+
+
 def bearing() -> mg.Solution:
     """The engine of the page on oil films, its big-end bearing with a film."""
     told = page("how-to/oil-film", 1)
@@ -327,6 +356,7 @@ ENTRIES = [
     Entry("V-twin with gas forces in time", v_twin, "../how-to/planar.md"),
     Entry("Engine in the plane", engine, "../how-to/planar.md"),
     Entry("Toggle press with friction", press, "../tutorials/press.md"),
+    Entry("Screw jack with friction", jack, "../how-to/friction.md"),
     Entry("Con-rod bearing of an engine", bearing, "../how-to/oil-film.md"),
     Entry("Table on four feet", table, "../how-to/misfits.md"),
     Entry("Planetary train", example("14", "planetary", turn("S", 10.0, 1260.0), 1), "../how-to/gears.md"),

@@ -141,6 +141,26 @@ def test_a_collar_lifted_beside_its_guide_jams() -> None:
     assert abs(both.checks.power[1]) < 1e-12
 
 
+def test_a_jammed_position_is_told_and_drawn() -> None:
+    """What jams, and from which part of the friction on; the picture says it and greys the links that do not."""
+    pytest.importorskip("matplotlib")
+    from matplotlib.colors import to_hex
+
+    from mechgraph import show
+    from mechgraph.show.canvas import FAINT
+
+    m = collar(0.3)
+    s = mg.solve(m, {"D": mg.Motion([0.0, 0.1], velocity=[1.0, -1.0])}, on_reach="flag")
+    assert s.status.tolist() == ["jams", "ok"]
+    assert s.jams == {0: (pytest.approx(0.25 / 0.3, rel=1e-9), ("A",))}
+    ax, free = show.draw_skeleton(s, 0, forces=True), show.draw_skeleton(s, 1, forces=True)
+    assert ax.get_title() == "jams: A\nfrom 0.833 of its friction on"
+    assert not free.get_title()
+    colors = [{text.get_text(): to_hex(text.get_color()) for text in one.texts} for one in (ax, free)]
+    assert [one["pusher"] == to_hex(FAINT) for one in colors] == [True, False]
+    assert [one["collar"] == to_hex(FAINT) for one in colors] == [False, False]
+
+
 def test_a_guide_that_is_embraced_or_embraces() -> None:
     """The friction of a shoe acts at the side of the guide; that of two shoes that press on opposite sides cancels but for the width."""
     for w in (0.02, -0.02):

@@ -16,6 +16,7 @@ from mechgraph.document import Document, Shown, to_text
 from mechgraph.equations.terms import State
 from mechgraph.errors import DeclarationError, visible
 from mechgraph.files import Format, csv_of, format_of, json_text, optional, plain, whole_file, write_whole
+from mechgraph.force.friction import OUTCOMES
 from mechgraph.maths.newton import Work
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import CHECKS, PATH
@@ -72,6 +73,13 @@ if TYPE_CHECKING:
 
 Doubt = LoadBearing | LiftOff | Overlap | Unbalanced | MisfitsLeftOut
 """What makes a solution doubtful."""
+
+
+class Jam(NamedTuple):
+    """By how much friction would have to fall, ``factor``, and the names of the ``places`` whose normal forces grow."""
+
+    factor: float
+    places: tuple[str, ...]
 
 
 class Column(NamedTuple):
@@ -613,6 +621,12 @@ class Solution(Shown):
     def losses(self) -> dict[str, Array]:
         """Power lost in the pairs with friction, by name, ``(...)``; never negative."""
         return losses(self._values)
+
+    @property
+    def jams(self) -> dict[int, Jam]:
+        """What jams, by the flat index of every position that does (status ``'jams'`` or ``'no finite force'``)."""
+        stuck = np.flatnonzero(np.isin(self.status, OUTCOMES[1:3]))
+        return {int(i): Jam(*self._values.friction_factor(int(i))) for i in stuck}
 
     @property
     def self_locking(self) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -12,6 +12,7 @@ import scipy
 
 from mechgraph.document import plain
 from mechgraph.errors import DeclarationError
+from mechgraph.force.friction import OUTCOMES
 from mechgraph.force.loads import user_poses
 from mechgraph.kinematics.assembly import assembled
 from mechgraph.kinematics.state import Configuration
@@ -27,6 +28,7 @@ from mechgraph.pairs.contact_types import is_open, takes_curves
 from mechgraph.pairs.curves import Travel, outside
 from mechgraph.pairs.travelling import Beside
 from mechgraph.result.solution import Solution
+from mechgraph.result.values import OK
 from mechgraph.result.views import BeltResult
 from mechgraph.show import shapes
 from mechgraph.show.shapes import FreedomLine, Shape, frame_along, lines_of, symbol
@@ -115,16 +117,16 @@ def scene(drawn: Solution | Mechanism, *, forces: bool = False, centers: bool = 
         system, x = assembled(drawn)
         found = scene_at(drawn, place_of_states(system, x[:, None]), np.zeros(1, dtype=np.intp))
     else:
-        good, place = place_of(drawn)
+        good, place = place_of(drawn, (OK, *OUTCOMES[1:]))
         found = scene_at(drawn.mechanism, place, good, drawn, forces=forces)
     shown = found.parts if centers else tuple(part for part in found.parts if part.role not in ("center", "tie"))
     return replace(found, parts=shown)
 
 
-def place_of(s: Solution) -> tuple[Any, DrawnPlace]:
-    """Flat indices of the solved positions of a solution, and where its mechanism stands there."""
+def place_of(s: Solution, outcomes: Sequence[str] = (OK,)) -> tuple[Any, DrawnPlace]:
+    """Flat indices of the positions of a solution with these outcomes, the solved ones, and where its mechanism stands there."""
     m = s.mechanism
-    good = np.flatnonzero(np.asarray(s.status).reshape(-1) == "ok")
+    good = np.flatnonzero(np.isin(np.asarray(s.status).reshape(-1), outcomes))
     if not good.size:
         raise DeclarationError(f"picture of {m.name!r}", ["the solution has no solved position"])
     return good, DrawnPlace(
@@ -545,7 +547,8 @@ def _law(stage: DrawnPose, i: int, load: Law) -> DrawnPart:
 def reactions(stage: DrawnPose, solution: Solution, positions: Any) -> tuple[list[DrawnPart], tuple[str, ...], float]:
     """Reaction forces on links b as arrows at their markers, pairs whose force is not unique, and the length of a unit of force."""
     values = {p.name: known_force(stage, solution, p, positions, stage.normal) for p in stage.m.pairs}
-    lost = tuple(name for name, force in values.items() if np.isnan(force).any())
+    solved = np.asarray(solution.status).reshape(-1)[positions] == OK
+    lost = tuple(name for name, force in values.items() if np.isnan(force[solved]).any())
     longest = max((float(np.nanmax(np.linalg.norm(v, axis=1), initial=0.0)) for v in values.values()), default=0.0)
     scale = LONGEST_ARROW * stage.size / longest if longest else 0.0
     out: list[DrawnPart] = []

@@ -37,6 +37,7 @@ from mechgraph.show.canvas import (
     inside,
     new_axes,
     nice_length,
+    said,
     scale_in,
     shaded,
     tint,
@@ -104,7 +105,7 @@ def draw_skeleton(
     centers : bool
         Mass centers.
     highlight : sequence
-        Names of pairs, or a loop (``report.loops[0]``); all other links are gray.
+        Names of pairs, or a loop (``report.loops[0]``); all other links are gray. Left out, what jams where the position does.
     view : (2,) tuple of float
         Elevation and azimuth [deg] of a spatial mechanism.
 
@@ -143,6 +144,10 @@ def draw_skeleton(
         raise DeclarationError(f"skeleton of {m.name!r}", faults)
     t = 0 if position is None else int(np.searchsorted(found.positions, position % size))
     painter = painter_for(found, ax, view)
+    if isinstance(s, Solution) and (stuck := s.jams.get(int(found.positions[t]))) is not None:
+        chosen = chosen or [name for name in stuck.places if name in names]
+        what = f"{np.asarray(s.status).reshape(-1)[found.positions[t]]}: {', '.join(map(said, stuck.places))}"
+        painter.ax.set_title(f"{what}\nfrom {stuck.factor:.3g} of its friction on", color=INK, fontsize=10)
     drawing = Drawing(found, painter, colours(m, chosen))
     others = np.unique(np.linspace(0, len(found.positions) - 1, ghosts + 1).astype(int)) if ghosts else ()
     drawing.ghosts([int(i) for i in others if i != t])
