@@ -72,6 +72,13 @@ def test_top_level_holds_the_allowed_names_only() -> None:
     assert {file.relative_to(ROOT).parts[0] for file in repository_files()} <= TOP_LEVEL
 
 
+def test_dataclasses_write_their_methods_when_they_are_used() -> None:
+    """``memo.dataclass``: some 250 classes take longer to write than all else that ``import mechgraph`` does."""
+    at_once = re.compile(r"^from dataclasses import [^\n]*\bdataclass\b|^@dataclasses\.dataclass", re.MULTILINE)
+    found = {name_of(file) for file in package_files() if at_once.search(file.read_text(encoding="utf-8"))}
+    assert found == {"mechgraph/pairs/pair_type.py"}  # rows of the table are made without ``__init__``
+
+
 def test_library_holds_no_python() -> None:
     assert not list((ROOT / "library").rglob("*.py"))
 

@@ -367,7 +367,7 @@ NUMBERS_STEP = 1e-7
 """What the numbers change by in that difference (radians, lengths / L): half the digits are left, which a prediction does not miss."""
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclass(frozen=True)
 class Together:
     """The solution of all variants that could be followed from the mechanism itself, and which could not (``alone``).
 
