@@ -94,43 +94,24 @@ def inclined(RI: Array, RJ: Array, angle: float) -> Directions:
 class JointRow(NamedTuple):
     """A joint: its pair, which of x, y, z of J in I are free, what holds its axes, and the name of its number in the file.
 
-    ``type`` is a symbol, or a function of ``angle`` (between the z axes) that makes the row of the pair table.
+    ``type`` is a symbol, a row of the pair table, or a function of ``angle`` (between the z axes) that makes one.
     """
 
-    type: str | Callable[[float], PairType]
+    type: str | PairType | Callable[[float], PairType]
     slides: tuple[bool, bool, bool]
     turns: Callable[[Array, Array, float], Directions]
     number: str = ""
     angle: float = np.pi / 2
 
-    @property
-    def anywhere(self) -> bool:
-        """Whether x, y and z of J in I are all free."""
-        return all(self.slides)
-
-    def pair_type(self) -> str | PairType:
-        """The pair."""
-        return self.type if isinstance(self.type, str) else self.type(self.angle)
-
 
 AT, ALONG, ACROSS, ANYWHERE = (False, False, False), (False, False, True), (True, True, False), (True, True, True)
 SLIDES = ("Tx", "Ty", "Tz")
-HELD_BY_MOTION = "held by a motion alone"
 
 
-def screw(_: float) -> PairType:
-    """Turn and slide in a fixed ratio, nothing else: in FreeCAD the bearings of a screw are joints of their own."""
-    return PairType("Screw", "turn and slide in a fixed ratio", freedoms=["Tx", "Ty", "Rz + pitch Tz", "Rx", "Ry"])
-
-
-def parallel(_: float) -> PairType:
-    """Z axes parallel."""
-    return PairType("Parallel", "z axes parallel", freedoms=[*SLIDES, "Rz"], reactions=["Mx", "My"])
-
-
-def no_rotation(_: float) -> PairType:
-    """All axes parallel."""
-    return PairType("NoRotation", "all axes parallel", freedoms=SLIDES, reactions=["Mx", "My", "Mz"])
+SCREW = PairType("Screw", "turn and slide in a fixed ratio", freedoms=["Tx", "Ty", "Rz + pitch Tz", "Rx", "Ry"])
+"""Nothing else: in FreeCAD the bearings of a screw are joints of their own."""
+PARALLEL = PairType("Parallel", "z axes parallel", freedoms=[*SLIDES, "Rz"], reactions=["Mx", "My"])
+NO_ROTATION = PairType("NoRotation", "all axes parallel", freedoms=SLIDES, reactions=["Mx", "My", "Mz"])
 
 
 def at_angle(angle: float) -> PairType:
@@ -153,7 +134,7 @@ def motion_type(order: str) -> str | PairType:
     """A pair without any reaction, for a motion between markers that no joint connects: slides along the axes of I, then turns in order."""
     if order == "xyz":
         return "Fr"
-    return PairType(f"Motion{order}", HELD_BY_MOTION, freedoms=[*SLIDES, *turns_in(order)], reactions=[])
+    return PairType(f"Motion{order}", "held by a motion alone", freedoms=[*SLIDES, *turns_in(order)], reactions=[])
 
 
 def ball_type(row: JointRow, order: str) -> PairType:
@@ -173,11 +154,11 @@ JOINTS: dict[str, JointRow] = {
     "PointInLineJoint": JointRow("Sg", ALONG, free),
     "PointInPlaneJoint": JointRow("Sp", ACROSS, free, "offset"),
     "LineInPlaneJoint": JointRow("Cp", ACROSS, inclined, "offset"),
-    "ScrewJoint": JointRow(screw, ANYWHERE, free, "pitch"),
-    "ParallelAxesJoint": JointRow(parallel, ANYWHERE, about_z),
+    "ScrewJoint": JointRow(SCREW, ANYWHERE, free, "pitch"),
+    "ParallelAxesJoint": JointRow(PARALLEL, ANYWHERE, about_z),
     "PerpendicularJoint": JointRow(at_angle, ANYWHERE, inclined),
     "AngleJoint": JointRow(at_angle, ANYWHERE, inclined, "theIzJz"),
-    "NoRotationJoint": JointRow(no_rotation, ANYWHERE, same),
+    "NoRotationJoint": JointRow(NO_ROTATION, ANYWHERE, same),
 }
 """Joints that have a pair."""
 
@@ -191,6 +172,7 @@ REFUSED = {
 FIRST_LINES = ("OndselSolver", "FreeCADMbD", "freeCAD: 3D CAD with Motion Simulation  by  askoh.com")
 IN_LINE = "InLineForceTorque"
 """The force that is read."""
+NO_FORCE = "forces are not read from FreeCAD files; delete it there and give the load in Python (mg.Spring, mg.Wrench, mg.Effort)"
 CONNECTIONS = ("Joints", "Motions", "Limits", "ForceTorques")
 """Blocks of what stands between two markers; the last one stands beside the others' block."""
 SECTIONS = (
@@ -217,11 +199,9 @@ class AsmtPart:
     line: int = 0
 
 
-@dataclass(frozen=True)
-class AsmtMarker:
+class AsmtMarker(NamedTuple):
     """A marker: its part and its pose ``(3, 4)`` in the frame of the part."""
 
-    path: str
     part: str
     pose: Array
 
@@ -269,22 +249,17 @@ class AsmtReader:
     def __init__(self, path: Path, text: str) -> None:
         lines = text.splitlines()
         if not lines or lines[0].strip() not in FIRST_LINES:
-            raise FileError(
-                path, f"is not a valid FreeCAD assembly file: line 1 is {shown(lines[0][:80] if lines else '')}"
-            )
+            first = shown(lines[0][:80] if lines else "")
+            raise FileError(path, f"is not a valid FreeCAD assembly file: line 1 is {first}")
         end = next((k for k, line in enumerate(lines) if line.startswith(RESULTS)), len(lines))
         self.results, self.results_line = lines[end:], end + 1
         top = tree_of(lines[1:end], 2).child("Assembly")
         if top is None:
             raise FileError(path, "is not a valid FreeCAD assembly file: there is no line Assembly")
-        self.top = top
-        self.faults: list[str] = []
-        self.notes: list[str] = []
-        self.markers: dict[str, AsmtMarker] = {}
-        self.parts: dict[str, AsmtPart] = {}
-        self.variables: dict[str, str] = {}
+        self.top, self.stem = top, path.stem
+        self.faults, self.notes = list[str](), list[str]()
+        self.markers, self.parts, self.variables = dict[str, AsmtMarker](), dict[str, AsmtPart](), dict[str, str]()
         self.connected: dict[str, list[Connection]] = {key: [] for key in CONNECTIONS}
-        self.stem = path.stem
 
     def pose(self, node: Node, where: str) -> Array:
         """Position3D and RotationMatrix of a node as a pose; the identity where it has neither."""
@@ -317,7 +292,7 @@ class AsmtReader:
         axes = self.pose(mass, f"{where}: PrincipalMassMarker")
         if mass.word("Name"):
             self.marker(mass, f"{path}/{mass.word('Name')}", name, axes)
-        weight = float(mass.numbers("Mass", (1,), where, self.faults)[0])
+        weight = mass.number("Mass", where, self.faults)
         moments = mass.numbers("MomentOfInertias", (3,), where, self.faults)
         if weight < 0:
             self.faults.append(f"line {mass.line}: {where}: Mass = {weight:g}: a mass is not below 0")
@@ -329,7 +304,7 @@ class AsmtReader:
         """Notes a marker."""
         if path in self.markers:
             self.faults.append(f"line {node.line}: two markers are named {path}")
-        self.markers[path] = AsmtMarker(path, part, pose)
+        self.markers[path] = AsmtMarker(part, pose)
 
     def connections(self, entries: Sequence[Node], within: str) -> list[Connection]:
         """Joints, motions, limits or forces of an assembly; those without a name of their own get one."""
@@ -370,15 +345,11 @@ class AsmtReader:
     def between(self, node: Node, within: str) -> None:
         """Joints, motions, limits and forces of an assembly; constraints and forces of other kinds are faults."""
         sets = node.child("ConstraintSets") or Node("", 0)
-        for other in (entry for key in sets.children if key.text not in CONNECTIONS for entry in key.children):
-            why = REFUSED.get(other.text, "not known here")
-            self.faults.append(f"line {other.line}: {other.text} {shown(other.word('Name'))}: {why}")
         forces = node.under(CONNECTIONS[-1])
-        for force in (other for other in forces if other.text != IN_LINE):
-            self.faults.append(
-                f"line {force.line}: {force.text} {shown(force.word('Name'))}: forces are not read from FreeCAD files; delete it there "
-                "and give the load in Python (mg.Spring, mg.Wrench, mg.Effort)"
-            )
+        refused = [entry for key in sets.children if key.text not in CONNECTIONS for entry in key.children]
+        for other in (*refused, *(force for force in forces if force.text != IN_LINE)):
+            why = NO_FORCE if other in forces else REFUSED.get(other.text, "not known here")
+            self.faults.append(f"line {other.line}: {other.text} {shown(other.word('Name'))}: {why}")
         lists = [*(sets.under(key) for key in CONNECTIONS[:-1]), [force for force in forces if force.text == IN_LINE]]
         for key, entries in zip(CONNECTIONS, lists, strict=True):
             self.connected[key] += self.connections(entries, within)
@@ -402,9 +373,7 @@ class AsmtReader:
         node = self.top.child("SimulationParameters")
         if node is None:
             return np.zeros(1)
-        start, end, step = (
-            float(node.numbers(key, (1,), "SimulationParameters", self.faults)[0]) for key in ("tstart", "tend", "hout")
-        )
+        start, end, step = (node.number(key, "SimulationParameters", self.faults) for key in ("tstart", "tend", "hout"))
         count = round((end - start) / step) if step > 0 and end > start else 0
         return np.asarray(start + step * np.arange(min(count, LONGEST_SWEEP - 1) + 1), float)
 
@@ -542,10 +511,8 @@ class Standing:
         markers = self.assembly.markers
         missing = [path for path in (found.i, found.j) if path not in markers]
         if missing:
-            known = listed(markers, 8)
-            self.faults.append(
-                f"{found.title}: there is no marker {', '.join(map(shown, missing))} (there are: {known})"
-            )
+            names, known = ", ".join(map(shown, missing)), listed(markers, 8)
+            self.faults.append(f"{found.title}: there is no marker {names} (there are: {known})")
             return None
         return markers[found.i].part, markers[found.j].part
 
@@ -557,6 +524,10 @@ class Standing:
     def own(self, part: str, X: Array) -> Array:
         """A pose of the assembly in the frame of a part; that of the ground is global."""
         return X if part == self.assembly.name else compose(inverse(self.part(part).pose), X)
+
+    def number(self, joint: Connection, label: str) -> float:
+        """A number of a joint."""
+        return joint.node.number(label, joint.title.partition(": ")[2], self.faults)
 
     def fits(self, joint: Connection, distance: float, angle: float) -> bool:
         """Whether the markers of a joint meet; where they do not, or parts have to be moved for it, that is said."""
@@ -630,17 +601,15 @@ class Comparison(Shown):
     def document(self) -> Document:
         """The verdict and a table."""
         off = [d for d in self.differences if d.relative > AGREES]
-        worst = max(off, key=lambda d: d.relative, default=None)
         verdict = f"All that is unique agrees to {AGREES:g}"
-        if worst is not None:
+        if off:
+            worst = max(off, key=lambda d: d.relative)
             count = f"Quantities off by more than {AGREES:g}: {len(off)} of {len(self.differences)}"
             verdict = f"{count}, {worst.quantity} of {worst.of} the most"
         head = ("of", "quantity", "greatest in the file", "difference", "relative", "")
         rows = tuple(d.cells() for d in self.differences)
-        return Document(
-            f"{self.name}: FreeCAD's stored results beside mechgraph's",
-            (Paragraph(f"{verdict}, at {self.times} times."), Table(head, rows, "llrrrl")),
-        )
+        blocks = (Paragraph(f"{verdict}, at {self.times} times."), Table(head, rows, "llrrrl"))
+        return Document(f"{self.name}: FreeCAD's stored results beside mechgraph's", blocks)
 
 
 def difference(of: str, quantity: str, ours: Array, theirs: Array, size: float | None = None) -> Difference:

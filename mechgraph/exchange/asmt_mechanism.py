@@ -50,12 +50,17 @@ import os
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
+import networkx as nx
 import numpy as np
 import scipy
 
 from mechgraph.errors import ContentError, DeclarationError, FileError, MechgraphWarning, listed
 from mechgraph.exchange.asmt import (
+    ACROSS,
+    ALONG,
+    AT,
     FITS,
     HALF_TURNS,
     JOINTS,
@@ -80,8 +85,8 @@ from mechgraph.exchange.asmt import (
     results_of,
     turns_in,
 )
-from mechgraph.exchange.syntax import FormulaFault, evaluated, law
-from mechgraph.fields import second_direction
+from mechgraph.exchange.syntax import FormulaFault, evaluated, law, marker_at, pose_about
+from mechgraph.fields import axes_of
 from mechgraph.kinetostatics import solve
 from mechgraph.maths.inertia import physical_faults
 from mechgraph.maths.se3 import Array, compose, inverse
@@ -90,7 +95,7 @@ from mechgraph.model.couplings import Coupling
 from mechgraph.model.loads import ForceLaw, Gravity, Spring
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Drive, Motion
-from mechgraph.model.pair import Link, Marker, Pair
+from mechgraph.model.pair import Link, Pair
 from mechgraph.quantities import shown
 from mechgraph.result.solution import Solution
 
@@ -112,7 +117,7 @@ def rod(builder: Standing, joint: Connection) -> tuple[Link, list[Pair]] | None:
     if builder.ends(joint) is None:
         return None
     kinds = RODS[joint.kind]
-    length = float(joint.node.numbers("distanceIJ", (1,), joint.title.partition(": ")[2], builder.faults)[0])
+    length = builder.number(joint, "distanceIJ")
     poses = [builder.pose(path) for path in (joint.i, joint.j)]
     points, axes = [X[:, 3] for X in poses], [X[:, 2] for X in poses]
     if np.linalg.norm(np.cross(axes[0], axes[1])) <= FITS:
@@ -123,29 +128,16 @@ def rod(builder: Standing, joint: Connection) -> tuple[Link, list[Pair]] | None:
     ]
     across = feet[1] - feet[0]
     if not (length > 0 and np.linalg.norm(across) > FITS * builder.size):
-        builder.faults.append(
-            f"{joint.title}: distanceIJ = {length:g}: expected a distance above 0 of what is apart as the parts stand"
-        )
+        expected = "expected a distance above 0 of what is apart as the parts stand"
+        builder.faults.append(f"{joint.title}: distanceIJ = {length:g}: {expected}")
         return None
     ends = [feet[0], feet[0] + length * across / np.linalg.norm(across)]
     pairs = []
     for side, (kind, _), path, foot, end, z in zip("IJ", kinds, (joint.i, joint.j), feet, ends, axes, strict=True):
         part = builder.assembly.markers[path].part
-        X = np.column_stack([_axes(z), foot])
-        markers = [
-            Marker(tuple(Y[:, 3]), tuple(Y[:, 2]), tuple(Y[:, 0]))
-            for Y in (builder.own(part, X), np.column_stack([X[:, :3], end]))
-        ]
-        pairs.append(Pair(f"{joint.name} {side}", kind, part, joint.name, on_a=markers[0], on_b=markers[1]))
+        on_a, on_b = marker_at(builder.own(part, pose_about(z, foot))), marker_at(pose_about(z, end))
+        pairs.append(Pair(f"{joint.name} {side}", kind, part, joint.name, on_a=on_a, on_b=on_b))
     return Link(joint.name), pairs
-
-
-def _axes(z: Array) -> Array:
-    """A rotation with the third axis ``z``."""
-    x = np.asarray(second_direction(tuple(z.tolist())), dtype=float)
-    x = x - (x @ z) * z
-    x = x / np.linalg.norm(x)
-    return np.column_stack([x, np.cross(z, x), z])
 
 
 GEARED = ("GearJoint", "RackPinionJoint")
@@ -159,20 +151,18 @@ def geared(builder: Standing, joint: Connection, pairs: Sequence[Pair]) -> Coupl
     if builder.ends(joint) is None:
         return None
     names = ("radiusI", "radiusJ") if joint.kind == "GearJoint" else ("pitchRadius",)
-    radii = [float(joint.node.numbers(name, (1,), joint.title.partition(": ")[2], builder.faults)[0]) for name in names]
+    radii = [builder.number(joint, name) for name in names]
     if not all(radii):
-        builder.faults.append(
-            f"{joint.title}: {', '.join(names)} = {', '.join(f'{r:g}' for r in radii)}: expected no zero"
-        )
+        given = ", ".join(f"{r:g}" for r in radii)
+        builder.faults.append(f"{joint.title}: {', '.join(names)} = {given}: expected no zero")
         return None
-    J = builder.pose(joint.j)
+    axis = builder.pose(joint.i)[:, 2]
     if joint.kind == "GearJoint":
-        first, second, what = _turns(builder, joint.i, pairs, builder.pose(joint.i)[:, 2]), J[:, 2], "turn about"
-        ratio = radii[0] / radii[1]
+        first, what, ratio = _turns(builder, joint.i, pairs, axis), "turn about", radii[0] / radii[1]
+        axis = builder.pose(joint.j)[:, 2]
     else:
-        first, second, what = _slides(builder, joint.i, pairs), builder.pose(joint.i)[:, 2], "slide along x of"
-        ratio = -1.0 / radii[0]
-    others = _turns(builder, joint.j, pairs, second)
+        first, what, ratio = _slides(builder, joint.i, pairs), "slide along x of", -1.0 / radii[0]
+    others = _turns(builder, joint.j, pairs, axis)
     carrier = next((part for part in first if part in others), None)
     if carrier is None:
         builder.faults.append(
@@ -236,10 +226,7 @@ def force(builder: Standing, found: Connection) -> Spring | ForceLaw | None:
     try:
         tension = law(found.node.word("tension"), builder.assembly.variables)
         if law(found.node.word("twist") or "0", builder.assembly.variables)(*LOOKED_AT).any():
-            builder.faults.append(
-                f"{found.title}: twist: a couple about the line of two points is no load here; delete it there"
-            )
-            return None
+            raise FormulaFault("twist: a couple about the line of two points is no load here; delete it there")
         T = tension(*LOOKED_AT)
     except FormulaFault as fault:
         builder.faults.append(f"{found.title}: {fault}")
@@ -262,17 +249,16 @@ def force(builder: Standing, found: Connection) -> Spring | ForceLaw | None:
 
 
 CONSTANT_VELOCITY = "ConstantVelocityJoint"
-AXES = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
+AXES = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0]])
 """The first axis of a universal joint, z, along x of the marker, its second, x, along y."""
 
 
-@dataclass(frozen=True)
-class Bend:
+class Bend(NamedTuple):
     """What stands for a joint of constant velocity."""
 
     link: Link
-    pairs: tuple[Pair, ...]
-    couplings: tuple[Coupling, ...]
+    pairs: Sequence[Pair]
+    couplings: Sequence[Coupling]
     start: Mapping[str, float]
 
 
@@ -291,46 +277,25 @@ def bent(builder: Standing, joint: Connection) -> Bend | None:
     given = np.column_stack([J[:, :3] @ half, J[:, 3]])
     x, y, z, w = scipy.spatial.transform.Rotation.from_matrix(I[:, :3].T @ given[:, :3]).as_quat(canonical=True)
     p, q = float(np.arctan2(x, w)), float(np.arctan2(y, np.hypot(x, w)))
-    turn = scipy.spatial.transform.Rotation.from_euler("XY", [p, q]).as_matrix()
-    back = scipy.spatial.transform.Rotation.from_euler("YX", [q, p]).as_matrix()
-    distance, angle = (
-        float(np.linalg.norm(J[:, 3] - I[:, 3])),
-        2 * float(np.arctan2(abs(z), np.hypot(np.hypot(x, y), w))),
+    turn, back = (
+        scipy.spatial.transform.Rotation.from_euler(order, angles).as_matrix()
+        for order, angles in (("XY", [p, q]), ("YX", [q, p]))
     )
-    fits = builder.fits(joint, distance, angle)
+    distance, angle = np.linalg.norm(J[:, 3] - I[:, 3]), 2 * np.arctan2(abs(z), np.hypot(np.hypot(x, y), w))
+    fits = builder.fits(joint, float(distance), float(angle))
     between = np.column_stack([I[:, :3] @ turn, I[:, 3]])
     end = np.column_stack([between[:, :3] @ back, I[:, 3]]) if fits else given
-    pairs = tuple(
-        Pair(
-            f"{joint.name} {side}",
-            "U",
-            part,
-            joint.name,
-            on_a=_universal_marker(builder.own(part, X)),
-            on_b=_universal_marker(between),
-        )
-        for side, path, X in (("I", joint.i, I), ("J", joint.j, end))
-        for part in [builder.assembly.markers[path].part]
-    )
-    names = [f"{joint.name} {side}" for side in "IJ"]
-    couplings = tuple(
-        Coupling(
-            dict.fromkeys([f"{name}.{turn}" for name in names], 1.0), name=f"{joint.name} halves {turn}", constant=0.0
-        )
+    pairs, start = list[Pair](), dict[str, float]()
+    for side, path, X, sign in (("I", joint.i, I, 1), ("J", joint.j, end, -1)):
+        part, name = builder.assembly.markers[path].part, f"{joint.name} {side}"
+        on_a, on_b = (marker_at(compose(Y, AXES)) for Y in (builder.own(part, X), between))
+        pairs.append(Pair(name, "U", part, joint.name, on_a=on_a, on_b=on_b))
+        start |= {f"{name}.Rz": sign * p, f"{name}.Rx": sign * q}
+    couplings = [
+        Coupling({f"{pair.name}.{turn}": 1.0 for pair in pairs}, name=f"{joint.name} halves {turn}", constant=0.0)
         for turn in ("Rz", "Rx")
-    )
-    start = {
-        f"{name}.{turn}": sign * value
-        for name, sign in zip(names, (1, -1), strict=True)
-        for turn, value in (("Rz", p), ("Rx", q))
-    }
+    ]
     return Bend(Link(joint.name), pairs, couplings, start)
-
-
-def _universal_marker(X: Array) -> Marker:
-    """The marker of a universal joint at a pose."""
-    R = X[:, :3] @ AXES
-    return Marker(tuple(X[:, 3]), tuple(R[:, 2]), tuple(R[:, 0]))
 
 
 @dataclass
@@ -348,12 +313,7 @@ class Seat:
     @property
     def is_ball(self) -> bool:
         """Whether J turns in any way about a point that the joint holds."""
-        return self.row.turns is free and not self.row.anywhere
-
-    @property
-    def misfit(self) -> tuple[float, float]:
-        """Distance and angle by which J misses its place."""
-        return float(np.linalg.norm(self.given[:, 3] - self.on_b[:, 3])), self.directions.error
+        return self.row.turns is free and not all(self.row.slides)
 
 
 GENERAL = "GeneralMotion"
@@ -385,21 +345,19 @@ class Builder(Standing):
         """The row with the angle of the joint; axes at the angle 0 are parallel."""
         if row.number != "theIzJz" or joint.node.child(row.number) is None:
             return row
-        angle = self.number(joint, row)
+        angle = self.number(joint, row.number)
         return row._replace(angle=angle) if abs(np.sin(angle)) > FITS else JOINTS["ParallelAxesJoint"]
 
-    def number(self, joint: Connection, row: JointRow) -> float:
-        """The number of a joint (offset, pitch, angle); 0 where it has none."""
-        if not row.number or joint.node.child(row.number) is None:
-            return 0.0
-        return float(joint.node.numbers(row.number, (1,), joint.title.partition(": ")[2], self.faults)[0])
+    def row_number(self, joint: Connection, row: JointRow) -> float:
+        """The number of a joint (offset, pitch); 0 where it has none."""
+        return self.number(joint, row.number) if row.number and joint.node.child(row.number) else 0.0
 
     def seat(self, joint: Connection, row: JointRow, I: Array) -> Seat:
         """Markers of the pair for the pose of I: the place of J, and the coordinates there."""
         J = self.pose(joint.j)
         d = row.turns(I[:, :3], J[:, :3], row.angle)
-        offset = self.number(joint, row) if row.slides[:2] == (True, True) and not row.anywhere else 0.0
-        A = np.column_stack([d.on_a, J[:, 3] if row.anywhere else I[:, 3] + offset * I[:, 2]])
+        offset = self.row_number(joint, row) if row.slides == ACROSS else 0.0
+        A = np.column_stack([d.on_a, J[:, 3] if all(row.slides) else I[:, 3] + offset * I[:, 2]])
         along = np.where(row.slides, d.on_a.T @ (J[:, 3] - A[:, 3]), 0.0)
         on_b = np.column_stack([d.on_b, A[:, 3] + d.on_a @ along])
         start = {name: float(value) for name, value, is_free in zip(SLIDES, along, row.slides, strict=True) if is_free}
@@ -407,13 +365,8 @@ class Builder(Standing):
 
     def seats(self) -> list[Seat]:
         """All joints, their axes and lines made exactly parallel, perpendicular and one where they are nearly so."""
-        found = list(self.rows())
         snap = Snapping(FITS * self.size)
-        out = []
-        for joint, row in found:
-            I = self.pose(joint.i)
-            fixed = np.column_stack([*self.straightened(snap, joint, row, I)])
-            out.append(self.seat(joint, row, fixed))
+        out = [self.seat(joint, row, self.straightened(snap, row, self.pose(joint.i))) for joint, row in self.rows()]
         if snap.largest > UNMENTIONED:
             self.notes.append(
                 f"axes that are parallel or perpendicular to {FITS:g} rad, and lines that are one to {FITS:g} L, were made so exactly "
@@ -421,41 +374,33 @@ class Builder(Standing):
             )
         return out
 
-    def straightened(self, snap: Snapping, joint: Connection, row: JointRow, I: Array) -> tuple[Array, Array]:
-        """Rotation and origin of marker I with its axis made exact."""
+    def straightened(self, snap: Snapping, row: JointRow, I: Array) -> Array:
+        """The pose of marker I with its axis made exact."""
         if row.turns is free and not any(row.slides):
-            return I[:, :3], I[:, 3]
+            return I
         z = snap.direction(I[:, 2])
         x = snap.direction(I[:, 0] - (I[:, 0] @ z) * z)
-        x = x - (x @ z) * z
-        R = np.column_stack([x / np.linalg.norm(x), np.cross(z, x / np.linalg.norm(x)), z])
-        is_line = row.slides in (JOINTS["RevoluteJoint"].slides, JOINTS["CylindricalJoint"].slides)
-        return R, snap.on_line(I[:, 3], z) if is_line else I[:, 3]
+        point = snap.on_line(I[:, 3], z) if row.slides in (AT, ALONG) else I[:, 3]
+        return np.column_stack([axes_of(z, x), point])
 
     def pair(self, seat: Seat) -> Pair:
         """The pair, marker J moved to its place where it is meant to be there."""
-        distance, angle = seat.misfit
-        joint, d = seat.joint, seat.directions
+        joint, d, row = seat.joint, seat.directions, seat.row
         if d.turned:
             self.notes.append(
                 f"{joint.kind} {joint.name!r}: marker {joint.j} points the opposite way of {joint.i} and was turned half round"
             )
-        fits = self.fits(joint, distance, angle)
-        pitch = self.number(joint, seat.row) / (2 * np.pi) if seat.row.number == "pitch" else None
-        return self.by_markers(
-            joint.name, seat.row.pair_type(), joint, seat.on_a, seat.on_b if fits else seat.given, pitch
-        )
+        fits = self.fits(joint, float(np.linalg.norm(seat.given[:, 3] - seat.on_b[:, 3])), d.error)
+        pitch = self.row_number(joint, row) / (2 * np.pi) if row.number == "pitch" else None
+        kind = row.type(row.angle) if callable(row.type) else row.type
+        return self.by_markers(joint.name, kind, joint, seat.on_a, seat.on_b if fits else seat.given, pitch)
 
     def by_markers(
         self, name: str, kind: object, of: Connection, A: Array, B: Array, pitch: float | None = None
     ) -> Pair:
         """A pair whose markers have these poses in the assembly; each is written in the frame of its part, that of the ground is global."""
-        links = [self.assembly.markers[path].part for path in (of.i, of.j)]
-        markers = []
-        for link, X in zip(links, (A, B), strict=True):
-            own = self.own(link, X)
-            markers.append(Marker(tuple(own[:, 3]), tuple(own[:, 2]), tuple(own[:, 0])))
-        return Pair(name, kind, *links, on_a=markers[0], on_b=markers[1], pitch=pitch)
+        a, b = (self.assembly.markers[path].part for path in (of.i, of.j))
+        return Pair(name, kind, a, b, on_a=marker_at(self.own(a, A)), on_b=marker_at(self.own(b, B)), pitch=pitch)
 
     # --- motions ---------------------------------------------------------------------------------------------------
 
@@ -463,11 +408,10 @@ class Builder(Standing):
         """Drives of all motions, pairs for those between markers that no joint connects, and start values of all pairs."""
         pairs = {seat.joint.name: self.pair(seat) for seat in seats}
         start = {
-            f"{name}.{key}": value
+            f"{seat.joint.name}.{key}": value
             for seat in seats
-            for name, freedoms in [(seat.joint.name, [f.name for f in pairs[seat.joint.name].type.freedoms])]
             for key, value in seat.start.items()
-            if key in freedoms and not seat.row.anywhere
+            if key in [f.name for f in pairs[seat.joint.name].type.freedoms] and not all(seat.row.slides)
         }
         drives: dict[str, Drive] = {}
         for motion in self.assembly.motions:
@@ -592,17 +536,10 @@ class Builder(Standing):
     def links(self, pairs: Sequence[Pair]) -> list[Link]:
         """The ground and the parts that joints or motions reach; parts that hang together without the ground are a fault."""
         a = self.assembly
-        neighbours: dict[str, list[str]] = {}
-        for pair in pairs:
-            neighbours.setdefault(pair.a, []).append(pair.b)
-            neighbours.setdefault(pair.b, []).append(pair.a)
-        reached, front = {a.name}, [a.name]
-        while front:
-            new = [end for end in neighbours.get(front.pop(), ()) if end not in reached]
-            reached.update(new)
-            front += new
-        loose = [name for name in a.parts if name in neighbours and name not in reached]
-        alone = [name for name in a.parts if name not in neighbours]
+        joined: nx.Graph[str] = nx.Graph((pair.a, pair.b) for pair in pairs)
+        reached = nx.node_connected_component(joined, a.name) if a.name in joined else {a.name}
+        loose = [name for name in a.parts if name in joined and name not in reached]
+        alone = [name for name in a.parts if name not in joined]
         if loose:
             self.faults.append(
                 f"parts {listed(loose)} are joined to each other, but not to the ground; ground one of them in FreeCAD"
@@ -624,13 +561,6 @@ class Builder(Standing):
         if odd:
             self.notes.append(f"the moments of inertia of part {part.name!r} are those of no body")
         return Link(part.name, part.mass, part.center, part.inertia, unphysical=odd)
-
-    def limit(self, found: Connection) -> str:
-        """A limit in words."""
-        what = f"between {found.i} and {found.j}" if found.i else f"of {found.joint}"
-        return (
-            f"{found.kind} {found.name!r} {what} ({found.node.word('Type')} {found.node.word('Limit')}) is not applied"
-        )
 
     def build(self) -> tuple[Mechanism, tuple[str, ...]]:
         """The mechanism and the notes.
@@ -658,7 +588,10 @@ class Builder(Standing):
                 f"{len(self.moved)} marker{'s' * (len(self.moved) > 1)} moved so that the joints fit exactly, {far} the most: "
                 f"by {distance:.2g} and {angle:.2g} rad"
             )
-        self.notes += [self.limit(found) for found in a.limits]
+        for limit in a.limits:
+            what = f"between {limit.i} and {limit.j}" if limit.i else f"of {limit.joint}"
+            bound = f"{limit.node.word('Type')} {limit.node.word('Limit')}"
+            self.notes.append(f"{limit.kind} {limit.name!r} {what} ({bound}) is not applied")
         notes = (*a.notes, *self.notes)
         if self.faults:
             raise DeclarationError(f"assembly {shown(a.name)}", self.faults)
@@ -703,18 +636,12 @@ class _Compared:
     def parts(self) -> Iterator[Difference]:
         """Places, relative to the largest coordinate of all, and turns of the parts."""
         paths = {part.path: part.name for part in self.assembly.parts.values()}
-        known = set(self.s.mechanism.link_names())
-        stored = {
-            paths[path]: rows for (kind, path), rows in self.results.series.items() if kind == "Part" and path in paths
-        }
-        stored = {name: rows for name, rows in stored.items() if name in known}
-        size = max(
-            (float(np.abs(p).max()) for rows in stored.values() if (p := _rows(rows, ("X", "Y", "Z"))) is not None),
-            default=1.0,
-        )
-        for name, rows in stored.items():
-            place, angles = _rows(rows, ("X", "Y", "Z")), _rows(rows, ("Bryantx", "Bryanty", "Bryantz"))
-            X = self.s.link(name).pose
+        of = {path: name for path, name in paths.items() if name in self.s.mechanism.link_index}
+        stored = {of[path]: rows for (kind, path), rows in self.results.series.items() if kind == "Part" and path in of}
+        places = {name: _rows(rows, ("X", "Y", "Z")) for name, rows in stored.items()}
+        size = max((float(np.abs(p).max()) for p in places.values() if p is not None), default=1.0)
+        for name, place in places.items():
+            X, angles = self.s.link(name).pose, _rows(stored[name], ("Bryantx", "Bryanty", "Bryantz"))
             if place is not None:
                 yield difference(name, "place", X[:, :3, 3], place, size)
             if angles is not None:
@@ -774,9 +701,8 @@ def compare(path: str | os.PathLike[str]) -> Comparison:
     assembly = assembly_of(path)
     results = results_of(assembly, path)
     if not assembly.motions:
-        raise FileError(
-            path, "has no motions: its results are a free movement, which cannot be computed from positions alone"
-        )
+        why = "its results are a free movement, which cannot be computed from positions alone"
+        raise FileError(path, f"has no motions: {why}")
     try:
         m, _ = mechanism_of(dataclasses.replace(assembly, times=results.times))
     except DeclarationError as error:

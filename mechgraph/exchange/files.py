@@ -11,7 +11,6 @@ from __future__ import annotations
 import json
 import os
 import warnings
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -59,9 +58,8 @@ def graph_of(m: Mechanism) -> nx.MultiGraph[str]:
             through[pair].append(f"{sign * number:+d}")
     driven = {m.full_name(d.freedom) for d in m.drives}
     for one, loops in zip(m.pairs, through, strict=True):
-        graph.add_edge(
-            visible(one.a), visible(one.b), key=visible(one.name), **_facts(one, driven), loops=" ".join(loops)
-        )
+        key, facts = visible(one.name), _facts(one, driven)
+        graph.add_edge(visible(one.a), visible(one.b), key=key, **facts, loops=" ".join(loops))
     return graph
 
 
@@ -79,20 +77,22 @@ def _vector(name: str, values: Any) -> dict[str, float]:
     return {} if values is None else {f"{name}_{letter}": float(v) for letter, v in zip("xyz", values, strict=True)}
 
 
-Notes = tuple[str, ...]
+READERS = (".asmt", ".xml", ".mjcf", ".urdf")
+"""Suffixes of files of other programs; these are rare: what reads and writes them is loaded where it is asked for."""
 
 
-# files of other programs are rare: what reads and writes them is loaded where it is asked for
+def _read(path: Path) -> tuple[Mechanism, tuple[str, ...]]:
+    """The mechanism of such a file, and what was taken otherwise than it stands there."""
+    match path.suffix.lower():
+        case ".asmt":
+            from mechgraph.exchange.asmt import assembly_of
+            from mechgraph.exchange.asmt_mechanism import mechanism_of
 
+            return mechanism_of(assembly_of(path))
+        case ".urdf":
+            from mechgraph.exchange.urdf import read_urdf
 
-def _from_asmt(path: Path) -> tuple[Mechanism, Notes]:
-    from mechgraph.exchange.asmt import assembly_of
-    from mechgraph.exchange.asmt_mechanism import mechanism_of
-
-    return mechanism_of(assembly_of(path))
-
-
-def _from_mjcf(path: Path) -> tuple[Mechanism, Notes]:
+            return read_urdf(path)
     from mechgraph.exchange.mjcf import read_mjcf
 
     return read_mjcf(path)
@@ -102,21 +102,6 @@ def _to_mjcf(m: Mechanism, path: str | os.PathLike[str]) -> None:
     from mechgraph.exchange.mjcf import save_mjcf
 
     save_mjcf(m, path)
-
-
-def _from_urdf(path: Path) -> tuple[Mechanism, Notes]:
-    from mechgraph.exchange.urdf import read_urdf
-
-    return read_urdf(path)
-
-
-READERS: dict[str, Callable[[Path], tuple[Mechanism, Notes]]] = {
-    ".asmt": _from_asmt,
-    ".xml": _from_mjcf,
-    ".mjcf": _from_mjcf,
-    ".urdf": _from_urdf,
-}
-"""Readers by suffix: the mechanism of a file, and what was taken otherwise than it stands there."""
 
 
 @door
@@ -152,12 +137,11 @@ def load(name: str | os.PathLike[str]) -> Mechanism:
     >>> mg.load("rcsr")
     Mechanism('rcsr', 4 links, 4 pairs)
     """
-    reader = READERS.get(Path(os.fsdecode(name)).suffix.lower()) if isinstance(name, str | os.PathLike) else None
-    if reader is None:
+    path = Path(os.fsdecode(name)) if isinstance(name, str | os.PathLike) else Path()
+    if path.suffix.lower() not in READERS:
         return toml.load(name)
-    path = Path(os.fsdecode(name))
     try:
-        made, notes = reader(path)
+        made, notes = _read(path)
     except DeclarationError as error:
         raise ContentError(path, error) from None
     for note in notes:

@@ -20,8 +20,9 @@ import html
 import os
 import re
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,8 @@ import numpy as np
 import scipy
 
 from mechgraph.errors import HIDDEN, DeclarationError, FileError
-from mechgraph.exchange.syntax import XmlElement, read_xml
+from mechgraph.exchange.syntax import XmlElement, marker_at, pose_about, read_xml
+from mechgraph.fields import axes_of
 from mechgraph.files import write_whole
 from mechgraph.kinetostatics import assemble
 from mechgraph.maths.inertia import physical_faults, shifted
@@ -39,7 +41,7 @@ from mechgraph.model.couplings import Coupling
 from mechgraph.model.loads import Gravity
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Drive
-from mechgraph.model.pair import Link, Marker, Pair, second_direction
+from mechgraph.model.pair import Link, Pair
 from mechgraph.pairs import pair_type as evaluation
 from mechgraph.pairs.factors import ConstantScrew
 from mechgraph.quantities import shown
@@ -63,56 +65,45 @@ def pose_of(e: XmlElement, c: Compiler) -> Array:
     given = [key for key in ORIENTATIONS if key in e.attributes]
     if len(given) > 1:
         c.faults.append(f"{e.title}: has {' and '.join(given)}; one of them says the orientation")
-    R = ORIENTATIONS[given[0]](e, c) if given else np.eye(3)
+    R = _rotation(given[0], e.numbers(given[0], ORIENTATIONS[given[0]], None, c.faults), e, c) if given else np.eye(3)
     return np.column_stack([R, e.numbers("pos", (3,), np.zeros(3), c.faults)])
 
 
-def _of_euler(e: XmlElement, c: Compiler) -> Array:
-    """Three turns in the order of the compiler, about axes that turn along (small letters) or stay (capitals)."""
-    angles = [c.angle(v) for v in e.numbers("euler", (3,), None, c.faults)]
+ORIENTATIONS = {"quat": (4,), "axisangle": (4,), "euler": (3,), "xyaxes": (2, 3), "zaxis": (3,)}
+"""Attributes that say an orientation, with the shapes of their numbers."""
+
+
+def _rotation(key: str, given: Array, e: XmlElement, c: Compiler) -> Array:
+    """The orientation that an attribute says; one without a direction is none.
+
+    ``euler``: three turns in the order of the compiler, about axes that turn along (small letters) or stay (capitals). ``zaxis``: the
+    smallest turn that brings z there.
+    """
     turn: Any = scipy.spatial.transform.Rotation
-    return np.asarray(turn.from_euler(c.order.swapcase(), angles).as_matrix())
-
-
-def _of_quat(e: XmlElement, c: Compiler) -> Array:
-    q = e.numbers("quat", (4,), None, c.faults)
-    return quaternion_matrix(q / np.linalg.norm(q)) if q.any() else np.eye(3)
-
-
-def _of_axisangle(e: XmlElement, c: Compiler) -> Array:
-    *axis, angle = e.numbers("axisangle", (4,), None, c.faults)
-    turn: Any = scipy.spatial.transform.Rotation
-    return np.asarray(turn.from_rotvec(np.array(axis) / (np.linalg.norm(axis) or 1.0) * c.angle(angle)).as_matrix())
-
-
-def _of_xyaxes(e: XmlElement, c: Compiler) -> Array:
-    x, y = e.numbers("xyaxes", (2, 3), None, c.faults)
-    z = np.cross(x, y)
-    if not z.any():
-        c.faults.append(f"{e.title}: xyaxes are parallel")
+    if key == "euler":
+        return np.asarray(turn.from_euler(c.order.swapcase(), [c.angle(v) for v in given]).as_matrix())
+    if key == "xyaxes":
+        x, z = given[0], np.cross(*given)
+        if not z.any():
+            c.faults.append(f"{e.title}: xyaxes are parallel")
+            return np.eye(3)
+        return axes_of(z, x)
+    if not (given[:3] if key == "axisangle" else given).any():
         return np.eye(3)
-    return np.column_stack([v / np.linalg.norm(v) for v in (x, np.cross(z, x), z)])
-
-
-def _of_zaxis(e: XmlElement, c: Compiler) -> Array:
-    """The smallest turn that brings z there."""
-    z = e.numbers("zaxis", (3,), None, c.faults)
-    z = z / (np.linalg.norm(z) or 1.0)
-    axis, turn = np.cross([0.0, 0, 1], z), scipy.spatial.transform.Rotation
-    if not axis.any():
-        return np.diag([1.0, -1, -1]) if z[2] < 0 else np.eye(3)
-    return np.asarray(turn.from_rotvec(axis / np.linalg.norm(axis) * np.arccos(np.clip(z[2], -1, 1))).as_matrix())
-
-
-ORIENTATIONS: dict[str, Callable[[XmlElement, Compiler], Array]] = {
-    "quat": _of_quat, "axisangle": _of_axisangle, "euler": _of_euler, "xyaxes": _of_xyaxes,
-    "zaxis": _of_zaxis,
-}  # fmt: skip
-"""Attributes that say an orientation."""
+    if key == "quat":
+        return quaternion_matrix(given / np.linalg.norm(given))
+    axis, angle = given[:3], c.angle(given[-1])
+    if key == "zaxis":
+        axis = np.cross([0.0, 0, 1], given)
+        angle = np.arctan2(np.linalg.norm(axis), given[2])
+        axis = axis if axis.any() else np.array([1.0, 0, 0])
+    return np.asarray(turn.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix())
 
 
 WORLD = "world"
 """Name of the frame in MJCF."""
+ENTRIES = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])
+"""Places of the entries of a tensor in ``fullinertia``: xx, yy, zz, xy, xz, yz."""
 CUT = "(cut"
 """What follows the name of a link in that of a part cut from it."""
 
@@ -171,7 +162,7 @@ class Writer:
         A = compose(inverse(self.poses[child]), compose(self.poses[pair.a], pair.markers[0].pose()))
         frames = [compose(A[:, :, None, None], X) for X in self.inner_frames(pair)]
         q, out = self.coordinates(pair), []
-        for step, (columns, _) in zip(pair.type.steps, evaluation.places(pair.type), strict=True):
+        for step, columns, _ in evaluation.placed(pair.type):
             names = pair.freedom_names[columns]
             before = frames[columns.start]
             if step.holds_rotation:
@@ -240,9 +231,8 @@ class Writer:
         steps = pair.type.steps
         if len(steps) == 1 and steps[0].holds_rotation:
             anchor = pair.markers[0].point
-            self.equalities.append(
-                ("connect", {"name": pair.name, "body1": ends[0], "body2": ends[1], "anchor": anchor})
-            )
+            given = {"name": pair.name, "body1": ends[0], "body2": ends[1], "anchor": anchor}
+            self.equalities.append(("connect", given))
             return
         if not steps:
             self.weld(pair.name, ends[0], ends[1], self.step(pair))
@@ -287,8 +277,7 @@ class Writer:
                 "and three moments above 0, those of a body. Give it an inertia (mg.inertia.box, .cylinder, ...)"
             )
             return {}
-        I = inertia * share
-        full = [I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]
+        full = inertia[(0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)] * share
         return {"pos": link.center, "mass": link.mass * share, "fullinertia": full}
 
     def element(self, tag: str, attributes: dict[str, Any], depth: int, end: str = "/>") -> str:
@@ -359,9 +348,8 @@ def save_mjcf(m: Mechanism, path: str | os.PathLike[str]) -> None:
     writer = Writer(m)
     text = "\n".join(writer.lines()) + "\n"
     if writer.faults:
-        raise FileError(
-            path, f"mechanism {m.name!r} cannot be written as MJCF:\n  " + "\n  ".join(dict.fromkeys(writer.faults))
-        )
+        why = "\n  ".join(dict.fromkeys(writer.faults))
+        raise FileError(path, f"mechanism {m.name!r} cannot be written as MJCF:\n  {why}")
     write_whole(path, [text])
 
 
@@ -372,7 +360,7 @@ NOT_APPLIED = ("range", "stiffness", "damping", "frictionloss", "armature", "spr
 REFUSED = ("include", "composite", "replicate", "attach", "flexcomp", "plugin", "deformable", "tendon", "frame")
 """Elements that change the bodies or their forces and are not read."""
 IGNORED = {"geom", "site", "camera", "light", "inertial", "joint", "freejoint", "body"}
-PART = re.compile(rf"(?P<link>.+) {re.escape(CUT)} \d+\)")
+PART = re.compile(rf".+ {re.escape(CUT)} \d+\)")
 
 
 @dataclass
@@ -431,9 +419,8 @@ class MjcfReader:
         """An element with the attributes of its class; its own come first."""
         rows = self.classes.get(element.attributes.get("class", inherited))
         if rows is None:
-            self.faults.append(
-                f"{element.title}: there is no class {shown(element.attributes.get('class', inherited))}"
-            )
+            given = shown(element.attributes.get("class", inherited))
+            self.faults.append(f"{element.title}: there is no class {given}")
             return element
         return XmlElement(element.tag, rows.get(element.tag, {}) | element.attributes, element.line, element.children)
 
@@ -502,23 +489,19 @@ class MjcfReader:
         X = pose_of(e, self.compiler)
         mass = e.number("mass", None, self.faults)
         if "fullinertia" in e.attributes:
-            xx, yy, zz, xy, xz, yz = e.numbers("fullinertia", (6,), None, self.faults)
-            I = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+            I = e.numbers("fullinertia", (6,), None, self.faults)[ENTRIES]
         else:
             I = np.diag(e.numbers("diaginertia", (3,), None, self.faults))
-        I = X[:, :3] @ I @ X[:, :3].T
         if not mass:
             return Link(body.name)
+        I = X[:, :3] @ I @ X[:, :3].T
         return Link(body.name, mass, X[:, 3], (I + I.T) / 2, unphysical=bool(physical_faults((I + I.T) / 2)))
 
     def hang(self, body: ReadBody, inherited: str) -> None:
         """The pairs between a body and its parent: its joints in order, or a weld."""
         joints = [child for child in body.element.children if child.tag in ("joint", "freejoint")]
-        kinds = [
-            ("free" if e.tag == "freejoint" else self.with_defaults(e, inherited).attributes.get("type", "hinge"))
-            for e in joints
-        ]
-        if "free" in kinds:
+        elements = [self.with_defaults(e, inherited) for e in joints]
+        if any(e.tag == "freejoint" or e.attributes.get("type") == "free" for e in elements):
             roots = [child for child in self.section("worldbody") if child.tag == "body"]
             if body.parent == WORLD and len(roots) == 1 and len(joints) == 1:
                 self.frame = body.name
@@ -530,16 +513,11 @@ class MjcfReader:
                 self.faults.append(f"{body.element.title}: a free joint; only a single body on the world may have one")
             return
         if not joints:
-            self.pairs.append(
-                self.pair(f"{body.name} on {body.parent}", "W", body.parent, body.name, body.pose, np.eye(3, 4))
-            )
-        for k, e in enumerate(joints):
-            last = k == len(joints) - 1
-            a = body.parent if k == 0 else f"{body.name} before {joints[k].attributes.get('name', k)}"
-            b = body.name if last else f"{body.name} before {joints[k + 1].attributes.get('name', k + 1)}"
-            if not last:
-                self.links[b] = Link(b)
-            self.joint(self.with_defaults(e, inherited), a, b, body.pose if k == 0 else np.eye(3, 4))
+            self.pair(f"{body.name} on {body.parent}", "W", body.parent, body.name, body.pose, np.eye(3, 4))
+        between = [f"{body.name} before {e.attributes.get('name', k)}" for k, e in enumerate(joints[1:], 1)]
+        self.links |= {name: Link(name) for name in between}
+        for k, (e, (a, b)) in enumerate(zip(elements, pairwise([body.parent, *between, body.name]), strict=False)):
+            self.joint(e, a, b, np.eye(3, 4) if k else body.pose)
 
     def joint(self, e: XmlElement, a: str, b: str, X: Array) -> None:
         """The pair of a joint from a to b, whose frame stands at X in a where the coordinate is ``ref``."""
@@ -553,9 +531,7 @@ class MjcfReader:
             self.faults.append(f"{e.title}: axis has length 0")
             return
         symbol, freedom = JOINTS[kind]
-        z = axis / np.linalg.norm(axis)
-        x = np.array(second_direction(tuple(z)))
-        M = np.column_stack([x, np.cross(z, x), z, e.numbers("pos", (3,), np.zeros(3), self.faults)])
+        M = pose_about(axis, e.numbers("pos", (3,), np.zeros(3), self.faults))
         ref = e.number("ref", 0.0, self.faults)
         ref = self.compiler.angle(ref) if freedom.startswith("R") else ref
         back = np.eye(3, 4)
@@ -564,17 +540,16 @@ class MjcfReader:
             back[:2, :2] = [[c, s], [-s, c]]
         elif freedom:
             back[2, 3] = -ref
-        self.pairs.append(self.pair(name, symbol, a, b, compose(X, compose(M, back)), M))
+        self.pair(name, symbol, a, b, compose(X, compose(M, back)), M)
         if ref:
             self.start[f"{name}.{freedom}"] = ref
         dropped = [key for key in NOT_APPLIED if key in e.attributes and set(e.attributes[key].split()) - {"0"}]
         if dropped:
             self.notes.append(f"{e.tag} {name!r}: {', '.join(dropped)} not applied")
 
-    def pair(self, name: str, symbol: str, a: str, b: str, A: Array, B: Array) -> Pair:
+    def pair(self, name: str, symbol: str, a: str, b: str, A: Array, B: Array) -> None:
         """A pair with these marker poses in its links."""
-        on_a, on_b = (Marker(tuple(X[:, 3]), tuple(X[:, 2]), tuple(X[:, 0])) for X in (A, B))
-        return Pair(name, symbol, a, b, on_a=on_a, on_b=on_b)
+        self.pairs.append(Pair(name, symbol, a, b, on_a=marker_at(A), on_b=marker_at(B)))
 
     # --- equality, parts, drives ---------------------------------------------------------------------------------------
 
@@ -583,11 +558,7 @@ class MjcfReader:
         if e.attributes.get("active", "true") != "true":
             self.notes.append(f"{e.title} is not active: left out")
             return
-        makers: Mapping[str, Callable[[XmlElement, str], None]] = {
-            "connect": self.connect,
-            "weld": self.weld,
-            "joint": self.couple,
-        }
+        makers = {"connect": self.connect, "weld": self.connect, "joint": self.couple}
         if e.tag not in makers:
             self.faults.append(f"{e.title}: this equality is not read (read are {', '.join(makers)})")
             return
@@ -606,24 +577,20 @@ class MjcfReader:
         return names
 
     def connect(self, e: XmlElement, name: str) -> None:
-        """A common point of two bodies, at the anchor in the first."""
+        """A common point of two bodies, at the anchor in the first; or a weld as they stand, or at a relative pose."""
         ends = self.ends(e)
         if ends is None:
+            return
+        if e.tag == "weld":
+            given = e.numbers("relpose", (7,), np.zeros(7), self.faults)
+            A = compose(inverse(self.poses[ends[0]]), self.poses[ends[1]])
+            if given[3:].any():
+                A = np.column_stack([quaternion_matrix(given[3:] / np.linalg.norm(given[3:])), given[:3]])
+            self.pair(name, "W", *ends, A, np.eye(3, 4))
             return
         A = np.column_stack([np.eye(3), e.numbers("anchor", (3,), None, self.faults)])
         B = compose(inverse(self.poses[ends[1]]), compose(self.poses[ends[0]], A))
-        self.pairs.append(self.pair(name, "S", *ends, A, B))
-
-    def weld(self, e: XmlElement, name: str) -> None:
-        """Two bodies as they stand, or at a relative pose."""
-        ends = self.ends(e)
-        if ends is None:
-            return
-        given = e.numbers("relpose", (7,), np.zeros(7), self.faults)
-        A = compose(inverse(self.poses[ends[0]]), self.poses[ends[1]])
-        if given[3:].any():
-            A = np.column_stack([quaternion_matrix(given[3:] / np.linalg.norm(given[3:])), given[:3]])
-        self.pairs.append(self.pair(name, "W", *ends, A, np.eye(3, 4)))
+        self.pair(name, "S", *ends, A, B)
 
     def couple(self, e: XmlElement, name: str) -> None:
         """``q_1 - ref_1 = c_0 + c_1 (q_2 - ref_2)``."""
@@ -645,26 +612,20 @@ class MjcfReader:
     def join_parts(self) -> None:
         """Links that ``save`` cut: the parts and the welds between them become one link again."""
         for name in [name for name in self.links if PART.fullmatch(name)]:
-            link = PART.fullmatch(name)["link"]  # type: ignore[index]
+            link = name.rpartition(f" {CUT} ")[0]
             weld = next((p for p in self.pairs if p.type.f == 0 and {p.a, p.b} == {name, link}), None)
             if weld is None or link not in self.links:
                 continue
-            self.pairs = [
-                p.replace(a=link if p.a == name else p.a, b=link if p.b == name else p.b)
-                for p in self.pairs
-                if p is not weld
-            ]
+            whole = {name: link}
+            self.pairs = [p.replace(a=whole.get(p.a, p.a), b=whole.get(p.b, p.b)) for p in self.pairs if p is not weld]
             self.links[link] = joined(self.links[link], self.links.pop(name))
 
     def drives(self) -> list[Drive]:
         """Joints that an actuator moves."""
         freedoms = {pair.name: pair.freedom_names[0] for pair in self.pairs if pair.type.f == 1}
-        found = dict.fromkeys(
-            freedoms[joint] for e in self.section("actuator") if (joint := e.attributes.get("joint", "")) in freedoms
-        )
-        other = [e.title for e in self.section("actuator") if e.attributes.get("joint", "") not in freedoms]
-        self.notes += [f"{title} drives no hinge or slide: left out" for title in other]
-        return [Drive(freedom) for freedom in found]
+        moved = {e.title: freedoms.get(e.attributes.get("joint", "")) for e in self.section("actuator")}
+        self.notes += [f"{title} drives no hinge or slide: left out" for title, q in moved.items() if q is None]
+        return [Drive(freedom) for freedom in dict.fromkeys(filter(None, moved.values()))]
 
 
 def joined(one: Link, other: Link) -> Link:

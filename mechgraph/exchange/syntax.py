@@ -16,7 +16,8 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import field
 from pathlib import Path
 from typing import Any
@@ -25,9 +26,11 @@ from xml.parsers import expat
 import numpy as np
 
 from mechgraph.errors import FileError
+from mechgraph.fields import second_direction
 from mechgraph.files import text_of
 from mechgraph.maths.se3 import Array
 from mechgraph.memo import dataclass
+from mechgraph.model.pair import Marker
 from mechgraph.quantities import LARGEST, shown
 
 
@@ -58,14 +61,17 @@ class Node:
         if found is None:
             faults.append(f"line {self.line}: {where}: {label} is missing")
             return np.zeros(shape)
-        rows = [numbers_of(node.text) for node in found.children]
-        flat = [value for row in rows for value in row or ()]
-        size = int(np.prod(shape))
-        if None in rows or len(flat) != size:
-            given = " ".join(word for node in found.children for word in node.text.split())
-            faults.append(f"line {found.line}: {where}: {label} = {shown(given)}: expected {size} finite numbers")
+        given, size = " ".join(node.text for node in found.children), int(np.prod(shape))
+        values = numbers_of(given)
+        if values is None or len(values) != size:
+            text = shown(" ".join(given.split()))
+            faults.append(f"line {found.line}: {where}: {label} = {text}: expected {size} finite numbers")
             return np.zeros(shape)
-        return np.array(flat).reshape(shape)
+        return np.array(values).reshape(shape)
+
+    def number(self, label: str, where: str, faults: list[str]) -> float:
+        """One finite number below a label."""
+        return float(self.numbers(label, (1,), where, faults)[0])
 
 
 def numbers_of(text: str) -> list[float] | None:
@@ -81,19 +87,14 @@ def tree_of(lines: Sequence[str], first: int = 1) -> Node:
     """The tree of some lines of a file, the first of which has the number ``first``; blank lines count for nothing."""
     root = Node("", first)
     path: list[tuple[int, Node]] = [(-1, root)]
-    for depth, node in _nodes(lines, first):
-        while path[-1][0] >= depth:
-            path.pop()
-        path[-1][1].children.append(node)
-        path.append((depth, node))
-    return root
-
-
-def _nodes(lines: Sequence[str], first: int) -> Iterator[tuple[int, Node]]:
     for number, line in enumerate(lines, first):
-        text = line.strip()
-        if text:
-            yield len(line) - len(line.lstrip("\t")), Node(text, number)
+        if text := line.strip():
+            depth, node = len(line) - len(line.lstrip("\t")), Node(text, number)
+            while path[-1][0] >= depth:
+                path.pop()
+            path[-1][1].children.append(node)
+            path.append((depth, node))
+    return root
 
 
 @dataclass
@@ -112,6 +113,11 @@ class XmlElement:
     def first(self, tag: str) -> XmlElement | None:
         """The first child of a tag."""
         return next((child for child in self.children if child.tag == tag), None)
+
+    def of(self, tag: str, key: str) -> str:
+        """An attribute of the first child of a tag; empty where there is none."""
+        found = self.first(tag)
+        return found.attributes.get(key, "") if found else ""
 
     @property
     def title(self) -> str:
@@ -163,13 +169,24 @@ def read_xml(path: Path, kind: str, root: str) -> XmlElement:
     try:
         parser.Parse(text, True)
     except expat.ExpatError as error:
-        raise FileError(
-            path, f"is not a valid {kind} file: line {error.lineno}: {expat.ErrorString(error.code)}"
-        ) from None
+        why = f"line {error.lineno}: {expat.ErrorString(error.code)}"
+        raise FileError(path, f"is not a valid {kind} file: {why}") from None
     found = top.children[0]
     if found.tag != root:
         raise FileError(path, f"is not a valid {kind} file: its root is <{shown(found.tag)[1:-1]}>, expected <{root}>")
     return found
+
+
+def marker_at(X: Array) -> Marker:
+    """The marker at a pose ``(3, 4)``."""
+    return Marker(tuple(X[:, 3]), tuple(X[:, 2]), tuple(X[:, 0]))
+
+
+def pose_about(z: Array, point: Array) -> Array:
+    """A pose ``(3, 4)`` whose third axis has a direction."""
+    z = z / np.linalg.norm(z)
+    x = np.array(second_direction(z))
+    return np.column_stack([x, np.cross(z, x), z, point])
 
 
 DECIMAL = r"(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
@@ -213,10 +230,11 @@ class Jet:
         if np.any(other.v) or np.any(other.a):
             raise FormulaFault("a power whose exponent changes with time")
         n = other.s
-        zero = np.zeros_like(self.s)
-        rate = (lambda u: n * u ** (n - 1)) if n else (lambda u: zero)
-        second = (lambda u: n * (n - 1) * u ** (n - 2)) if n not in (0, 1) else (lambda u: zero)
-        return self.through(lambda u: u**n, rate, second)
+
+        def power(times: float, exponent: float) -> Callable[[Any], Any]:
+            return lambda u: times * u**exponent if times else np.zeros_like(u)
+
+        return self.through(power(1.0, n), power(n, n - 1), power(n * (n - 1), n - 2))
 
     def through(self, f: Callable[[Any], Any], rate: Callable[[Any], Any], second: Callable[[Any], Any]) -> Jet:
         """``f(u)``, ``f'(u) u'`` and ``f''(u) u'^2 + f'(u) u''``; a constant has no rates, also where f has no slope (``sqrt(0)``)."""
@@ -311,11 +329,9 @@ def _tree(formula: str) -> ast.expr:
     longest_formula = 2000  # characters of a formula
     if len(text) > longest_formula:
         raise FormulaFault(f"longer than {longest_formula} characters")
-    try:
+    with suppress(SyntaxError, ValueError, MemoryError, RecursionError):
         if TOKENS.fullmatch(text):
             return ast.parse(DOUBLE.sub(r"\1", text).replace("^", "**"), mode="eval").body
-    except (SyntaxError, ValueError, MemoryError, RecursionError):
-        pass
     raise FormulaFault(_none(formula))
 
 

@@ -14,13 +14,13 @@ import numpy as np
 import scipy
 
 from mechgraph.errors import DeclarationError, listed
-from mechgraph.exchange.syntax import XmlElement, read_xml
+from mechgraph.exchange.syntax import XmlElement, marker_at, pose_about, read_xml
 from mechgraph.maths.inertia import physical_faults
 from mechgraph.maths.se3 import Array, compose
 from mechgraph.memo import dataclass
 from mechgraph.model.couplings import Coupling
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair import Link, Marker, Pair, second_direction
+from mechgraph.model.pair import Link, Pair
 from mechgraph.quantities import shown
 
 TYPES = {"revolute": "R", "continuous": "R", "prismatic": "P", "fixed": "W", "planar": "E"}
@@ -54,10 +54,8 @@ class UrdfReader:
         X, tensor = self.origin(inertial), inertial.first("inertia")
         if tensor is None:
             return Link(name, weight, X[:, 3])
-        xx, xy, xz, yy, yz, zz = (
-            tensor.number(key, 0.0, self.faults) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-        )
-        I = X[:, :3] @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ X[:, :3].T
+        entries = [[tensor.number(f"i{min(i, j)}{max(i, j)}", 0.0, self.faults) for j in "xyz"] for i in "xyz"]
+        I = X[:, :3] @ np.array(entries) @ X[:, :3].T
         odd = bool(physical_faults(I))
         if odd:
             self.notes.append(f"the inertia of link {name!r} is that of no body")
@@ -66,24 +64,18 @@ class UrdfReader:
     def pair(self, e: XmlElement) -> Pair | None:
         """The pair of a joint; None, and a fault, where there is none."""
         name, kind = e.attributes.get("name", f"joint on line {e.line}"), e.attributes.get("type", "")
-        ends = [found.attributes.get("link", "") if (found := e.first(side)) else "" for side in ("parent", "child")]
+        ends = [e.of(side, "link") for side in ("parent", "child")]
+        axis_of, fault = e.first("axis"), ""
         if kind not in TYPES:
-            self.faults.append(
-                f"{e.title}: type {shown(kind)} {REFUSED.get(kind, f'is not known (known: {listed(TYPES)})')}"
-            )
+            fault = f"type {shown(kind)} {REFUSED.get(kind, f'is not known (known: {listed(TYPES)})')}"
+        elif not all(ends):
+            fault = "needs <parent link=...> and <child link=...>"
+        axis = axis_of.numbers("xyz", (3,), None, self.faults) if axis_of and not fault else np.array([1.0, 0, 0])
+        if fault or not axis.any():
+            self.faults.append(f"{e.title}: {fault or 'axis has length 0'}")
             return None
-        if not all(ends):
-            self.faults.append(f"{e.title}: needs <parent link=...> and <child link=...>")
-            return None
-        axis_of = e.first("axis")
-        axis = axis_of.numbers("xyz", (3,), None, self.faults) if axis_of else np.array([1.0, 0, 0])
-        if not axis.any():
-            self.faults.append(f"{e.title}: axis has length 0")
-            return None
-        z = axis / np.linalg.norm(axis)
-        x = np.array(second_direction(tuple(z)))
-        M = np.column_stack([x, np.cross(z, x), z, np.zeros(3)])
-        on_a, on_b = (Marker(tuple(X[:, 3]), tuple(X[:, 2]), tuple(X[:, 0])) for X in (compose(self.origin(e), M), M))
+        M = pose_about(axis, np.zeros(3))
+        on_a, on_b = marker_at(compose(self.origin(e), M)), marker_at(M)
         dropped = [child.tag for child in e.children if child.tag in NOT_APPLIED]
         if dropped:
             self.notes.append(f"joint {name!r}: {', '.join(dropped)} not applied")
@@ -97,9 +89,8 @@ class UrdfReader:
         other = pairs.get(mimic.attributes.get("joint", ""))
         ratio, offset = mimic.number("multiplier", 1.0, self.faults), mimic.number("offset", 0.0, self.faults)
         if other is None or own.type.f != 1 or other.type.f != 1:
-            self.faults.append(
-                f"{e.title}: mimics {shown(mimic.attributes.get('joint', ''))}, which is no turn or slide here"
-            )
+            what = shown(mimic.attributes.get("joint", ""))
+            self.faults.append(f"{e.title}: mimics {what}, which is no turn or slide here")
             return []
         terms = [(own.freedom_names[0], 1.0), (other.freedom_names[0], -ratio)]
         return [Coupling([term for term in terms if term[1]], name=f"{own.name} mimics {other.name}", constant=offset)]

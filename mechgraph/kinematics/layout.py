@@ -336,7 +336,7 @@ def factor_batches(groups: Sequence[PairsOfType], walk: Walk, n_factors: Index) 
 def _batch(members: Sequence[tuple[Factor, PairsOfType, int]], walk: Walk) -> FactorBatch:
     parts = []
     for number, (_, g, rank) in enumerate(members):
-        at_columns, at_rows = evaluation.places(g.row)[rank]
+        _, at_columns, at_rows = evaluation.placed(g.row)[rank]
         same = [np.full(len(g.pairs), value, dtype=np.intp) for value in (rank, number)]
         parts.append(
             [g.columns[at_columns], g.state_rows[at_rows], g.pairs, walk.step_of[walk.first[g.pairs] + rank], *same]

@@ -211,7 +211,7 @@ class States(Places):
         """For every freedom its row in the state, -1 for those of rotations."""
         out = np.full(self.n_freedoms, -1, dtype=np.intp)
         for g in self.groups:
-            for factor, (columns, rows) in zip(g.row.steps, evaluation.places(g.row), strict=True):
+            for factor, columns, rows in evaluation.placed(g.row):
                 if not factor.holds_rotation:
                     out[g.columns[columns]] = g.state_rows[rows]
         return out
@@ -228,7 +228,7 @@ class States(Places):
         parts = [
             (g.columns[columns], g.state_rows[rows])
             for g in self.groups
-            for factor, (columns, rows) in zip(g.row.steps, evaluation.places(g.row), strict=True)
+            for factor, columns, rows in evaluation.placed(g.row)
             if factor.holds_rotation
         ]
         if not parts:

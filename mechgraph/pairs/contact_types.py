@@ -9,7 +9,6 @@ Source of the pressure: K. L. Johnson, Contact Mechanics, 1985, sections 4.2 (li
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from copy import copy
 from dataclasses import field, replace
 from functools import cached_property
 from itertools import count
@@ -196,23 +195,15 @@ def travels(row: Any) -> bool:
 
 def filled(row: PairType, factors: Sequence[AlongCurve | OnSurface], pair: str) -> PairType:
     """The row with factors in the places for curves and surfaces; components that would do work are combined with efforts."""
-    out = copy(row)
-    for name in ("factors", "nx", "has_lengths", "takes_pitch"):
-        vars(out).pop(name, None)
     left = (replace(factor, pair=pair) for factor in factors)
-    steps = tuple(next(left) if isinstance(step, AlongCurve | OnSurface) else step for step in row.steps)
-    object.__setattr__(out, "steps", steps)
-    held = tuple(
-        columns.start
-        for step, (columns, _) in zip(steps, evaluation.places(out), strict=True)
-        if isinstance(step, AlongCurve) and step.held
-    )
+    out = row.with_steps([next(left) if isinstance(step, AlongCurve | OnSurface) else step for step in row.steps])
+    places = evaluation.placed(out)
+    held = tuple(columns.start for step, columns, _ in places if isinstance(step, AlongCurve) and step.held)
     if held:  # no component is constant in a frame that does not turn with the curve
-        object.__setattr__(out, "pushed", held)
-        object.__setattr__(out, "reactions", None)
+        vars(out).update(pushed=held, reactions=None)
         return out
     x = evaluation.random_coordinates(out, np.random.default_rng(12345), 1, 16)
-    for step, (_, numbers) in zip(steps, evaluation.places(out), strict=True):
+    for step, _, numbers in places:
         if isinstance(step, AlongCurve):
             low, high = (end if np.isfinite(end) else np.copysign(step.travel.length, end) for end in step.ranges[0])
             x[numbers] = np.linspace(low, high, x.shape[-1])
@@ -222,7 +213,7 @@ def filled(row: PairType, factors: Sequence[AlongCurve | OnSurface], pair: str) 
     frames = evaluation.frames_of(out, pitch, x)
     S, W = evaluation.twists_of(out, pitch, frames, x), evaluation.reactions_of(out, pitch, frames, x)
     work = np.abs(np.einsum("ifnt,icnt->fcnt", S, W)).max(initial=0.0)
-    object.__setattr__(out, "computed_reactions", bool(work > 1e-12 * max(1.0, np.abs(S).max())))
+    vars(out).update(computed_reactions=bool(work > 1e-12 * max(1.0, np.abs(S).max())))
     return out
 
 
@@ -247,60 +238,26 @@ HELD = ("P", "C")
 ROWS = {
     row.symbol: row
     for row in (
+        table_row("P", "rail and carriage", [ALONG], "Fx@1, Fy@1, Mx@1, My@1, Mz@1", "Fz@1"),
+        table_row("C", "round rail and carriage", [ALONG, "Rz"], "Fx@1, Fy@1, Mx@1, My@1", "Fz@1, Mz@1"),
         table_row(
-            "P",
-            "rail and carriage",
-            [ALONG],
-            ["Fx@1", "Fy@1", "Mx@1", "My@1", "Mz@1"],
-            efforts=["Fz@1"],
-            dual=False,
-        ),
-        table_row(
-            "C",
-            "round rail and carriage",
-            [ALONG, "Rz"],
-            ["Fx@1", "Fy@1", "Mx@1", "My@1"],
-            efforts=["Fz@1", "Mz@1"],
-            dual=False,
-        ),
-        table_row(
-            "Sg",
-            "sphere in curved groove",
-            [ALONG, "rotation"],
-            ["Fx@1", "Fy@1"],
-            efforts=["Fz@1", "Mx@1", "My@1", "Mz@1"],
-            dual=False,
+            "Sg", "sphere in curved groove", [ALONG, "rotation"], "Fx@1, Fy@1", "Fz@1, Mx@1, My@1, Mz@1",
             touching=Touching(("Fx", "Fy"), a=(0.0, -1.0), b=(1.0, 1.0), curved=True),
         ),
         table_row(
-            "Ps",
-            "pin in curved slot",
-            [FOLLOWING, "Rz"],
-            ["Fy@1", "Fz@1", "Mx@1", "My@1"],
-            efforts=["Fx@1", "Mz@1"],
-            dual=False,
+            "Ps", "pin in curved slot", [FOLLOWING, "Rz"], "Fy@1, Fz@1, Mx@1, My@1", "Fx@1, Mz@1",
             touching=Touching(("Fy",), a=(0.0, 0.0), b=(0.0, 1.0), curved=True),
         ),
         table_row(
-            "Rg",
-            "roller in groove",
-            [FOLLOWING, "Tz", "rotation"],
-            ["Fy@2"],
-            efforts=["Fx@2", "Fz@2", "Mx@2", "My@2", "Mz@2"],
-            dual=False,
+            "Rg", "roller in groove", [FOLLOWING, "Tz", "rotation"], "Fy@2", "Fx@2, Fz@2, Mx@2, My@2, Mz@2",
             touching=Touching(("Fy",), a=(0.0, 0.0), b=(0.0, 1.0), curved=True),
         ),
         table_row(
-            "Kc",
-            "curves in contact",
-            [FOLLOWING, BESIDE],
-            ["Fy@1", "Fz@1", "Mx@1", "My@1"],
-            efforts=["Fx@1", "Mz@1"],
-            dual=False,
+            "Kc", "curves in contact", [FOLLOWING, BESIDE], "Fy@1, Fz@1, Mx@1, My@1", "Fx@1, Mz@1",
             touching=Touching(("Fy",), a=(0.0, 0.0), b=(0.0, 0.0), curved=True),
         ),
     )
-}
+}  # fmt: skip
 """The rows by the symbols of their types; of P, C and Sg those with a curve."""
 
 
@@ -391,26 +348,22 @@ def curve_faults(row: Any, curve: Curve, curve_b: Any, roller: Any, point: Any, 
     """What is wrong with curves in a row, before they are put in."""
     if not isinstance(row, PairType) or not takes_curves(row):
         return [f"{where}curve: a pair {getattr(row, 'symbol', '?')} takes none; those that do: {', '.join(ROWS)}"]
-    fit = {
-        "curve_b": isinstance(curve_b, Curve | None),
-        "roller": roller is None or is_numeric(roller, ()),
-        "point": point is None or is_numeric(point, (3,)),
-    }
-    if not all(fit.values()):
-        return [f"{where}curve: {', '.join(name for name, fits in fit.items() if not fits)} at fault"]
+    off = [] if isinstance(curve_b, Curve | None) else ["curve_b"]
+    shapes = (("roller", roller, ()), ("point", point, (3,)))
+    off += [name for name, given, shape in shapes if not (given is None or is_numeric(given, shape))]
+    if off:
+        return [f"{where}curve: {', '.join(off)} at fault"]
     places = takes_curves(row)
     curves = {name: given for name, given in (("curve", curve), ("curve_b", curve_b)) if given is not None}
     found = [fault for name, given in curves.items() for fault in _of_shape(given, f"{where}{name}.")]
     if found:
         return found
     if curve_b is not None and len(places) < 2:
-        found.append(
-            f"{where}curve_b: a pair {row.symbol} takes one curve, on link a; exchange a and b for one on link b"
-        )
+        why = "takes one curve, on link a; exchange a and b for one on link b"
+        found.append(f"{where}curve_b: a pair {row.symbol} {why}")
     if any(given.frame == "held" for given in curves.values()) and row.symbol not in HELD:
-        found.append(
-            f"{where}curve: frame='held' is for {' and '.join(HELD)}; a pair {row.symbol} turns with its curve"
-        )
+        why = f"a pair {row.symbol} turns with its curve"
+        found.append(f"{where}curve: frame='held' is for {' and '.join(HELD)}; {why}")
     plane = roller or any(place.tangent == X for place in places)
     turns = any(step.holds_rotation for step in row.steps)  # so that it follows a groove about the cam
     found += [
@@ -469,15 +422,10 @@ def miss_faults(contact: PlacedRow, curves: Sequence[Curve | None], tol: float, 
 
 SURFACE_ROWS = {
     "Sp": table_row(
-        "Sp",
-        "sphere on surface",
-        [OnSurface(), "rotation"],
-        ["Fz@2"],
-        efforts=["Fx@2", "Fy@2", "Mx@2", "My@2", "Mz@2"],
-        dual=False,
+        "Sp", "sphere on surface", [OnSurface(), "rotation"], "Fz@2", "Fx@2, Fy@2, Mx@2, My@2, Mz@2",
         touching=Touching(("Fz",), a=(0.0, 0.0), b=(1.0, 1.0), curved=True),
     )
-}
+}  # fmt: skip
 """The same of those that take a surface."""
 _BY_SYMBOL = {**ROWS, **TABLE}
 _WITH_CURVE = {**TABLE, **ROWS}
@@ -563,10 +511,9 @@ def _ball_faults(surface: Surface, roller: Any, point: Any, where: str) -> list[
 
 def surface_faults(row: Any, surface: Surface, point: Any, where: str, roller: Any = None) -> list[str]:
     """What is wrong with a surface in a row, before it is put in."""
-    if not isinstance(row, PairType) or not any(isinstance(step, OnSurface) for step in row.steps):
-        return [
-            f"{where}surface: a pair {getattr(row, 'symbol', '?')} takes none; those that do: {', '.join(SURFACE_ROWS)}"
-        ]
+    if not isinstance(row, PairType) or placed_surface(row) is None:
+        known = ", ".join(SURFACE_ROWS)
+        return [f"{where}surface: a pair {getattr(row, 'symbol', '?')} takes none; those that do: {known}"]
     if not (point is None or is_numeric(point, (3,))):
         return [f"{where}surface: point is at fault"]
     found = of_function(lambda: surface.faults(f"{where}surface."), f"{where}surface.")
@@ -583,11 +530,11 @@ def surface_faults(row: Any, surface: Surface, point: Any, where: str, roller: A
 
 def surface_miss(contact: PlacedRow, tol: float, where: str) -> Iterator[str]:
     """A contact that is not on its surface."""
-    surface = next(
-        step.surface for step in contact.row.steps if isinstance(step, OnSurface) and step.surface is not None
-    )
+    place = placed_surface(contact.row)
+    assert place is not None
+    assert place.surface is not None
     # a miss of 1e-12 is rounding at any size of a mechanism, as of a point in a plane through the origin
-    size = max(extent(surface, contact.marker[:, 3]), 1e-12 / SHAPES.met)
+    size = max(extent(place.surface, contact.marker[:, 3]), 1e-12 / SHAPES.met)
     if contact.misses[0] > max(SHAPES.met, tol) * size:
         at = point_text(contact.marker[:, 3])
         yield (
@@ -605,6 +552,10 @@ class Pressed(NamedTuple):
     along: Array
     across: Array
     approach: Array
+
+
+STEEL = (0.3, 0.3)
+"""Poisson's ratios of two elements of steel."""
 
 
 @dataclass(frozen=True)
@@ -625,13 +576,10 @@ class Hertz(Described):
     """
 
     moduli: Annotated[Any, TWO_POSITIVE("Young's moduli of the elements on a and on b", PRESSURE)]
-    poisson: Annotated[Any, TWO("Poisson's ratios of the elements on a and on b", PURE, default="0.3, 0.3")] = (
-        0.3,
-        0.3,
+    poisson: Annotated[Any, TWO("Poisson's ratios of the elements on a and on b", PURE, default="0.3, 0.3")] = STEEL
+    groove_radius: Annotated[float | None, POSITIVE("of the section of a groove, larger than the ball's", LENGTH)] = (
+        None
     )
-    groove_radius: Annotated[
-        float | None, POSITIVE("of the cross section of a groove, larger than the ball's", LENGTH)
-    ] = None
     length: Annotated[float | None, POSITIVE("of the line along which a cylinder touches", LENGTH)] = None
 
     def __post_init__(self) -> None:

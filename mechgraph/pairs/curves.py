@@ -115,6 +115,7 @@ ORDERS = 4
 INTERVALS = 360
 """Intervals into which a curve is parted before its shape is known."""
 FRAMES = ("minimizing", "guided", "held")
+ORIGIN = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -332,7 +333,8 @@ class Line(Curve):
     """A straight line."""
 
     kind = "line"
-    point: Annotated[Any, POINT("where the arc length is zero", LENGTH, default="0")] = (0.0, 0.0, 0.0)
+    speed = 1.0
+    point: Annotated[Any, POINT("where the arc length is zero", LENGTH, default="0")] = ORIGIN
     direction: Annotated[Any, DIRECTION("along the line", default="z")] = (0.0, 0.0, 1.0)
     ends_at: Annotated[Any, INTERVAL("arc lengths at which it ends", LENGTH, default="endless")] = None
 
@@ -353,17 +355,12 @@ class Line(Curve):
         """A parallel line."""
         return self.replace(point=np.asarray(self.point) + distance * y)
 
-    @property
-    def speed(self) -> float:
-        """One."""
-        return 1.0
-
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Centred(Curve):
     """What curves about a center share: ``x = center + f e1 + g e2 + h e3``, e3 the axis and e1 along ``second``."""
 
-    center: Annotated[Any, POINT("center", LENGTH, default="0")] = (0.0, 0.0, 0.0)
+    center: Annotated[Any, POINT("center", LENGTH, default="0")] = ORIGIN
     axis: Annotated[Any, DIRECTION("normal of the plane, or axis", default="z")] = (0.0, 0.0, 1.0)
     second: Annotated[
         Any, DIRECTION("where the parameter is zero", default="global axis least aligned with `axis`")
@@ -426,9 +423,8 @@ class Circle(Centred):
 
     def beside(self, distance: float, y: Array) -> Curve | None:
         """A circle about the same center."""
-        radius = self.radius + distance * float(
-            np.sign(y @ (self.at(np.array(self.ends[0]))[0] - np.asarray(self.center)))
-        )
+        out = y @ (self.at(np.array(self.ends[0]))[0] - np.asarray(self.center))
+        radius = self.radius + distance * float(np.sign(out))
         return self.replace(radius=radius) if radius > 0 else None
 
     @property
@@ -442,6 +438,7 @@ class Ellipse(Centred):
     """An ellipse."""
 
     kind = "ellipse"
+    is_closed = True
     a: Annotated[float, POSITIVE("half axis along `second`", LENGTH)]
     b: Annotated[float, POSITIVE("half axis across it", LENGTH)]
 
@@ -449,11 +446,6 @@ class Ellipse(Centred):
         """``a cos u e1 + b sin u e2``."""
         c, s = _turning(u)
         return self._placed(np.stack([self.a * c, self.b * s, 0 * c], axis=1))
-
-    @property
-    def is_closed(self) -> bool:
-        """Yes."""
-        return True
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -504,9 +496,8 @@ class Involute(Centred):
         f = [c + u * s, u * c, c - u * s, -2 * s - u * c]
         g = [s - u * c, u * s, s + u * c, 2 * c - u * s]
         hand = -1.0 if self.mirrored else 1.0
-        return self._placed(
-            self.radius * np.stack([[*f], [hand * part for part in g], [0 * part for part in f]], axis=1)
-        )
+        parts = np.array([f, g, np.zeros_like(f)]) * np.reshape([1.0, hand, 1.0], (3, 1, *(1,) * u.ndim))
+        return self._placed(self.radius * parts.swapaxes(0, 1))
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -541,8 +532,7 @@ class CurvePlace:
     @property
     def real(self) -> CurvePlace:
         """Without imaginary parts."""
-        parts = (self.x, self.t, self.dt, self.y, self.k, self.w, self.dw)
-        return CurvePlace(*(np.asarray(part.real) for part in parts))
+        return CurvePlace(*(np.asarray(part.real) for part in vars(self).values()))
 
 
 def _dot(a: Array, b: Array) -> Array:
@@ -601,9 +591,8 @@ class Travel:
         """The parameter at arc lengths; beyond the ends of an open curve at the speed that it has there."""
         if self.speed is not None:
             return np.asarray(self._origin + s / self.speed)
-        inside = (
-            s.real - self._rounds(s.real) * self.length if self.is_closed else np.clip(s.real, self.begin, self.end)
-        )
+        at = s.real
+        inside = at - self._rounds(at) * self.length if self.is_closed else np.clip(at, self.begin, self.end)
         u = self._parameter.at(inside)[0]
         beyond = s - s.real if self.is_closed else s - inside
         return np.asarray(u + beyond * _parameter_rates(self.curve.at(u))[0]) if np.any(beyond) else u
@@ -807,17 +796,12 @@ def shape_faults(curve: Curve, where: str) -> list[str]:
     turns = _dot(x[1][:, 1:], x[1][:, :-1]) <= 0
     slow = np.flatnonzero((v < SHAPES.standstill * v.max()) | np.append(turns, False))
     if slow.size:
-        return [
-            f"{name} has a cusp at {point_text(x[0][:, slow[0]])} (parameter {curve.grid[slow[0]]:.6g}); end it before that"
-        ]
-    if curve.roller:
-        found = roller_faults(curve, curve.roller, "undercut: ", where)
-        if found:
-            return found
-    if not curve.is_closed:
-        return _guide_faults(curve, x[1] / v, x[0], where)
+        at = f"{point_text(x[0][:, slow[0]])} (parameter {curve.grid[slow[0]]:.6g})"
+        return [f"{name} has a cusp at {at}; end it before that"]
+    if curve.roller and (found := roller_faults(curve, curve.roller, "undercut: ", where)):
+        return found
     gap, turn = np.linalg.norm(x[0][:, -1] - x[0][:, 0]), np.linalg.norm(x[1][:, -1] / v[-1] - x[1][:, 0] / v[0])
-    if gap > SHAPES.met * np.ptp(x[0], axis=1).max() or turn > SHAPES.met:
+    if curve.is_closed and (gap > SHAPES.met * np.ptp(x[0], axis=1).max() or turn > SHAPES.met):
         return [
             f"{name} is not closed: its ends are {gap:.3g} apart, their tangents differ by {turn:.3g} rad; let it end where it begins, "
             "or declare it open"
@@ -829,11 +813,8 @@ def outside(curve: Curve) -> float:
     """1 where the normal y of a closed plane curve points outwards, -1 where it points inwards."""
     travel = curve.once(Travel)
     here = travel.at(travel.s)
-    about = _dot(
-        cross(here.x[:, :-1] - here.x[:, :1], np.diff(here.x)),
-        np.broadcast_to(travel.guide[:, None], here.x[:, 1:].shape),
-    )
-    return -1.0 if about.sum() > 0 else 1.0
+    area = cross(here.x[:, :-1] - here.x[:, :1], np.diff(here.x)).sum(axis=1)
+    return -1.0 if travel.guide @ area > 0 else 1.0
 
 
 def roller_faults(curve: Curve, radius: float, what: str, where: str, side: float | None = None) -> list[str]:

@@ -15,7 +15,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Sequence
 from dataclasses import replace
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,14 +26,10 @@ from mechgraph.quantities import is_numeric, items_of, shown, wrong
 
 Six = tuple[float, float, float, float, float, float]
 
-UNIT_TWISTS: dict[str, Six] = {
-    name: tuple(float(i == j) for j in range(6))  # type: ignore[misc]
-    for i, name in enumerate(("Rx", "Ry", "Rz", "Tx", "Ty", "Tz"))
-}
-UNIT_WRENCHES: dict[str, Six] = {
-    name: tuple(float(i == j) for j in range(6))  # type: ignore[misc]
-    for i, name in enumerate(("Mx", "My", "Mz", "Fx", "Fy", "Fz"))
-}
+UNIT_TWISTS, UNIT_WRENCHES = (
+    {name: cast(Six, tuple(float(i == j) for j in range(6))) for i, name in enumerate(names)}
+    for names in (("Rx", "Ry", "Rz", "Tx", "Ty", "Tz"), ("Mx", "My", "Mz", "Fx", "Fy", "Fz"))
+)
 WRENCHES = tuple(UNIT_WRENCHES)
 """Names of the components of a wrench, in order."""
 
@@ -197,8 +193,7 @@ def all_scaled(parts: Sequence[Scaled], L: float) -> tuple[Scaled, ...]:
 def read_freedom(item: object, faults: list[str]) -> Freedom | None:
     """A freedom from ``Freedom``, ``"Tz"`` or ``"Rz + pitch Tz"``; what is wrong with it is added to ``faults``."""
     if isinstance(item, Freedom):
-        found = _name_fault(item.name, "freedom")
-        found += _six_faults(item.twist, item.per_pitch, f"freedom {shown(item.name)}: twist")
+        found = _screw_faults("freedom", item.name, "twist, angular", item.twist, item.per_pitch)
         faults += found
         return None if found else item
     text = item if isinstance(item, str) else ""
@@ -212,23 +207,18 @@ def read_freedom(item: object, faults: list[str]) -> Freedom | None:
     return None
 
 
-def _name_fault(name: object, what: str) -> list[str]:
-    return [] if isinstance(name, str) and name else [wrong(name, f"{what}: name", "a text")]
-
-
-def _six_faults(constant: object, per_pitch: object, what: str) -> list[str]:
-    order = "angular part first" if what.endswith("twist") else "moment part first"
-    return [
-        wrong(row, what, f"six finite numbers, {order}") for row in (constant, per_pitch) if not is_numeric(row, (6,))
-    ]
+def _screw_faults(what: str, name: object, of: str, *rows: object) -> list[str]:
+    """What is wrong with a name and with ``rows`` of six numbers; ``of`` is what they are, and of which part the first three."""
+    found = [] if isinstance(name, str) and name else [wrong(name, f"{what}: name", "a text")]
+    screw, _, first = of.partition(", ")
+    where, expected = f"{what} {shown(name)}: {screw}", f"six finite numbers, {first} part first"
+    return found + [wrong(row, where, expected) for row in rows if not is_numeric(row, (6,))]
 
 
 def read_component(item: object, faults: list[str], what: str) -> Component | None:
     """A component from ``Component``, ``"Fz@2"`` or ``("Fz", 2)``; what is wrong with it is added to ``faults``."""
     if isinstance(item, Component):
-        found = _name_fault(item.name, what) + _six_faults(
-            item.wrench, item.per_pitch, f"{what} {shown(item.name)}: wrench"
-        )
+        found = _screw_faults(what, item.name, "wrench, moment", item.wrench, item.per_pitch)
         if not isinstance(item.at_b, bool):
             found.append(wrong(item.at_b, f"{what} {shown(item.name)}: at_b", "true or false"))
         if type(item.frame) is not int:
@@ -251,16 +241,15 @@ def bookkeeping_faults(given: object) -> list[str]:
     if not isinstance(given, Bookkeeping):
         return [wrong(given, "bookkeeping", "a Bookkeeping")]
     faults: list[str] = []
-    for item in items_of(given.conditions, "bookkeeping: conditions", faults):
-        if not isinstance(item, Freedom):
-            faults.append(wrong(item, "bookkeeping: conditions", "a Freedom"))
-        else:
-            read_freedom(item, faults)
-    for item in items_of(given.along, "bookkeeping: along", faults):
-        if not isinstance(item, Component):
-            faults.append(wrong(item, "bookkeeping: along", "a Component"))
-        else:
-            read_component(item, faults, "bookkeeping: along")
+    for name, kind in (("conditions", Freedom), ("along", Component)):
+        what = f"bookkeeping: {name}"
+        for item in items_of(getattr(given, name), what, faults):
+            if not isinstance(item, kind):
+                faults.append(wrong(item, what, f"a {kind.__name__}"))
+            elif isinstance(item, Freedom):
+                read_freedom(item, faults)
+            else:
+                read_component(item, faults, what)
     return faults
 
 
@@ -459,16 +448,12 @@ class Rotation(Factor):
     """A rotation of three freedoms, held as a unit quaternion and moved by ``exp``: no chart, no singularity."""
 
     names: tuple[Freedom, ...]
+    holds_rotation = True
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
         """The freedoms."""
         return self.names
-
-    @property
-    def holds_rotation(self) -> bool:
-        """Yes."""
-        return True
 
     @property
     def kind(self) -> Hashable:

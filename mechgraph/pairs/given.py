@@ -14,18 +14,7 @@ from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import SHAPES
 from mechgraph.memo import dataclass
 from mechgraph.pairs.cams import ArmCam, Barrel, Cam, Globoid
-from mechgraph.pairs.curves import (
-    INTERVALS,
-    ORDERS,
-    Circle,
-    Curve,
-    Ellipse,
-    Helix,
-    Involute,
-    Line,
-    Pieces,
-    parted,
-)
+from mechgraph.pairs.curves import INTERVALS, ORDERS, Circle, Curve, Ellipse, Helix, Involute, Line, Pieces, parted
 from mechgraph.quantities import LENGTH, wrong
 
 

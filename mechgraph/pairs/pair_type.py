@@ -14,7 +14,7 @@ All functions take ``n`` pairs of one type at ``T`` positions: state numbers ``x
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import KW_ONLY, field, replace
 from functools import cached_property
@@ -55,16 +55,11 @@ from mechgraph.pairs.factors import (
 from mechgraph.quantities import items_of, shown, wrong
 
 
-def places(row: PairType) -> list[tuple[slice, slice]]:
-    """For every factor of a row the places of its freedoms and of its state numbers."""
+def placed(row: PairType) -> list[tuple[Factor, slice, slice]]:
+    """Every factor of a row with the places of its freedoms and of its state numbers."""
     columns = accumulate((len(step.freedoms) for step in row.steps), initial=0)
     numbers = accumulate((step.n_state for step in row.steps), initial=0)
-    return list(zip(starmap(slice, pairwise(columns)), starmap(slice, pairwise(numbers)), strict=True))
-
-
-def _placed(row: PairType) -> Iterator[tuple[Factor, slice, slice]]:
-    for step, (columns, numbers) in zip(row.steps, places(row), strict=True):
-        yield step, columns, numbers
+    return list(zip(row.steps, starmap(slice, pairwise(columns)), starmap(slice, pairwise(numbers)), strict=True))
 
 
 def frames_of(row: PairType, pitch: Array, x: Array, base: Array | None = None) -> list[Array]:
@@ -74,7 +69,7 @@ def frames_of(row: PairType, pitch: Array, x: Array, base: Array | None = None) 
     start. The last entry is the frame of marker B.
     """
     frames = [identity(*x.shape[1:]) if base is None else base]
-    for step, columns, numbers in _placed(row):
+    for step, columns, numbers in placed(row):
         frames += [frames[-1]] * (columns.stop - columns.start - 1)
         frames.append(compose(frames[-1], step.pose(x[numbers], pitch)))
     return frames
@@ -88,7 +83,7 @@ def twists_of(row: PairType, pitch: Array, frames: Sequence[Array], x: Array | N
     X = frames[0]
     out = np.empty((6, row.f, *X.shape[2:]), dtype=frames[-1].dtype if x is None else np.result_type(X, x))
     numbers = np.empty((row.nx, *X.shape[2:])) if x is None else x
-    for step, columns, rows in _placed(row):
+    for step, columns, rows in placed(row):
         local = step.twists(numbers[rows], pitch)
         before = frames[columns.start]
         for j in range(local.shape[1]):
@@ -201,14 +196,14 @@ def _null_of_transpose(S: Array) -> Array:
 
 def coordinates_to_state(row: PairType, q: Array) -> Array:
     """State numbers ``(nx, ...)`` from user coordinates ``(f, ...)`` (rotation vectors for rotations)."""
-    parts = [quaternion_exp(q[columns]) if step.holds_rotation else q[columns] for step, columns, _ in _placed(row)]
+    parts = [quaternion_exp(q[columns]) if step.holds_rotation else q[columns] for step, columns, _ in placed(row)]
     return np.concatenate(parts) if parts else np.empty((0, *q.shape[1:]))
 
 
 def advance(row: PairType, x: Array, dq: Array) -> Array:
     """State after the increments ``dq`` ``(f, ...)``: added for single freedoms, ``exp(dq) Q`` for rotations."""
     out = np.empty(np.broadcast_shapes(x.shape, (row.nx, *dq.shape[1:])), dtype=np.result_type(x, dq))
-    for step, columns, rows in _placed(row):
+    for step, columns, rows in placed(row):
         if step.holds_rotation:
             out[rows] = turned(x[rows], dq[columns])
         else:
@@ -223,7 +218,7 @@ def state_to_coordinates(row: PairType, x: Array, start: Array | None = None) ->
     further one that nearest to the one before: of ``v + 2 pi k v/|v|`` the nearest.
     """
     out = np.empty((row.f, *x.shape[1:]), dtype=x.dtype)
-    for step, columns, rows in _placed(row):
+    for step, columns, rows in placed(row):
         if step.holds_rotation:
             first = np.zeros(3) if start is None else start[columns]
             out[columns] = _continued(quaternion_log(x[rows]), first)
@@ -283,6 +278,15 @@ def _factors(given: Sequence[object], faults: list[str]) -> tuple[Factor, ...]:
             read = read_freedom(item, faults)
             out += [] if read is None else [ConstantScrew(read)]
     return tuple(out)
+
+
+def _of_steps(steps: Sequence[Factor]) -> dict[str, tuple[Any, ...]]:
+    """What follows from the factors of a row: their freedoms, and the frame before each of these."""
+    starts = accumulate((len(step.freedoms) for step in steps), initial=0)
+    return {
+        "freedoms": tuple(freedom for step in steps for freedom in step.freedoms),
+        "frame_before": tuple(start for step, start in zip(steps, starts, strict=False) for _ in step.freedoms),
+    }
 
 
 @dataclasses.dataclass(frozen=True)  # at once: rows of the table are made without ``__init__``
@@ -348,7 +352,7 @@ class PairType:
         tried = self.efforts is None
         faults = self.read()
         if not faults and tried:
-            object.__setattr__(self, "computed_efforts", not _dual_at_random(self))
+            object.__setattr__(self, "computed_efforts", not _is_dual(self))
         if not faults:
             faults += _row_faults(self)
         if faults:
@@ -366,47 +370,41 @@ class PairType:
         flags = (("directed", self.directed), ("square_second", self.square_second))
         faults += [wrong(flag, what, "true or false") for what, flag in flags if not isinstance(flag, bool)]
         steps = _factors(items_of(self.freedoms, "freedoms", faults), faults)
-        freedoms = tuple(freedom for step in steps for freedom in step.freedoms)
-        starts = accumulate((len(step.freedoms) for step in steps), initial=0)
-        before = tuple(start for step, start in zip(steps, starts, strict=False) for _ in step.freedoms)
-        parts = {}
+        parts = _of_steps(steps)
         for what in ("reactions", "efforts"):
             if (given := getattr(self, what)) is not None:
                 items = items_of(given, what, faults)
                 parts[what] = tuple(c for item in items if (c := read_component(item, faults, what[:-1])) is not None)
         if self.efforts is None:
-            parts["efforts"] = tuple(_dual_effort(f, k) for f, k in zip(freedoms, before, strict=True))
+            parts["efforts"] = tuple(map(_dual_effort, parts["freedoms"], parts["frame_before"]))
         named = {"name": self.symbol} if isinstance(self.name, str) and not self.name else {}
-        vars(self).update(freedoms=freedoms, steps=steps, frame_before=before, **parts, **named)
+        vars(self).update(steps=steps, **parts, **named)
         return faults
 
     def scaled(self, L: float) -> PairType:
         """The row with its lengths divided by ``L``: pitches of turns given as numbers, arms of forces; itself where it has none."""
         if not self.has_lengths:
             return self
-        steps = tuple(step.scaled(L) for step in self.steps)
-        scaled = {
-            "steps": steps,
-            "freedoms": tuple(freedom for step in steps for freedom in step.freedoms),
-            "reactions": None if self.reactions is None else all_scaled(self.reactions, L),
-            "efforts": all_scaled(self.efforts, L),
-            "bookkeeping": self.bookkeeping and self.bookkeeping.scaled(L),
-        }
+        return self.with_steps(
+            [step.scaled(L) for step in self.steps],
+            reactions=None if self.reactions is None else all_scaled(self.reactions, L),
+            efforts=all_scaled(self.efforts, L),
+            bookkeeping=self.bookkeeping and self.bookkeeping.scaled(L),
+        )
+
+    def with_steps(self, steps: Sequence[Factor], **changes: Any) -> PairType:
+        """The row with other factors, and whatever goes with them; not tried."""
         out = copy(self)
-        vars(out).update(scaled)
+        for name in ("factors", "nx", "has_lengths", "takes_pitch"):
+            vars(out).pop(name, None)
+        vars(out).update(steps=tuple(steps), **_of_steps(steps), **changes)
         return out
 
     @cached_property
     def has_lengths(self) -> bool:
         """Whether numbers of the row are lengths."""
         book = self.bookkeeping or Bookkeeping((), ())
-        parts: tuple[Factor | Freedom | Component, ...] = (
-            *self.steps,
-            *(self.reactions or ()),
-            *self.efforts,
-            *book.conditions,
-            *book.along,
-        )
+        parts = (*self.steps, *(self.reactions or ()), *self.efforts, *book.conditions, *book.along)
         return any(part.scaled(2.0) is not part for part in parts)
 
     @property
@@ -431,22 +429,9 @@ class PairType:
         behind = {c: replace(c, frame=c.frame + (c.frame >= k)) for c in (*(row.reactions or ()), *row.efforts)}
         efforts = [behind[c] for c in row.efforts]
         efforts.insert(k, Component("gap", force, k))
-        out = copy(row)
-        for name in ("factors", "nx", "has_lengths", "takes_pitch"):
-            vars(out).pop(name, None)
-        before = [start + (start >= k) for start in row.frame_before]
-        vars(out).update(
-            steps=tuple(steps),
-            freedoms=tuple(freedom for step in steps for freedom in step.freedoms),
-            frame_before=(*before[:k], k, *before[k:]),
-            reactions=tuple(behind[c] for c in row.reactions or () if c is not normal),
-            efforts=tuple(efforts),
-            computed_efforts=True,
-            computed_reactions=True,
-            touching=None,
-            opens=True,
-        )
-        return out
+        reactions = tuple(behind[c] for c in row.reactions or () if c is not normal)
+        computed = {"computed_efforts": True, "computed_reactions": True}
+        return row.with_steps(steps, reactions=reactions, efforts=tuple(efforts), touching=None, opens=True, **computed)
 
     @property
     def f(self) -> int:
@@ -473,8 +458,7 @@ class PairType:
     @cached_property
     def factors(self) -> tuple[tuple[int, ...], ...]:
         """Freedoms grouped by factor: one index for a single freedom, three for a rotation."""
-        ends = accumulate(len(step.freedoms) for step in self.steps)
-        return tuple(tuple(range(end - len(step.freedoms), end)) for step, end in zip(self.steps, ends, strict=True))
+        return tuple(tuple(range(columns.start, columns.stop)) for _, columns, _ in placed(self))
 
     @cached_property
     def nx(self) -> int:
@@ -514,14 +498,16 @@ def _dual_effort(freedom: Freedom, frame: int) -> Component:
     return Component("F" + freedom.name[1:], (0.0, 0.0, 0.0, *v), frame, at_b=True)
 
 
-def _dual_at_random(row: PairType) -> bool:
-    """Whether ``S^T E = 1`` at random positions (fixed seed)."""
-    x = random_coordinates(row, np.random.default_rng(12345), 1, 7)
-    pitch = np.array([[0.3]])
-    frames = frames_of(row, pitch, x)
-    S, E = twists_of(row, pitch, frames, x), efforts_of(row, pitch, frames, x)
-    unit = np.einsum("ifnt,ignt->fgnt", S, E)
-    return not row.f or bool(np.abs(unit - np.eye(row.f)[:, :, None, None]).max() < 1e-9)
+def _tried(row: PairType, of: Callable[[PairType, Array, list[Array], Array], Array]) -> Array:
+    """Twists, efforts or components of a row at random positions (fixed seed)."""
+    x, pitch = random_coordinates(row, np.random.default_rng(12345), 1, 7), np.array([[0.3]])
+    return of(row, pitch, frames_of(row, pitch, x), x)
+
+
+def _is_dual(row: PairType) -> bool:
+    """Whether ``S^T E = 1`` there."""
+    unit = np.einsum("ifnt,ignt->ntfg", _tried(row, twists_of), _tried(row, efforts_of))
+    return bool(np.abs(unit - np.eye(row.f)).max(initial=0.0) < 1e-9)
 
 
 def _row_faults(row: PairType) -> list[str]:
@@ -531,14 +517,12 @@ def _row_faults(row: PairType) -> list[str]:
     for j, freedom in enumerate(row.freedoms):
         w, v = np.array(freedom.twist[:3]), np.array(freedom.twist[3:])
         if isinstance(steps[j], ConstantScrew) and abs(np.linalg.norm(w if w.any() else v) - 1) > 1e-12:
-            faults.append(
-                f"freedom {freedom.name}: the twist {freedom.twist} is not a unit twist; divide it by its length"
-            )
+            why = "is not a unit twist; divide it by its length"
+            faults.append(f"freedom {freedom.name}: the twist {freedom.twist} {why}")
     names = [f.name for f in row.freedoms]
     if len(set(names)) < len(names):
-        faults.append(
-            f"freedoms {', '.join(names)}: names repeat; give each a name of its own through Freedom(name, twist)"
-        )
+        why = "names repeat; give each a name of its own through Freedom(name, twist)"
+        faults.append(f"freedoms {', '.join(names)}: {why}")
     if len(set(row.component_names)) < len(row.component_names):
         faults.append(f"reactions {', '.join(row.component_names)}: names repeat")
     if len(row.efforts) != row.f:
@@ -548,23 +532,18 @@ def _row_faults(row: PairType) -> list[str]:
     legal = {0, *np.cumsum([len(g) for g in row.factors]).tolist()}
     for c in (*(row.reactions or ()), *row.efforts):
         if c.frame not in legal:
-            faults.append(
-                f"component {c.name}: there is no frame {shown(c.frame)}; frames of this row: {sorted(legal)}"
-            )
+            known = f"frames of this row: {sorted(legal)}"
+            faults.append(f"component {c.name}: there is no frame {shown(c.frame)}; {known}")
     if row.f > 6:
         faults.append(f"freedoms: {row.f} given, a pair has at most 6")
     if faults:
         return faults
-    rng = np.random.default_rng(12345)
-    x = random_coordinates(row, rng, 1, 7)
-    pitch = np.array([[0.3]])
-    frames = frames_of(row, pitch, x)
-    S = twists_of(row, pitch, frames, x)
+    S = _tried(row, twists_of)
     if row.f and min(np.linalg.matrix_rank(S[:, :, 0, t], tol=1e-9) for t in range(7)) < row.f:
         faults.append(f"freedoms {', '.join(names)}: not independent at random positions")
         return faults
-    W = reactions_of(row, pitch, frames, x)
-    if not _dual_at_random(row):
+    W = _tried(row, reactions_of)
+    if not _is_dual(row):
         faults.append("efforts: S^T E is not the unit matrix at random positions; give efforts dual to the freedoms")
     work = np.einsum("ifnt,icnt->fcnt", S, W)
     for i, name in enumerate(row.component_names):
@@ -611,108 +590,64 @@ class PairTable(Mapping[str, PairType], Shown):
         for row in self.values():
             reactions = " ".join(f"{c.name}@{c.frame}" for c in row.reactions or ()) or " ".join(row.component_names)
             unknowns, equations = row.unknowns_and_equations
-            rows.append(
-                (
-                    row.symbol,
-                    row.name,
-                    str(row.f),
-                    " ".join(f.label for f in row.freedoms) or "none",
-                    reactions or "none",
-                    f"{unknowns} / {equations}",
-                )
-            )
+            freedoms, count = " ".join(f.label for f in row.freedoms), f"{unknowns} / {equations}"
+            rows.append((row.symbol, row.name, str(row.f), freedoms or "none", reactions or "none", count))
         header = ("symbol", "name", "f", "freedoms in order", "reactions @ frame", "Lee's count")
         return Document("Pair types", (Table(header, tuple(rows)),))
 
 
 def table_row(
-    symbol: str, name: str, freedoms: Sequence[object], reactions: Sequence[object], *, dual: bool = True, **rest: Any
+    symbol: str,
+    name: str,
+    freedoms: str | Sequence[object],
+    reactions: str | Sequence[object],
+    efforts: str | None = None,
+    *,
+    dual: bool = True,
+    **rest: Any,
 ) -> PairType:
     """A row of the table, not tried at random positions: a test does that for all of them, once and not at every start.
 
-    ``dual``: whether the efforts, unit couples about the turns and unit forces along the slides, are dual to the freedoms.
+    ``dual``: whether the efforts that are not given, unit couples about the turns and unit forces along the slides, are dual to the
+    freedoms.
     """
     row = object.__new__(PairType)
-    given = {"freedoms": freedoms, "reactions": reactions, "computed_efforts": not dual}
-    vars(row).update(symbol=symbol, name=name, **given, **rest)
+    given = {"freedoms": freedoms, "reactions": reactions, "efforts": efforts}
+    parts = {what: v.split(", ") if isinstance(v, str) else v for what, v in given.items()}
+    vars(row).update(symbol=symbol, name=name, computed_efforts=not dual or efforts is not None, **parts, **rest)
     row.read()
     return row
 
 
 TABLE = PairTable(
     [
+        table_row("R", "revolute", "Rz", "Fx, Fy, Fz, Mx, My", bookkeeping=Bookkeeping(_AXIS, (_FZ,))),
+        table_row("P", "prismatic", "Tz", "Fx, Fy, Mx, My, Mz", bookkeeping=Bookkeeping(_AXIS, (_MZ,))),
         table_row(
-            "R",
-            "revolute",
-            freedoms=["Rz"],
-            reactions=["Fx", "Fy", "Fz", "Mx", "My"],
-            bookkeeping=Bookkeeping(_AXIS, (_FZ,)),
-        ),
-        table_row(
-            "P",
-            "prismatic",
-            freedoms=["Tz"],
-            reactions=["Fx", "Fy", "Mx", "My", "Mz"],
-            bookkeeping=Bookkeeping(_AXIS, (_MZ,)),
-        ),
-        table_row(
-            "H",
-            "helical",
-            freedoms=["Rz + pitch Tz"],
-            reactions=["Fx", "Fy", "Mx", "My", _SCREW_FZ],
+            "H", "helical", "Rz + pitch Tz", ["Fx", "Fy", "Mx", "My", _SCREW_FZ],
             bookkeeping=Bookkeeping(_AXIS, (_SCREW_FZ,)),
         ),
+        table_row("C", "cylindrical", "Rz, Tz", "Fx, Fy, Mx, My", bookkeeping=Bookkeeping(_AXIS, ())),
+        table_row("U", "universal (slotted sphere)", "Rz, Rx", "Fx, Fy, Fz, My@1", square_second=True),
+        table_row("S", "spherical", "rotation", "Fx, Fy, Fz", directed=False),
+        table_row("E", "planar", "Tx, Ty, Rz", "Fz, Mx, My"),
         table_row(
-            "C",
-            "cylindrical",
-            freedoms=["Rz", "Tz"],
-            reactions=["Fx", "Fy", "Mx", "My"],
-            bookkeeping=Bookkeeping(_AXIS, ()),
+            "Sc", "sphere in slotted cylinder", "Tz, Ry, Rx", "Fx@1, Fy@1, Mz@2", square_second=True, touching=_IN_GROOVE
         ),
+        table_row("Sg", "sphere in groove", "Tz, rotation", "Fx@1, Fy@1", touching=_IN_GROOVE),
         table_row(
-            "U",
-            "universal (slotted sphere)",
-            freedoms=["Rz", "Rx"],
-            reactions=["Fx", "Fy", "Fz", "My@1"],
-            square_second=True,
-        ),
-        table_row("S", "spherical", freedoms=["rotation"], reactions=["Fx", "Fy", "Fz"], directed=False),
-        table_row("E", "planar", freedoms=["Tx", "Ty", "Rz"], reactions=["Fz", "Mx", "My"]),
-        table_row(
-            "Sc",
-            "sphere in slotted cylinder",
-            freedoms=["Tz", "Ry", "Rx"],
-            reactions=["Fx@1", "Fy@1", "Mz@2"],
-            square_second=True,
-            touching=_IN_GROOVE,
-        ),
-        table_row(
-            "Sg",
-            "sphere in groove",
-            freedoms=["Tz", "rotation"],
-            reactions=["Fx@1", "Fy@1"],
-            touching=_IN_GROOVE,
-        ),
-        table_row(
-            "Cp",
-            "cylinder on plane",
-            freedoms=["Tx", "Ty", "Rz", "Rx"],
-            reactions=["Fz@2", "My@3"],
-            square_second=True,
+            "Cp", "cylinder on plane", "Tx, Ty, Rz, Rx", "Fz@2, My@3", square_second=True,
             touching=Touching(("Fz",), a=(0.0, 0.0), b=(0.0, 1.0), tilting="My"),
         ),
         table_row(
-            "Sp",
-            "sphere on plane",
-            freedoms=["Tx", "Ty", "rotation"],
-            reactions=["Fz@2"],
+            "Sp", "sphere on plane", "Tx, Ty, rotation", "Fz@2",
             touching=Touching(("Fz",), a=(0.0, 0.0), b=(1.0, 1.0)),
         ),
-        table_row("Tc", "torque coupling", freedoms=["Tx", "Ty", "Tz", "Rx", "Ry"], reactions=["Mz@4"]),
-        table_row("Fr", "free, all six", freedoms=["Tx", "Ty", "Tz", "Rx", "Ry", "Rz"], reactions=[], dual=False),
-        table_row("W", "weld", freedoms=[], reactions=["Fx", "Fy", "Fz", "Mx", "My", "Mz"], directed=False),
+        table_row("Tc", "torque coupling", "Tx, Ty, Tz, Rx, Ry", "Mz@4"),
+        table_row("Fr", "free, all six", "Tx, Ty, Tz, Rx, Ry, Rz", [], dual=False),
+        table_row("W", "weld", [], "Fx, Fy, Fz, Mx, My, Mz", directed=False),
     ]
-)
+)  # fmt: skip
 
 
 def pair_types() -> PairTable:

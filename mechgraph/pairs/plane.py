@@ -8,7 +8,7 @@ holds no link (a coupling of torques, names for a motion) loses it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -30,50 +30,33 @@ CLEAR = 1e-9
 @lru_cache(maxsize=4096)
 def in_plane(row: PairType) -> PairType | None:
     """The row in a plane; None where it can leave the plane, or holds nothing there although it holds something in space."""
-    found = (_projected(row, normal) for normal in NORMALS)
-    return next((one for one in found if one is not None), None)
+    return next(filter(None, (_projected(row, normal) for normal in NORMALS)), None)
 
 
 def _projected(row: PairType, normal: int) -> PairType | None:
     """The row with that axis of its marker standing on the plane, None where that cannot be."""
     steps, kept = _steps(row, normal)
-    if (row.bears and len(kept) < row.f) or any(
-        _side(c.wrench, c.per_pitch, normal) is None for c in row.reactions or ()
-    ):
+    sides = [_side(c.wrench, c.per_pitch, normal) for c in row.reactions or ()]
+    if (row.bears and len(kept) < row.f) or None in sides:
         return None
     count = [sum(j < k for j in kept) for k in range(row.f + 1)]  # of the freedoms before a frame that remain
 
     def moved(part: Component) -> Component:
-        return Component(part.name, part.wrench, count[part.frame], part.per_pitch, part.at_b)
+        return replace(part, frame=count[part.frame])
 
     reactions = None
     if row.reactions is not None:
-        reactions = tuple(moved(c) for c in row.reactions if _side(c.wrench, c.per_pitch, normal))
+        reactions = tuple(moved(c) for c, side in zip(row.reactions, sides, strict=True) if side)
         if len(reactions) != 3 - len(kept):
             return None
     if row.bears and len(kept) == 3 and not row.opens:
         return None
-    out = copy(row)
-    for name in ("factors", "nx", "has_lengths", "takes_pitch"):
-        vars(out).pop(name, None)
-    starts = np.cumsum([0, *(len(step.freedoms) for step in steps)]).tolist()
-    before = tuple(start for step, start in zip(steps, starts, strict=False) for _ in step.freedoms)
     touching = row.touching
     if touching is not None and not {*touching.forces} <= {c.name for c in reactions or ()}:
         touching = None
-    vars(out).update(
-        normal=normal,
-        spatial=row,
-        steps=tuple(steps),
-        freedoms=tuple(freedom for step in steps for freedom in step.freedoms),
-        reactions=reactions,
-        efforts=tuple(moved(row.efforts[j]) for j in kept),
-        pushed=tuple(kept.index(j) for j in row.pushed),
-        frame_before=before,
-        bookkeeping=None,
-        touching=touching,
-        square_second=False,
-    )
+    efforts, pushed = tuple(moved(row.efforts[j]) for j in kept), tuple(kept.index(j) for j in row.pushed)
+    given = {"reactions": reactions, "efforts": efforts, "pushed": pushed, "bookkeeping": None, "touching": touching}
+    out = row.with_steps(steps, normal=normal, spatial=row, square_second=False, **given)
     return out if any(_empty(step) for step in steps) or _stays(out) else None
 
 
@@ -117,8 +100,8 @@ def _stays(row: PairType) -> bool:
     x = _tried(row)
     pitch = np.zeros((1, 1))
     frames = evaluation.frames_of(row, pitch, x)
-    S, E = evaluation.twists_of(row, pitch, frames, x), evaluation.efforts_of(row, pitch, frames, x)
-    W = evaluation.reactions_of(row, pitch, frames, x)
+    parts = (evaluation.twists_of, evaluation.efforts_of, evaluation.reactions_of)
+    S, E, W = (part(row, pitch, frames, x) for part in parts)
     outside = np.delete(np.arange(6), _rows_of(row.normal))
     size = max(1.0, float(np.abs(S).max(initial=0.0)))
     leaves = max(float(np.abs(part[outside]).max(initial=0.0)) for part in (S, E, W))
@@ -129,7 +112,7 @@ def _stays(row: PairType) -> bool:
 def _tried(row: PairType) -> Array:
     """States at which a row is tried: random ones, along a curve places of it."""
     x = evaluation.random_coordinates(row, np.random.default_rng(12345), 1, 16)
-    for step, (_, numbers) in zip(row.steps, evaluation.places(row), strict=True):
+    for step, _, numbers in evaluation.placed(row):
         if travels(row) and not isinstance(step, ConstantScrew):
             low, high = (end if np.isfinite(end) else np.copysign(1.0, end) for end in step.ranges[0])
             x[numbers] = np.linspace(low, high, x.shape[-1])

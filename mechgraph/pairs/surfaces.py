@@ -33,7 +33,7 @@ from mechgraph.fields import (
 from mechgraph.fields import TABLE as NESTED
 from mechgraph.maths.se3 import Array, cross
 from mechgraph.memo import dataclass
-from mechgraph.pairs.curves import Circle, Curve, Line, far_from, parallel_faults, remade_from
+from mechgraph.pairs.curves import ORIGIN, Circle, Curve, Line, far_from, parallel_faults, remade_from
 from mechgraph.quantities import LENGTH, PURE, shown, wrong
 
 NO_ENDS = (-np.inf, np.inf)
@@ -104,10 +104,7 @@ class Surface(Described):
 
     def grid(self, p: Array) -> tuple[Array, Array]:
         """Parameters among which one is near to a point ``(3,)``."""
-        size = 1.0 + 2.0 * float(np.linalg.norm(p))
-        axes = [_between(end, size) for end in self.ends]
-        u, v = np.meshgrid(*axes)
-        return u.ravel(), v.ravel()
+        return _crossed(*(_between(end, 1.0 + 2.0 * float(np.linalg.norm(p))) for end in self.ends))
 
     def offset(self, distance: float) -> Surface | None:
         """The surface at a distance towards the normal, on which the center of a ball travels; None where it is of no known kind."""
@@ -131,8 +128,7 @@ class Surface(Described):
     @property
     def looked_at(self) -> tuple[Array, Array]:
         """Parameters ``(n,)`` between which the surface is smooth."""
-        u, v = np.meshgrid(*(_between(end, 1.0) for end in self.ends))
-        return u.ravel(), v.ravel()
+        return _crossed(*(_between(end, 1.0) for end in self.ends))
 
     @cached_property
     def bend(self) -> float:
@@ -169,14 +165,18 @@ def _between(ends: tuple[float, float], size: float) -> Array:
     return low + (high - low) * (np.arange(33) + 0.5) / 33
 
 
+def _crossed(u: Array, v: Array) -> tuple[Array, Array]:
+    """All pairs of two rows of parameters."""
+    grid = np.meshgrid(u, v)
+    return grid[0].ravel(), grid[1].ravel()
+
+
 @dataclass(frozen=True, kw_only=True, repr=False)
 class AboutAxis(Surface):
     """What a plane and surfaces of revolution share: a center and an axis."""
 
     center: Annotated[Any, POINT("a point of the axis: center, apex, or a point of the plane", LENGTH, default="0")] = (
-        0.0,
-        0.0,
-        0.0,
+        ORIGIN
     )
     axis: Annotated[Any, DIRECTION("axis, or normal of the plane", default="z")] = (0.0, 0.0, 1.0)
     second: Annotated[
@@ -219,18 +219,14 @@ class Plane(AboutAxis):
 class Turned(AboutAxis):
     """A curve turned about an axis: u is the angle, v the parameter of the ``meridian``."""
 
-    @property
+    @cached_property
     @abstractmethod
     def meridian(self) -> Curve:
         """The curve where u is zero."""
 
-    @cached_property
-    def _curve(self) -> Curve:
-        return self.meridian
-
     def at(self, u: Array, v: Array) -> Array:
         """``center + a + cos u b + sin u (axis x b)``, a and b the parts of the meridian along and across the axis."""
-        p = self._curve.at(v)[:3].copy()
+        p = self.meridian.at(v)[:3].copy()
         z = self._basis[2].reshape(3, *(1,) * u.ndim)
         p[0] -= np.asarray(self.center).reshape(z.shape)
         along = (p * z).sum(axis=1, keepdims=True) * z
@@ -245,25 +241,24 @@ class Turned(AboutAxis):
     @property
     def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Those of the meridian."""
-        return NO_ENDS, NO_ENDS if self._curve.is_closed else self._curve.ends
+        return NO_ENDS, NO_ENDS if self.meridian.is_closed else self.meridian.ends
 
     @property
     def periods(self) -> tuple[float, float]:
         """A turn, and the range of a closed meridian."""
-        begin, end = self._curve.ends
-        return math.tau, end - begin if self._curve.is_closed else np.inf
+        begin, end = self.meridian.ends
+        return math.tau, end - begin if self.meridian.is_closed else np.inf
 
     def grid(self, p: Array) -> tuple[Array, Array]:
         """A whole turn, and the meridian; of an endless one no farther from where it begins than the point."""
-        center, begin = np.asarray(self.center), self._curve.at(np.zeros(1))[0][:, 0]
+        center, begin = np.asarray(self.center), self.meridian.at(np.zeros(1))[0][:, 0]
         size = float(np.linalg.norm(p - center) + np.linalg.norm(begin - center))
-        u, v = np.meshgrid(_between((0.0, math.tau), size), _between(self._curve.ends, size))
-        return u.ravel(), v.ravel()
+        return _crossed(_between((0.0, math.tau), size), _between(self.meridian.ends, size))
 
     @property
     def looked_at(self) -> tuple[Array, Array]:
         """The meridian."""
-        v = self._curve.grid
+        v = self.meridian.grid
         return np.zeros(len(v)), v
 
     def _circle(self, radius: float, away: float = 0.0, **more: Any) -> Circle:
@@ -278,7 +273,7 @@ class Sphere(Turned):
     kind = "sphere"
     radius: Annotated[float, POSITIVE("radius", LENGTH)]
 
-    @property
+    @cached_property
     def meridian(self) -> Curve:
         """Half a circle."""
         return self._circle(self.radius, angles=(-0.25 * math.tau, 0.25 * math.tau))
@@ -325,7 +320,7 @@ class Cylinder(Turned):
     kind = "cylinder"
     radius: Annotated[float, POSITIVE("radius", LENGTH)]
 
-    @property
+    @cached_property
     def meridian(self) -> Curve:
         """A line along the axis."""
         return Line(point=np.asarray(self.center) + self.radius * self._basis[0], direction=self.axis)
@@ -344,7 +339,7 @@ class Cone(Turned):
         float, POSITIVE("between axis and surface, below 90 degrees", PURE, degrees=True, below=math.pi / 2)
     ]
 
-    @property
+    @cached_property
     def meridian(self) -> Curve:
         """A line from the apex."""
         direction = np.sin(self.half_angle) * self._basis[0] + np.cos(self.half_angle) * self._basis[2]
@@ -373,7 +368,7 @@ class Torus(Turned):
     radius: Annotated[float, POSITIVE("radius of the circle of centers", LENGTH)]
     tube: Annotated[float, POSITIVE("radius of the tube, below that", LENGTH)]
 
-    @property
+    @cached_property
     def meridian(self) -> Curve:
         """A circle."""
         return self._circle(self.tube, self.radius)
@@ -385,9 +380,9 @@ class Torus(Turned):
     def faults(self, where: str) -> list[str]:
         """Radii that make no torus."""
         found = super().faults(where)
-        return found or (
-            [] if self.tube < self.radius else [wrong(self.tube, where + "tube", f"below {self.radius:g}")]
-        )
+        if found or self.tube < self.radius:
+            return found
+        return [wrong(self.tube, where + "tube", f"below {self.radius:g}")]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -397,7 +392,7 @@ class Revolution(Turned):
     kind = "revolution"
     profile: Annotated[Curve, NESTED("the curve", table="curve")]
 
-    @property
+    @cached_property
     def meridian(self) -> Curve:
         """As declared."""
         return self.profile
@@ -444,10 +439,8 @@ class Patch(Surface):
     def at(self, u: Array, v: Array) -> Array:
         """The spline."""
         grid, (along_u, along_v) = self._splines
-        U, V = (
-            [one(np.asarray(at.real, dtype=float).ravel()) for one in basis]
-            for basis, at in ((along_u, u), (along_v, v))
-        )
+        at_u, at_v = (np.asarray(at.real, dtype=float).ravel() for at in (u, v))
+        U, V = [one(at_u) for one in along_u], [one(at_v) for one in along_v]
         known = np.stack([np.einsum("ti,tj,ijc->ct", U[i], V[j], grid, optimize=True) for i, j in ORDERS_UV])
         return _continued(known.reshape(10, 3, *u.shape), u - u.real, v - v.real)
 
@@ -496,12 +489,10 @@ class ByFunction(Surface):
         if found:
             return found
         at = [part.ravel() for part in np.meshgrid(*(between(np.linspace(*ends, 6)) for ends in self.ends))]
-        steps = [
-            (k, ORDERS_UV.index((i - (i > 0), j - (i == 0))), int(i == 0)) for k, (i, j) in enumerate(ORDERS_UV) if k
-        ]
-        return slope_faults(
-            self._known, at, steps, ["x" + "_"[: i + j] + "u" * i + "v" * j for i, j in ORDERS_UV], where
-        )
+        before = [(i - 1, j) if i else (i, j - 1) for i, j in ORDERS_UV]
+        steps = [(k, ORDERS_UV.index(before[k]), int(not i)) for k, (i, _) in enumerate(ORDERS_UV) if k]
+        words = ["x" + "_"[: i + j] + "u" * i + "v" * j for i, j in ORDERS_UV]
+        return slope_faults(self._known, at, steps, words, where)
 
 
 SURFACES: dict[str, type[Surface]] = {

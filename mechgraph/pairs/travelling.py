@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import field, replace
 from functools import cached_property
@@ -16,16 +16,7 @@ from mechgraph.errors import DeclarationError, ShapeError
 from mechgraph.maths.se3 import Array, cross
 from mechgraph.maths.tolerances import COMPLEX_STEP, SHAPES
 from mechgraph.memo import dataclass
-from mechgraph.pairs.curves import (
-    ORDERS,
-    Curve,
-    CurvePlace,
-    Travel,
-    outside,
-    point_text,
-    shape_faults,
-    turned,
-)
+from mechgraph.pairs.curves import ORDERS, Curve, CurvePlace, Travel, outside, point_text, shape_faults, turned
 from mechgraph.pairs.factors import UNIT_TWISTS, Factor, Freedom, PoseStack, Stack, entries
 from mechgraph.quantities import LENGTH, is_numeric, wrong
 
@@ -38,11 +29,6 @@ class Travelling(Factor):
 
     unit: float
     pair: str
-
-    @property
-    def kind(self) -> Hashable:
-        """Each by itself."""
-        return self
 
     @property
     @abstractmethod
@@ -286,6 +272,7 @@ class Beside(Curve):
     kind: ClassVar[str] = "beside"
     base: Curve
     distance: float
+    orders = ORDERS
 
     @cached_property
     def _named(self) -> Curve | None:
@@ -331,11 +318,6 @@ class Beside(Curve):
         return None if self._named is None else self._named.speed
 
     @property
-    def orders(self) -> int:
-        """Three derivatives."""
-        return ORDERS
-
-    @property
     def is_closed(self) -> bool:
         """As the curve."""
         return self.base.is_closed
@@ -369,18 +351,13 @@ def cutter_path(curve: Curve, radius: float) -> Curve:
         raise DeclarationError("cutter path", [f"curve: is a {curve.kind} that is not plane and closed; a profile is"])
     side = outside(curve)
     if distance > 0:
-        words = f"radius = {radius:.6g}: "
         hollow = side * travel.curvature(travel.s)
         worst = int(np.argmax(hollow))
         if distance * hollow[worst] >= 1 - SHAPES.standstill:
             at = point_text(travel.at(travel.s[worst : worst + 1]).x[:, 0])
-            largest = 1 / hollow[worst] + curve.roller
-            raise DeclarationError(
-                "cutter path",
-                [
-                    f"{words}the profile is hollow with the radius {largest:.6g} at {at}; take a cutter smaller than that"
-                ],
-            )
+            why = f"the profile is hollow with the radius {1 / hollow[worst] + curve.roller:.6g} at {at}"
+            fault = f"radius = {radius:.6g}: {why}; take a cutter smaller than that"
+            raise DeclarationError("cutter path", [fault])
     return Beside(base=curve, distance=side * distance)
 
 
@@ -402,13 +379,10 @@ def across(curve: Curve, place: AlongCurve, z: Sequence[float] | Array | None) -
     if place.tangent != X or z is None or not travel.is_straight or curve.guide is not None:
         return curve
     here = travel.at(np.zeros(1))
+    k, y = here.k[:, 0], here.y[:, 0]
     # digits to which the direction of a plane is rounded, for the same reason
-    along = [
-        round(v / float(np.linalg.norm(z)), 12) for v in (here.k[:, 0] @ np.asarray(z), here.y[:, 0] @ np.asarray(z))
-    ]
-    if along[1] == 0:
-        return curve
-    return curve.replace(frame="guided", guide=along[0] * here.k[:, 0] + along[1] * here.y[:, 0])
+    along, beside = (round(v / float(np.linalg.norm(z)), 12) for v in (k @ np.asarray(z), y @ np.asarray(z)))
+    return curve.replace(frame="guided", guide=along * k + beside * y) if beside else curve
 
 
 def center_path(curve: Curve, roller: float | None, point: Sequence[float] | None) -> Curve:
@@ -432,9 +406,8 @@ def placed_on(place: AlongCurve, curve: Curve, point: Sequence[float] | Array | 
     ends = np.isfinite(travel.begin)
     home = (travel.begin if ends else 0.0) if point is None else travel.nearest(np.asarray(point))[0]
     size = max(extent(curve, travel.at(np.array(home)).x), travel.length if ends else 0.0)
-    again = (
-        travel.is_closed and travel.length - home < SHAPES.place * size
-    )  # the end of a closed curve is where it begins
+    # the end of a closed curve is where it begins
+    again = travel.is_closed and travel.length - home < SHAPES.place * size
     return replace(place, curve=curve, home=0.0 if again else rounded(home, size))
 
 
