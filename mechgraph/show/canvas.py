@@ -7,12 +7,12 @@ import importlib
 import io
 from collections.abc import Callable, Iterable, Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING, Annotated, Any, Protocol
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from mechgraph.errors import MissingExtraError, visible
-from mechgraph.maths.se3 import Array
+from mechgraph.maths.se3 import Array, Index
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import Wanted, is_numeric
 
@@ -61,9 +61,7 @@ def new_axes(size: tuple[float, float] | None = None, **options: Any) -> Any:
     except ImportError:
         raise MissingExtraError("matplotlib", "plot") from None
     ax: Any = Figure(figsize=size, layout="constrained").add_subplot(**options)
-    ax._repr_png_ = functools.partial(
-        _png, ax.figure
-    )  # a notebook shows axes by their name, and only figures of pyplot
+    ax._repr_png_ = functools.partial(_png, ax.figure)  # a notebook shows axes by name, and only figures of pyplot
     return ax
 
 
@@ -77,11 +75,6 @@ def _png(figure: Any) -> bytes:
 def toolkit(name: str) -> Any:
     """A module of matplotlib's three-dimensional toolkit, which has no types."""
     return importlib.import_module(f"mpl_toolkits.mplot3d.{name}")
-
-
-def bare(ax: Any) -> None:
-    """No frame, ticks or scales: a diagram."""
-    ax.set_axis_off()
 
 
 def plain(ax: Any) -> None:
@@ -118,32 +111,17 @@ MARGIN = np.array([0.07, 0.13, 0.07])
 """Part of a box that is left free beside, below and above a drawing: for names, and for the directions and the scale."""
 
 
-class Painter(Protocol):
-    """Draws on axes ``ax``, seen with ``camera (3, 3)``: rows to the right, up, and towards the viewer."""
+def camera_of(elevation: float, azimuth: float) -> Array:
+    """Directions to the right, up and towards a viewer at some elevation and azimuth (degrees), ``(3, 3)``."""
+    el, az = np.deg2rad(elevation), np.deg2rad(azimuth)
+    right = np.array([-np.sin(az), np.cos(az), 0.0])
+    toward = np.array([np.cos(el) * np.cos(az), np.cos(el) * np.sin(az), np.sin(el)])
+    return np.stack([right, np.cross(toward, right), toward])
 
-    ax: Any
 
-    @property
-    def camera(self) -> Array:
-        """Directions to the right, up and towards the viewer."""
-
-    def polygons(self, corners: Sequence[Array], faces: Array, edges: Array, zorder: float) -> Any:
-        """Polygons ``(n, 3)`` with colors ``(count, 4)``, the nearest last."""
-
-    def lines(self, runs: Sequence[Array], **style: Any) -> Any:
-        """Polylines of one style."""
-
-    def marks(self, points: Array, **style: Any) -> Any:
-        """Markers at points."""
-
-    def pixels(self, points: Array) -> Array:
-        """Where points ``(n, 3)`` are on the screen, ``(n, 2)``."""
-
-    def fit(self, points: Array, room: Callable[[], Array]) -> None:
-        """Equal scales, at which points ``(n, 3)`` fill a box on the screen, with margins; ``room()`` gives the box."""
-
-    def fill(self, box: Array) -> None:
-        """Fill a box that may have changed, just before everything is drawn."""
+def within_margins(box: Array) -> tuple[Array, Array]:
+    """Corners of what a drawing may fill of a box."""
+    return box[0] + MARGIN[:2] * (box[1] - box[0]), box[1] - MARGIN[[0, 2]] * (box[1] - box[0])
 
 
 def scale_in(box: Array, points: Array, camera: Array) -> float:
@@ -154,7 +132,7 @@ def scale_in(box: Array, points: Array, camera: Array) -> float:
 
 
 class FlatPainter:
-    """On axes of two dimensions."""
+    """Draws on axes ``ax`` of two dimensions, seen with ``camera (3, 3)``: rows to the right, up, and towards the viewer."""
 
     def __init__(self, ax: Any, camera: Array) -> None:
         self.ax, self.camera = ax, camera
@@ -162,18 +140,17 @@ class FlatPainter:
         self._filled = np.zeros((2, 2))
 
     def fit(self, points: Array, room: Callable[[], Array]) -> None:
-        """See ``Painter``."""
+        """Equal scales, at which points ``(n, 3)`` fill a box on the screen, with margins; ``room()`` gives the box."""
         seen = points @ self.camera[:2].T
         self._content = np.array([seen.min(axis=0), seen.max(axis=0)])
         self.fill(room())
 
     def fill(self, box: Array) -> None:
-        """See ``Painter``; the limits are set again where the box has another shape."""
+        """Fill a box, just before everything is drawn; the limits are set again where it has another shape."""
         if np.allclose(box, self._filled):
             return
         self._filled = box
-        whole = self.ax.bbox.get_points()
-        low, high = box[0] + MARGIN[:2] * (box[1] - box[0]), box[1] - MARGIN[[0, 2]] * (box[1] - box[0])
+        whole, (low, high) = self.ax.bbox.get_points(), within_margins(box)
         span = np.ptp(self._content, axis=0)
         scale = float(np.max(span / (high - low))) or 1.0
         begin = self._content.mean(axis=0) - scale * (0.5 * (low + high) - whole[0])
@@ -182,33 +159,27 @@ class FlatPainter:
         self.ax.set_ylim(begin[1], end[1])
 
     def polygons(self, corners: Sequence[Array], faces: Array, edges: Array, zorder: float) -> Any:
-        """See ``Painter``."""
+        """Polygons ``(n, 3)`` with colors ``(count, 4)``, the nearest last."""
         from matplotlib.collections import PolyCollection
 
         order = np.argsort([float((p @ self.camera[2]).mean()) for p in corners], kind="stable")
         flat = [corners[i] @ self.camera[:2].T for i in order]
-        drawn = PolyCollection(
-            flat,
-            facecolors=faces[order],
-            edgecolors=edges[order],
-            linewidths=0.7,
-            zorder=zorder,
-            rasterized=len(flat) > MOST_PATHS,
-        )
+        style: dict[str, Any] = {"linewidths": 0.7, "zorder": zorder, "rasterized": len(flat) > MOST_PATHS}
+        drawn = PolyCollection(flat, facecolors=faces[order], edgecolors=edges[order], **style)
         return self.ax.add_collection(drawn, autolim=False)
 
     def lines(self, runs: Sequence[Array], **style: Any) -> Any:
-        """See ``Painter``."""
+        """Polylines of one style."""
         from matplotlib.collections import LineCollection
 
         return self.ax.add_collection(LineCollection([run @ self.camera[:2].T for run in runs], **style), autolim=False)
 
     def marks(self, points: Array, **style: Any) -> Any:
-        """See ``Painter``."""
+        """Markers at points."""
         return self.ax.scatter(*(points @ self.camera[:2].T).T, **style)
 
     def pixels(self, points: Array) -> Array:
-        """See ``Painter``."""
+        """Where points ``(n, 3)`` are on the screen, ``(n, 2)``."""
         return np.asarray(self.ax.transData.transform(np.asarray(points) @ self.camera[:2].T))
 
 
@@ -220,7 +191,7 @@ class SpacePainter:
         self._seen: tuple[float, ...] = ()
 
     def fit(self, points: Array, room: Callable[[], Array]) -> None:
-        """See ``Painter``; matplotlib asks where the axes are just before it draws them, which is when they are fitted."""
+        """See ``FlatPainter``; matplotlib asks where the axes are just before it draws them, which is when they are fitted."""
         self._points, self._room = points, room
         self.ax.set_axes_locator(self._located)
 
@@ -241,7 +212,7 @@ class SpacePainter:
         extent = float(np.linalg.norm(np.ptp(seen, axis=0))) or 1.0
         self._look(middle, extent, 1.0)
         here, size = self.pixels(middle[None])[0], np.ptp(self.pixels(self._points), axis=0)
-        low, high = box[0] + MARGIN[:2] * (box[1] - box[0]), box[1] - MARGIN[[0, 2]] * (box[1] - box[0])
+        low, high = within_margins(box)
         zoom = float(np.min((high - low) / np.maximum(size, 1e-9)))
         unit = zoom * float(np.linalg.norm(self.pixels((middle + extent * self.camera[0])[None])[0] - here)) / extent
         right, up = (0.5 * (low + high) - here) / unit
@@ -253,18 +224,15 @@ class SpacePainter:
         self.ax.set_box_aspect((1.0, 1.0, 1.0), zoom=zoom)
 
     def fill(self, box: Array) -> None:
-        """See ``Painter``; it was filled before."""
+        """See ``FlatPainter``; it was filled before."""
 
     @property
     def camera(self) -> Array:
-        """See ``Painter``."""
-        el, az = np.deg2rad(self.ax.elev), np.deg2rad(self.ax.azim)
-        right = np.array([-np.sin(az), np.cos(az), 0.0])
-        toward = np.array([np.cos(el) * np.cos(az), np.cos(el) * np.sin(az), np.sin(el)])
-        return np.stack([right, np.cross(toward, right), toward])
+        """See ``FlatPainter``."""
+        return camera_of(self.ax.elev, self.ax.azim)
 
     def polygons(self, corners: Sequence[Array], faces: Array, edges: Array, zorder: float) -> Any:
-        """See ``Painter``."""
+        """See ``FlatPainter``."""
         # corners are repeated until all have as many: what matplotlib fills up itself holds any numbers
         most = max(map(len, corners))
         equal = [np.concatenate([p, np.repeat(p[-1:], most - len(p), axis=0)]) for p in corners]
@@ -274,17 +242,20 @@ class SpacePainter:
         return self.ax.add_collection3d(drawn, autolim=False)
 
     def lines(self, runs: Sequence[Array], **style: Any) -> Any:
-        """See ``Painter``."""
+        """See ``FlatPainter``."""
         return self.ax.add_collection3d(toolkit("art3d").Line3DCollection(list(runs), **style), autolim=False)
 
     def marks(self, points: Array, **style: Any) -> Any:
-        """See ``Painter``."""
+        """See ``FlatPainter``."""
         return self.ax.scatter(*points.T, depthshade=False, **style)
 
     def pixels(self, points: Array) -> Array:
-        """See ``Painter``."""
+        """See ``FlatPainter``."""
         x, y, _ = toolkit("proj3d").proj_transform(*np.asarray(points).T, self.ax.get_proj())
         return np.asarray(self.ax.transData.transform(np.column_stack([x, y])))
+
+
+Painter = FlatPainter | SpacePainter
 
 
 def shaded(colour: str, corners: Sequence[Array], camera: Array, alpha: float = 1.0) -> Array:
@@ -353,28 +324,29 @@ def _clearest(graph: nx.Graph[int]) -> dict[int, Any]:
     first = [nx.planar_layout(graph)] if nx.is_planar(graph) else []
     first += [nx.circular_layout(graph), *(nx.spring_layout(graph, seed=seed) for seed in range(3))]
     found = [_scaled(graph, nx.kamada_kawai_layout(graph, pos=pos)) for pos in first]
-    return min(found, key=lambda at: _clashes(graph, at))
+    number, n = {name: i for i, name in enumerate(graph)}, len(graph)
+    edges = np.array([(number[a], number[b]) for a, b in graph.edges])
+    apart = [(i, j) for i, j in combinations(range(len(edges)), 2) if not {*edges[i]} & {*edges[j]}]
+    beside = np.array([(e, k) for e, ends in enumerate(edges) for k in range(n) if k not in ends])
+    pairs = np.array(apart, dtype=np.intp).reshape(-1, 2)
+    # distance of a line from a node that is not its end, over that of neighbors, below which they clash
+    return min(found, key=lambda at: clashes(np.array([at[name] for name in graph]), edges, pairs, beside, 0.15))
 
 
-def _clashes(graph: nx.Graph[int], at: dict[int, Array]) -> int:
-    """Pairs of lines that cross, and lines that nearly run over a node that is not their end."""
-    count = 0
-    for (a, b), (c, d) in combinations(graph.edges, 2):
-        if len({a, b, c, d}) == 4:
-            p, q, r, s = at[a], at[b], at[c], at[d]
-            count += _side(p, q, r) != _side(p, q, s) and _side(r, s, p) != _side(r, s, q)
-    for a, b in graph.edges:
-        for name in graph:
-            if name not in (a, b):
-                along = at[b] - at[a]
-                u = np.clip((at[name] - at[a]) @ along / (along @ along), 0.0, 1.0)
-                # distance of a line from a node that is not its end, over that of neighbors, below which they clash
-                count += bool(np.linalg.norm(at[a] + u * along - at[name]) < 0.15)
-    return count
+def clashes(at: Array, edges: Index, apart: Index, beside: Index, near: float) -> int:
+    """Pairs ``apart (n, 2)`` of ``edges (m, 2)`` that cross between nodes ``at (k, 2)``, and pairs ``beside`` of an edge and a node that
+    are nearer to each other than ``near``.
+    """
+    p, q = at[edges[:, 0]], at[edges[:, 1]]
 
+    def side(a: Array, b: Array, c: Array) -> Array:
+        return np.asarray((b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) > (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0]), float)
 
-def _side(p: Array, q: Array, r: Array) -> bool:
-    return bool((q[0] - p[0]) * (r[1] - p[1]) > (q[1] - p[1]) * (r[0] - p[0]))
+    a, b, c, d = p[apart[:, 0]], q[apart[:, 0]], p[apart[:, 1]], q[apart[:, 1]]
+    crossings = (side(a, b, c) != side(a, b, d)) & (side(c, d, a) != side(c, d, b))
+    along, start, point = (q - p)[beside[:, 0]], p[beside[:, 0]], at[beside[:, 1]]
+    u = np.clip(((point - start) * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-9), 0.0, 1.0)
+    return int(crossings.sum()) + int((np.linalg.norm(start + u[:, None] * along - point, axis=1) < near).sum())
 
 
 def _scaled(graph: nx.Graph[int], begin: dict[int, Any]) -> dict[int, Array]:

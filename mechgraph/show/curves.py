@@ -51,9 +51,8 @@ def abscissa(s: Solution, over: str | None = None) -> Abscissa:
         over = "t" if timed else next((name for name in s.prescribed if _stroke(s, name) > 0), still)
     if over == "t":
         if s.t is None:
-            raise DeclarationError(
-                f"curve of {m.name!r}", ["over='t': this motion has no times; name a freedom, or 'position'"]
-            )
+            fault = "over='t': this motion has no times; name a freedom, or 'position'"
+            raise DeclarationError(f"curve of {m.name!r}", [fault])
         t = np.broadcast_to(np.asarray(s.t, dtype=float), s.batch).reshape(rows)
         return Abscissa(t, axis_label("t", unit_of(m.units, (0, 0, 1))))
     if over == "position":
@@ -206,9 +205,8 @@ def _driver_names(s: Solution, freedom: str | Iterable[str] | None) -> list[str]
     """Full names of the drivers that were asked for."""
     m = s.whole
     if not s.has_forces or not s.actuated:
-        raise DeclarationError(
-            f"effort curve of {m.name!r}", ["the solution has no driver effort: use solve() with a driver"]
-        )
+        fault = "the solution has no driver effort: use solve() with a driver"
+        raise DeclarationError(f"effort curve of {m.name!r}", [fault])
     asked = s.actuated if freedom is None else [freedom] if isinstance(freedom, str) else list(freedom)
     names = [m.full_name(name) for name in asked]
     faults = [f"{name!r} is no driver; drivers: {', '.join(s.actuated)}" for name in names if name not in s.actuated]
@@ -288,18 +286,14 @@ def reaction_curve(
     >>> ax = show.reaction_curve(s, "B")
     """
     m = s.whole
-    if not s.has_forces:
-        raise DeclarationError(f"reaction of {m.name!r}", ["the solution has no forces: use solve()"])
+    _need_forces(s, f"reaction of {m.name!r}")
     result, row = s[pair], m.pair(pair).type
     kinds = {c.name: c.is_couple for c in row.reactions or ()} or dict.fromkeys(row.component_names, False)
     names = [name for name, couple in kinds.items() if couple == moment]
+    what = "moment" if moment else "force"
     if not names:
-        raise DeclarationError(
-            f"reaction of {m.name!r}",
-            [
-                f"pair {pair!r} ({row.symbol}) transmits no {'moment' if moment else 'force'}; its components: {', '.join(kinds) or 'none'}"
-            ],
-        )
+        fault = f"pair {pair!r} ({row.symbol}) transmits no {what}; its components: {', '.join(kinds) or 'none'}"
+        raise DeclarationError(f"reaction of {m.name!r}", [fault])
     x = abscissa(s, over)
     ax = new_axes() if ax is None else ax
     solved, lost = np.asarray(s.status) == "ok", []
@@ -315,12 +309,10 @@ def reaction_curve(
             span = f"{np.nanmin(known):.4g} to {np.nanmax(known):.4g}"
             draw_curve(ax, x, known, f"{name}: {span} {unit}".rstrip(), color=colour)
             if marked is not None:
-                ax.plot(
-                    x.values.reshape(-1)[marked], known.reshape(-1)[marked], "o", ms=7, mfc="white", mec=colour, mew=2
-                )
+                at = x.values.reshape(-1)[marked], known.reshape(-1)[marked]
+                ax.plot(*at, "o", ms=7, mfc="white", mec=colour, mew=2)
     ax.axhline(0.0, color=MUTED, lw=0.8, zorder=0)
     owner = m.pair(pair)
-    what = "moment" if moment else "force"
     lay_out(ax, x, axis_label(f"{what} of {owner.a} on {owner.b} in {pair}", unit))
     hatched_strips(ax, x, lost)
     ax.legend(frameon=False)
@@ -376,10 +368,25 @@ def known_pair(s: Solution, pair: str) -> str:
     """The name of a pair, or an error that names those there are."""
     names = [p.name for p in s.mechanism.pairs]
     if pair not in names:
-        raise DeclarationError(
-            f"picture of {s.mechanism.name!r}", [f"there is no pair {shown(pair)}; pairs: {', '.join(names)}"]
-        )
+        fault = f"there is no pair {shown(pair)}; pairs: {', '.join(names)}"
+        raise DeclarationError(f"picture of {s.mechanism.name!r}", [fault])
     return pair
+
+
+def _need_forces(s: Solution, what: str) -> None:
+    if not s.has_forces:
+        raise DeclarationError(what, ["the solution has no forces: use solve()"])
+
+
+def _bars(ax: Any, names: Iterable[str], label: str) -> Any:
+    """Names of bars from the top, and what they measure; the axes."""
+    rows = [*map(said, names)]
+    ax.set_yticks(range(len(rows)), rows)
+    ax.invert_yaxis()
+    ax.set_xlabel(label, color=INK)
+    plain(ax)
+    ax.tick_params(axis="y", length=0)
+    return ax
 
 
 class Margins(NamedTuple):
@@ -448,36 +455,28 @@ def reaction_ranges(s: Solution, *, moment: bool = False, ax: Axes = None) -> An
     >>> ax = show.reaction_ranges(s)
     """
     m = s.mechanism
-    if not s.has_forces:
-        raise DeclarationError(f"reactions of {m.name!r}", ["the solution has no forces: use solve()"])
+    _need_forces(s, f"reactions of {m.name!r}")
     sizes = {p.name: found for p in m.pairs if (found := _sizes(s, p.name, moment)) is not None}
     ax = new_axes((6.4, 1.3 + 0.34 * len(sizes))) if ax is None else ax
     largest = max((float(np.nanmax(v, initial=0.0)) for v, _, _ in sizes.values()), default=0.0) or 1.0
     labels = []
     for i, (name, (values, parts, lost)) in enumerate(sizes.items()):
-        low, high, mean = (
-            float(f(values)) if np.isfinite(values).any() else 0.0 for f in (np.nanmin, np.nanmax, np.nanmean)
-        )
+        values = values if np.isfinite(values).any() else np.zeros(1)
+        low, high, mean = (float(f(values)) for f in (np.nanmin, np.nanmax, np.nanmean))
         if parts:
             ax.barh(i, high - low, left=low, height=0.56, color=PALETTE[0], zorder=2)
             ax.plot(mean, i, "o", ms=6, mfc="white", mec=INK, mew=1.2, zorder=4)
-            ax.plot(
-                [low, low], [i - 0.28, i + 0.28], color=PALETTE[0], lw=1.6, zorder=3
-            )  # a constant force has a bar without length
+            # a constant force has a bar without length
+            ax.plot([low, low], [i - 0.28, i + 0.28], color=PALETTE[0], lw=1.6, zorder=3)
         if lost:
             ax.barh(
                 i, 1.08 * largest - high, left=high, height=0.56, facecolor="white", edgecolor=REACTION, hatch=HATCH, lw=0.8,
                 gid=f"not unique {name}",
             )  # fmt: skip
         labels.append(f"{name} ({' '.join(parts) or 'nothing'} unique)" if lost else name)
-    ax.set_yticks(range(len(labels)), map(said, labels))
-    ax.invert_yaxis()
     ax.set_xlim(0.0, 1.08 * largest)
     what = "moment" if moment else "force"
-    ax.set_xlabel(axis_label(f"{what} of the reaction", unit_of(m.units, (2 if moment else 1, 1, -2))), color=INK)
-    plain(ax)
-    ax.tick_params(axis="y", length=0)
-    return ax
+    return _bars(ax, labels, axis_label(f"{what} of the reaction", unit_of(m.units, (2 if moment else 1, 1, -2))))
 
 
 def _sizes(s: Solution, pair: str, moment: bool) -> tuple[Array, list[str], bool] | None:
@@ -485,21 +484,16 @@ def _sizes(s: Solution, pair: str, moment: bool) -> tuple[Array, list[str], bool
     result, row = s[pair], s.mechanism.pair(pair).type
     good = np.asarray(s.status).reshape(-1) == "ok"
     unique = {name: bool(np.asarray(flags).reshape(-1)[good].all()) for name, flags in result.unique.items()}
+    whole = np.linalg.norm((result.moment if moment else result.force).reshape(-1, 3)[good], axis=1)
     if row.reactions is None:
-        whole = (result.moment if moment else result.force).reshape(-1, 3)[good]
         known = all(unique[name] for name in row.component_names)
-        return (
-            np.linalg.norm(whole, axis=1) if known else np.full(good.sum(), np.nan),
-            ["all"] if known else [],
-            not known,
-        )
+        return (whole, ["all"], False) if known else (np.full(good.sum(), np.nan), [], True)
     names = [c.name for c in row.reactions if c.is_couple == moment]
     if not names:
         return None
     parts = [name for name in names if unique[name]]
     if len(parts) == len(names):
-        whole = (result.moment if moment else result.force).reshape(-1, 3)[good]
-        return np.linalg.norm(whole, axis=1), parts, False
+        return whole, parts, False
     values = result.components
     size = np.sqrt(sum((np.square(values[name].reshape(-1)[good]) for name in parts), np.zeros(int(good.sum()))))
     return size, parts, True
@@ -542,23 +536,19 @@ def polar_force(s: Solution, pair: str, *, on: Literal["a", "b"] = "a", ax: Axes
     """
     m = s.mechanism
     p = m.pair(known_pair(s, pair))
-    if not s.has_forces:
-        raise DeclarationError(f"polar force of {m.name!r}", ["the solution has no forces: use solve()"])
+    what = f"polar force of {m.name!r}"
+    _need_forces(s, what)
     if on not in ("a", "b"):
-        raise DeclarationError(f"polar force of {m.name!r}", [f"on = {on!r}: expected 'a' or 'b'"])
+        raise DeclarationError(what, [f"on = {on!r}: expected 'a' or 'b'"])
     if ax is not None and ax.name != "polar":
-        raise DeclarationError(
-            f"polar force of {m.name!r}", ["ax: expected polar axes, add_subplot(projection='polar')"]
-        )
+        raise DeclarationError(what, ["ax: expected polar axes, add_subplot(projection='polar')"])
     good, place = place_of(s)
     stage = DrawnPose(m, place, len(good))
     frame = stage.frames[f"pair:{pair}@{0 if on == 'a' else p.type.f}"][:, :, :3]
     force = known_force(stage, s, p, good, frame[:, :, 2])
     if not np.isfinite(force).all(axis=1).any():
-        raise DeclarationError(
-            f"polar force of {m.name!r}",
-            [f"the force in {pair!r} across its axis is not unique; mg.check(m).unique says why"],
-        )
+        fault = f"the force in {pair!r} across its axis is not unique; mg.check(m).unique says why"
+        raise DeclarationError(what, [fault])
     from matplotlib.ticker import MaxNLocator
 
     inside = np.einsum("tij,ti->tj", frame, force)
@@ -679,13 +669,8 @@ def friction_losses(s: Solution, *, ax: Axes = None) -> Any:
     for i, power in enumerate(lost.values()):
         ax.barh(i, np.nanmean(power), height=0.56, color=PALETTE[0], zorder=2)
         ax.plot(np.nanmax(power), i, "o", ms=6, mfc="white", mec=INK, mew=1.2, zorder=4)
-    ax.set_yticks(range(len(lost)), map(said, lost))
-    ax.invert_yaxis()
     ax.set_xlim(left=0.0)
-    ax.set_xlabel(axis_label("power lost: mean (bar), greatest (dot)", unit_of(s.mechanism.units, POWER)), color=INK)
-    plain(ax)
-    ax.tick_params(axis="y", length=0)
-    return ax
+    return _bars(ax, lost, axis_label("power lost: mean (bar), greatest (dot)", unit_of(s.mechanism.units, POWER)))
 
 
 RANK = {"position": 0, "velocity": 1, "acceleration": 2}
@@ -790,9 +775,8 @@ def hodograph(
     >>> ax = show.hodograph(s, "C")
     """
     if of not in ("velocity", "acceleration"):
-        raise DeclarationError(
-            f"hodograph of {s.mechanism.name!r}", [f"of = {of!r}: expected 'velocity' or 'acceleration'"]
-        )
+        fault = f"of = {of!r}: expected 'velocity' or 'acceleration'"
+        raise DeclarationError(f"hodograph of {s.mechanism.name!r}", [fault])
     s = s.finely()
     return _draw(s, {name: getattr(motion_of(s, name), of) for name in _names(s, points)}, RANK[of], ax)
 
@@ -828,25 +812,18 @@ def _draw(s: Solution, found: dict[str, Array], rank: int, ax: Any) -> Any:
         rows = np.where(solved, values, np.nan).reshape(-1, s.batch[-1] if s.batch else 1, 3)
         for k, row in enumerate(rows):
             seen = row @ axes.T
-            ax.plot(
-                *seen.T,
-                color=colour,
-                lw=1.9,
-                label="_" * bool(k) + said(name),
-                marker="o" if len(row) == 1 else "",
-                ms=4,
-            )
+            label, marker = "_" * bool(k) + said(name), "o" if len(row) == 1 else ""
+            ax.plot(*seen.T, color=colour, lw=1.9, label=label, marker=marker, ms=4)
             there = seen[np.isfinite(seen).all(axis=1)]
             if len(there):
                 ax.plot(*there[:1].T, "o", ms=6, mfc="white", mec=colour, mew=1.6, label="_")
     unit = unit_of(m.units, (1, 0, -rank))
     letters = [_letter(axis) for axis in axes]
     words = ("", "velocity ", "acceleration ")[rank]
-    for setter, letter in zip(
-        (ax.set_xlabel, ax.set_ylabel, *([ax.set_zlabel] if space else [])), letters, strict=False
-    ):
-        setter(axis_label(f"{words}{letter}", unit), color=INK)
-    ax.set_aspect("equal", adjustable="datalim") if not space else ax.set_aspect("equal")
+    ax.set(**{f"{of}label": axis_label(f"{words}{letter}", unit) for of, letter in zip("xyz", letters, strict=False)})
+    for axis in (ax.xaxis, ax.yaxis, *([ax.zaxis] if space else [])):
+        axis.label.set_color(INK)
+    ax.set_aspect("equal", adjustable=None if space else "datalim")
     if not space:
         plain(ax)
         if rank:

@@ -27,7 +27,7 @@ from mechgraph.show.canvas import (
     Axes,
     FlatPainter,
     axis_label,
-    bare,
+    clashes,
     colours,
     inside,
     new_axes,
@@ -94,20 +94,11 @@ def draw_graph(m: Mechanism, *, ax: Axes = None) -> Any:
         canvas.coupling(c.name, [on[m.pairs[m.freedom(q)[0]].name] for q in c.freedoms])
     for name, (x, y) in at.items():
         frame = name == m.frame
-        canvas.ax.scatter(
-            x,
-            y,
-            marker="s" if frame else "o",
-            s=150,
-            facecolor=MUTED if frame else "white",
-            edgecolor=INK,
-            linewidth=1.4,
-            zorder=4,
-        )
+        mark, face = ("s", MUTED) if frame else ("o", "white")
+        canvas.ax.scatter(x, y, marker=mark, s=150, facecolor=face, edgecolor=INK, linewidth=1.4, zorder=4)
         canvas.name(name, at[name], INK, weight="bold")
-    words = ((f"loop {i + 1}: {', '.join(loop)}", PALETTE[i % len(PALETTE)]) for i, loop in enumerate(loops))
     canvas.finish(
-        [(line, colour) for text, colour in words for line in wrap(text, LEGEND_LETTERS, subsequent_indent="    ")]
+        [(f"loop {i}: {', '.join(loop)}", PALETTE[(i - 1) % len(PALETTE)]) for i, loop in enumerate(loops, 1)]
     )
     return canvas.ax
 
@@ -194,9 +185,7 @@ def draw_structure(m: Mechanism, *, groups: Decomposition | None = None, ax: Axe
         canvas.ax.scatter(x, y, s=130, facecolor="white", edgecolor=INK, linewidth=1.5, zorder=4)
         canvas.ax.scatter(x, y, s=60, marker="x", color=INK, linewidth=1.1, zorder=5)
         canvas.name(f"{pair.name} ({pair.type.symbol})", at[pair.name], INK, weight="bold")
-    canvas.finish(
-        [(line, tone) for text, tone in legend for line in wrap(text, LEGEND_LETTERS, subsequent_indent="    ")]
-    )
+    canvas.finish(legend)
     return canvas.ax
 
 
@@ -212,8 +201,7 @@ def _draw_link(canvas: _Canvas, link: str, corners: Array, colour: str, frame: b
         corners = np.stack([corners[0], end])
         middle = corners.mean(axis=0)
     if len(corners) > 2:
-        order = np.argsort(np.arctan2(*(corners - middle).T[::-1]), kind="stable")
-        corners = corners[order]
+        corners = _round(corners)
         canvas.ax.add_patch(
             Polygon(corners, facecolor="none" if frame else colour, edgecolor=MUTED if frame else "none", alpha=1.0 if frame else 0.18,
                     hatch=HATCH if frame else None, lw=0.0, zorder=1, gid=f"link {link}")
@@ -227,6 +215,11 @@ def _draw_link(canvas: _Canvas, link: str, corners: Array, colour: str, frame: b
     return np.asarray(middle)
 
 
+def _round(corners: Array) -> Array:
+    """Points ``(n, 2)`` in the order in which they stand about their middle."""
+    return np.asarray(corners[np.argsort(np.arctan2(*(corners - corners.mean(axis=0)).T[::-1]), kind="stable")])
+
+
 class _Canvas:
     """Axes without scales, on which names are arranged beside points of a plane."""
 
@@ -235,7 +228,7 @@ class _Canvas:
         self.ax = new_axes((6.4 + 0.25 * more, 5.2 + 0.2 * more)) if ax is None else ax
         self.points = points
         self.middle = points.mean(axis=0)
-        bare(self.ax)
+        self.ax.set_axis_off()
         self._names: list[tuple[str, Array, str, dict[str, Any]]] = []
         self._taken: list[Array] = [points]
 
@@ -278,16 +271,13 @@ class _Canvas:
         taken = np.concatenate(self._taken)
         free = np.column_stack([taken, np.zeros(len(taken))])
         arranged = Arrangement(
-            self.ax,
-            painter.pixels,
-            lambda: painter.pixels(free),
-            lambda: painter.camera,
-            lambda: inside(self.ax),
-            painter.fill,
-        )
+            self.ax, painter.pixels, lambda: painter.pixels(free), lambda: painter.camera, lambda: inside(self.ax), painter.fill
+        )  # fmt: skip
         for text, at, colour, style in self._names:
             arranged.name(text, at, colour, 0.07, **style)
-        arranged.legend(legend)
+        arranged.legend(
+            [(line, colour) for text, colour in legend for line in wrap(text, LEGEND_LETTERS, subsequent_indent="    ")]
+        )
         painter.fit(free, arranged.room)
 
 
@@ -329,14 +319,8 @@ def draw_sparsity(f: Formulation, *, ax: Axes = None) -> Any:
 
     image = np.full((n, k), np.nan)
     image[rows, columns] = [owners.index(f.equations[i].owner) % len(PALETTE) for i in rows]
-    ax.imshow(
-        image,
-        cmap=ListedColormap(list(PALETTE)),
-        vmin=-0.5,
-        vmax=len(PALETTE) - 0.5,
-        aspect="auto",
-        interpolation="none",
-    )
+    colour = {"cmap": ListedColormap(list(PALETTE)), "vmin": -0.5, "vmax": len(PALETTE) - 0.5}
+    ax.imshow(image, aspect="auto", interpolation="none", **colour)
     for axis, items, put in ((ax.yaxis, f.equations, ax.axhline), (ax.xaxis, f.unknowns, ax.axvline)):
         groups = [item.owner for item in items]
         starts = [i for i in range(len(groups)) if i == 0 or groups[i] != groups[i - 1]]
@@ -422,9 +406,7 @@ def _draw(chain: Chain, ax: Axes) -> None:
         corners = at[joints]
         colour = MUTED if len(joints) < 3 else PALETTE[len(joints) - 3]
         if len(joints) > 2:
-            middle = corners.mean(axis=0)
-            order = np.argsort(np.arctan2(*(corners - middle).T[::-1]), kind="stable")
-            ax.add_patch(Polygon(corners[order], facecolor=colour, edgecolor=colour, alpha=0.35, lw=1.5, zorder=1))
+            ax.add_patch(Polygon(_round(corners), facecolor=colour, edgecolor=colour, alpha=0.35, lw=1.5, zorder=1))
         else:
             ax.plot(*corners.T, color=colour, lw=1.8, zorder=2)
     many = np.array([len(joint) > 2 for joint in chain.joints])
@@ -436,7 +418,7 @@ def _draw(chain: Chain, ax: Axes) -> None:
     for kind, place in zip(chain.types, at, strict=True):
         if kind not in MARKERS:
             ax.annotate(kind, place, ha="center", va="center", fontsize=5, color=INK, zorder=4)
-    bare(ax)
+    ax.set_axis_off()
     ax.set_aspect("equal")
     ax.margins(0.12)
 
@@ -490,21 +472,10 @@ def _untangled(at: Array, edges: Index, apart: Index, beside: Index) -> tuple[Ar
 
 def _cost(at: Array, edges: Index, apart: Index, beside: Index) -> float:
     """How many links cross each other or run over joints of others, and by part of one how far lengths of links are from one."""
-    p, q = at[edges[:, 0]], at[edges[:, 1]]
-
-    def side(a: Array, b: Array, c: Array) -> Array:
-        return np.sign((b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0]))
-
-    a, b, c, d = p[apart[:, 0]], q[apart[:, 0]], p[apart[:, 1]], q[apart[:, 1]]
-    crossings = int(((side(a, b, c) != side(a, b, d)) & (side(c, d, a) != side(c, d, b))).sum())
-    along, point = (q - p)[beside[:, 0]], at[beside[:, 1]]
-    start = p[beside[:, 0]]
-    u = np.clip(((point - start) * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-9), 0.0, 1.0)
-    # distance of a link from a joint of others below which it runs over it
-    over = int((np.linalg.norm(start + u[:, None] * along - point, axis=1) < 0.2).sum())
-    length = np.log(np.maximum(np.linalg.norm(q - p, axis=1), 1e-3))
+    length = np.log(np.maximum(np.linalg.norm(at[edges[:, 1]] - at[edges[:, 0]], axis=1), 1e-3))
     spread = float((length * length).mean())
-    return crossings + over + spread / (1.0 + spread)
+    # distance of a link from a joint of others below which it runs over it
+    return clashes(at, edges, apart, beside, 0.2) + spread / (1.0 + spread)
 
 
 BinsName = Literal["auto", "fd", "doane", "scott", "stone", "rice", "sturges", "sqrt"]
@@ -575,9 +546,8 @@ def study_histogram(
             text = f"{name}: {x:.4g}" if i < 2 else f"{'_' * (i > 2)}{name}"
             ax.axvline(x, color=colour, lw=1.8, ls=style, label=text)
     ax.set_xlabel(label, color=INK)
-    ax.set_ylabel(
-        f"number of variants (of {len(study.failed)}, {len(study.failed) - values.size} not solved)", color=INK
-    )
+    n = len(study.failed)
+    ax.set_ylabel(f"number of variants (of {n}, {n - values.size} not solved)", color=INK)
     plain(ax)
     ax.legend(frameon=False)
     return ax
@@ -629,9 +599,8 @@ def study_bands(study: Study, output: str, *, over: str | None = None, part: int
     # quantiles between which bands are drawn: three standard deviations of a normal distribution to each side, nine tenths, half
     for (low, high), alpha in zip(((0.00135, 0.99865), (0.05, 0.95), (0.25, 0.75)), (0.16, 0.26, 0.4), strict=True):
         ends = np.where(some, np.nanquantile(filled, (low, high), axis=0), np.nan)
-        ax.fill_between(
-            x.values[0], *ends, color=PALETTE[0], alpha=alpha, lw=0, label=f"{100 * low:g} to {100 * high:g} %"
-        )
+        label = f"{100 * low:g} to {100 * high:g} %"
+        ax.fill_between(x.values[0], *ends, color=PALETTE[0], alpha=alpha, lw=0, label=label)
     ax.plot(x.values[0], np.where(some, np.nanmedian(filled, axis=0), np.nan), color=PALETTE[0], lw=1.8, label="median")
     ax.plot(x.values[0], picked.itself, color=INK, lw=1.4, ls=(0, (5, 2)), label="mechanism itself")
     lay_out(ax, x, picked.label)
@@ -707,29 +676,21 @@ class _Picked:
     """One number of an output for every variant, and for every position where it has them (``placed``)."""
 
     def __init__(self, study: Study, output: str, part: int | None) -> None:
+        values, positions = study.outputs.get(output, np.zeros(0)), study.status.shape[1]
+        self.output, self.placed = output, values.ndim > 1 and values.shape[1] == positions
+        rest, fault = values.shape[1 + self.placed :], ""
         if output not in study.outputs:
-            raise DeclarationError(
-                "picture of a study", [f"{output!r} is not an output; outputs: {', '.join(study.outputs)}"]
-            )
-        values, self.output = study.outputs[output], output
-        positions = study.status.shape[1]
-        self.placed = values.ndim > 1 and values.shape[1] == positions
-        rest = values.shape[1 + self.placed :]
-        if len(rest) > 1:
-            raise DeclarationError(
-                "picture of a study", [f"{output!r} has entries of shape {rest}; keep a single row as an output"]
-            )
-        self._entries = rest
-        if rest and not (isinstance(part, int) and 0 <= part < rest[0]):
-            raise DeclarationError(
-                "picture of a study",
-                [wrong(part, "part", f"a number below {rest[0]}: {output!r} has {rest[0]} entries")],
-            )
+            fault = f"{output!r} is not an output; outputs: {', '.join(study.outputs)}"
+        elif len(rest) > 1:
+            fault = f"{output!r} has entries of shape {rest}; keep a single row as an output"
+        elif rest and not (isinstance(part, int) and 0 <= part < rest[0]):
+            fault = wrong(part, "part", f"a number below {rest[0]}: {output!r} has {rest[0]} entries")
+        if fault:
+            raise DeclarationError("picture of a study", [fault])
         self._part = part if rest else None
         self.values, self.itself = self.entry(values), self.entry(study.nominal[output])
         unit = study.units[output]
-        unit = unit[self._part or 0] if isinstance(unit, tuple) else unit
-        self.unit = unit
+        self.unit = unit[self._part or 0] if isinstance(unit, tuple) else unit
         self._name = output if self._part is None else f"{output}[{self._part}]"
         self.label = self.label_at(None)
 
@@ -766,9 +727,8 @@ def _driver(study: Study, over: str | None, count: int) -> Abscissa:
     m = study.mechanism
     rows = {name: np.asarray(motion.position, dtype=float) for name, motion in study.motions.items()}
     rows = {name: row.reshape(-1, row.shape[-1])[0] if row.ndim else row.reshape(1) for name, row in rows.items()}
-    named = [
-        name for name in rows if over is not None and name == (m.full_name(over) if over in m.pair_index else over)
-    ]
+    full = m.full_name(over) if over is not None and over in m.pair_index else over
+    named = [name for name in rows if name == full]
     if over is not None and not named:
         raise DeclarationError("bands of a study", [f"{over!r} is no driver of the study; drivers: {', '.join(rows)}"])
     moving = named or [name for name, row in rows.items() if len(row) == count and np.ptp(row) > 0]
@@ -848,10 +808,8 @@ def draw_branches(b: Branches, output: str | None = None, *, ax: Any = None, cur
     column = names.index(name)
     for i, branch in enumerate(b.branches):
         colour = PALETTE[branch.circuit % len(PALETTE)] if current in (None, i) else MUTED
-        x, y = _curve(b, branch, column)
-        ax.plot(
-            x, y, color=colour, lw=2.5 if current == i else 1.5, label=said(f"branch {i}, circuit {branch.circuit}")
-        )
+        label = said(f"branch {i}, circuit {branch.circuit}")
+        ax.plot(*_curve(b, branch, column), color=colour, lw=2.5 if current == i else 1.5, label=label)
     for fold in b.folds:
         for i in fold.branches:
             x, y = _curve(b, b.branches[i], column)

@@ -31,7 +31,7 @@ from mechgraph.show.canvas import (
     Painter,
     Size,
     SpacePainter,
-    bare,
+    camera_of,
     colours,
     edges_of,
     inside,
@@ -132,9 +132,8 @@ def draw_skeleton(
     m, size = found.mechanism, 1 if isinstance(s, Mechanism) else int(np.asarray(s.status).size)
     chosen = [item if isinstance(item, str) else item[0] for item in highlight]
     names = [p.name for p in m.pairs]
-    faults = [
-        f"highlight: there is no pair {name!r}; pairs: {', '.join(names)}" for name in chosen if name not in names
-    ]
+    known = ", ".join(names)
+    faults = [f"highlight: there is no pair {name!r}; pairs: {known}" for name in chosen if name not in names]
     faults += trace_faults(found, traces)
     if not len(found.positions):
         faults.append(f"none of {counted(size, 'position')} was solved")
@@ -183,11 +182,8 @@ def _pieces(course: Scene, path: Array) -> list[Array]:
 def trace_faults(found: Scene, traces: bool | Sequence[str]) -> list[str]:
     """What is wrong with names of paths."""
     names, known = [] if isinstance(traces, bool) else list(traces), traceable(found)
-    return [
-        f"traces: there is no pair or named point {shown(name)}; there are: {', '.join(known)}"
-        for name in names
-        if name not in known
-    ]
+    bad = [shown(name) for name in names if name not in known]
+    return [f"traces: there is no pair or named point {name}; there are: {', '.join(known)}" for name in bad]
 
 
 def painter_for(found: Scene, ax: Any, view: tuple[float, float]) -> Painter:
@@ -197,27 +193,14 @@ def painter_for(found: Scene, ax: Any, view: tuple[float, float]) -> Painter:
     if ax.name == "3d":
         ax.set_proj_type("ortho")
         ax.computed_zorder = False
-        toward = None if found.normal is None else -found.upright[:, 1]
-        if toward is None:
-            ax.view_init(*view)
-        else:
-            upright = abs(toward[2]) > 0.99
-            ax.view_init(
-                np.rad2deg(np.arcsin(np.clip(toward[2], -1, 1))),
-                -90.0 if upright else np.rad2deg(np.arctan2(toward[1], toward[0])),
-            )
+        if found.normal is not None:
+            x, y, z = -found.upright[:, 1]
+            view = (np.rad2deg(np.arcsin(np.clip(z, -1, 1))), -90.0 if abs(z) > 0.99 else np.rad2deg(np.arctan2(y, x)))
+        ax.view_init(*view)
         return SpacePainter(ax)
     if found.normal is not None:
         return FlatPainter(ax, found.upright.T[[0, 2, 1]] * [[1], [1], [-1]])
     return FlatPainter(ax, camera_of(*view))
-
-
-def camera_of(elevation: float, azimuth: float) -> Array:
-    """Directions to the right, up and towards a viewer at some elevation and azimuth (degrees), ``(3, 3)``."""
-    el, az = np.deg2rad(elevation), np.deg2rad(azimuth)
-    right = np.array([-np.sin(az), np.cos(az), 0.0])
-    toward = np.array([np.cos(el) * np.cos(az), np.cos(el) * np.sin(az), np.sin(el)])
-    return np.stack([right, np.cross(toward, right), toward])
 
 
 class Drawing:
@@ -234,10 +217,8 @@ class Drawing:
         for part in self.scene.parts:
             if part.role == "link" and positions:
                 runs = [run for t in positions for run in _runs(part, self.scene.vertices(part, t))]
-                # opacity of the other positions
-                self.painter.lines(
-                    runs, colors=self.colour[part.link], linewidths=1.2, alpha=0.3, zorder=1.0, gid="ghosts"
-                )
+                style = {"linewidths": 1.2, "alpha": 0.3, "zorder": 1.0, "gid": "ghosts"}
+                self.painter.lines(runs, colors=self.colour[part.link], **style)
 
     def traces(self, traces: bool | Sequence[str], course: Scene) -> None:
         """Paths of pair points on link b, or on link a where b is the frame, and of named points: of all, of none, or of some by name."""
@@ -257,9 +238,8 @@ class Drawing:
             vertices = self.scene.vertices(part, t)
             if np.isnan(vertices).any() or not part.scales[0] <= scale < part.scales[1]:
                 continue
-            level = (
-                {} if self.scene.normal is None and part.role == "wheel" else ABOVE
-            )  # in space a shaft goes through its wheel
+            # in space a shaft goes through its wheel
+            level = {} if self.scene.normal is None and part.role == "wheel" else ABOVE
             heights.setdefault(level.get(part.role, 4.0), []).append((part, vertices))
             if part.role in ("center", "point"):
                 self._mark(part, vertices)
@@ -290,12 +270,10 @@ class Drawing:
             if part.role == "wheel":
                 colour = tint(colour)
             shade = shaded(colour, own, self.painter.camera, alpha)
-            rims = [i < part.shape.rims for i in range(len(own))]
+            rims = [i < part.shape.rims and part.role != "plate" for i in range(len(own))]
             corners += own
             faces.append(shade)
-            edges.append(
-                edges_of(shade, rims if part.role != "plate" else [False] * len(own), 0.8 if alpha < 1 else 1.0)
-            )
+            edges.append(edges_of(shade, rims, 0.8 if alpha < 1 else 1.0))
         if corners:
             self.painter.polygons(corners, np.concatenate(faces), np.concatenate(edges), height)
 
@@ -328,7 +306,7 @@ class Drawing:
         from mechgraph.show.arrangement import Arrangement  # not above: matplotlib is an extra
 
         painter, samples = self.painter, self._samples(t)
-        bare(self.ax)
+        self.ax.set_axis_off()
         arranged = Arrangement(
             self.ax, painter.pixels, lambda: painter.pixels(samples), lambda: painter.camera, lambda: inside(self.ax), painter.fill,
             places,
@@ -475,11 +453,10 @@ def _chosen(found: Scene, frames: int | Sequence[int] | None) -> list[int]:
         return np.linspace(0, count - 1, n).round().astype(int).tolist()
     places = {int(p): t for t, p in enumerate(found.positions)}
     bad = [p for p in frames if p not in places]
-    if bad or not len(frames):
-        fault = (
-            f"frames: position {bad[0]} was not solved, or is none" if bad else wrong(frames, "frames", "one or more")
-        )
-        raise DeclarationError(where, [fault])
+    if bad:
+        raise DeclarationError(where, [f"frames: position {bad[0]} was not solved, or is none"])
+    if not len(frames):
+        raise DeclarationError(where, [wrong(frames, "frames", "one or more")])
     return [places[p] for p in frames]
 
 
