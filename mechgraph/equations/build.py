@@ -121,20 +121,12 @@ def _lee(draft: _Draft, k: int) -> None:
         return
     free = replace(draft.names.reaction[k], letter="F")
     act: list[Term] = []
-    dual = []
-    for letter, offset, couple in (("F", 3, False), ("M", 0, True)):
+    for letter, offset, what in (("F", 3, "force"), ("M", 0, "moment about the origin")):
         for i, axis in enumerate(AXES):
-            what = "moment about the origin" if couple else "force"
-            unknown = draft.unknown(
-                replace(free, letter=letter, axis=axis),
-                pair.name,
-                pair.type.symbol,
-                couple,
-                f"free dual {what} of pair {pair.name}, {axis}",
-            )
+            symbol, meaning = replace(free, letter=letter, axis=axis), f"free dual {what} of pair {pair.name}, {axis}"
+            unknown = draft.unknown(symbol, pair.name, pair.type.symbol, letter == "M", meaning)
             act.append(Term(unknown, 1.0, None, offset + i))
-            dual.append(unknown)
-    draft.duals[k] = dual
+    draft.duals[k] = [term.unknown for term in act]
     printed = _along(draft, k, "along", book.along, act)
     draft.acts.append(act)
     _define(draft, k, [("+", (free,)), *printed])
@@ -244,24 +236,15 @@ def _equilibrium(draft: _Draft, words: MotionWords | None) -> list[ScalarEquatio
                 printed.append(("+" if m.pairs[k].b == link.name else "-", (exerted,)))
         for sign, exerted, acting in draft.touched.get(link.name, []):
             printed.append(("+" if sign > 0 else "-", (exerted,)))
-            for t in acting:
-                terms[t.part].append(t)
+            for term in acting:
+                terms[term.part].append(term)
         draft.block((*summed(printed), "=", "0"), "link", link.name)
         for what, letter, offset in (("force", "F", 3), ("moment", "M", 0)):
             for part in sorted({*range(6)[m.span]} & {*range(offset, offset + 3)}):
-                axis = AXES[part % 3]
+                axis, name = AXES[part % 3], f"link {number} ({link.name}): {what} {AXES[part % 3]}"
                 symbols = [(Symbol(letter, place, "vector", axis=axis), array) for place, array in known]
-                equations.append(
-                    ScalarEquation(
-                        f"link {number} ({link.name}): {what} {axis}",
-                        link.name,
-                        "link",
-                        tuple(terms[part]),
-                        index,
-                        part,
-                        tuple(KnownSymbol(symbol, array, (part, index)) for symbol, array in symbols),
-                    )
-                )
+                given = tuple(KnownSymbol(symbol, array, (part, index)) for symbol, array in symbols)
+                equations.append(ScalarEquation(name, link.name, "link", tuple(terms[part]), index, part, given))
     return equations
 
 
@@ -279,16 +262,12 @@ def _closure(draft: _Draft, words: MotionWords) -> list[ScalarEquation]:
     """The acceleration closure among the equations, and the accelerations that drivers prescribe."""
     closure, offset = words.closure(ACCELERATION), len(draft.screws)
     draft.screws += closure.screws
-    equations = [
-        replace(
-            equation,
-            terms=tuple(
-                replace(t, unknown=draft.accelerations[t.unknown], screw=None if t.screw is None else offset + t.screw)
-                for t in equation.terms
-            ),
-        )
-        for equation in closure.equations
-    ]
+
+    def moved(term: Term) -> Term:
+        screw = None if term.screw is None else offset + term.screw
+        return replace(term, unknown=draft.accelerations[term.unknown], screw=screw)
+
+    equations = [replace(equation, terms=tuple(map(moved, equation.terms))) for equation in closure.equations]
     draft.blocks += words.influence_blocks()
     for unknown in [u for u in draft.unknowns if u.group == "driver"]:
         k, j = draft.m.freedom(unknown.freedom)
@@ -298,9 +277,8 @@ def _closure(draft: _Draft, words: MotionWords) -> list[ScalarEquation]:
         known = (KnownSymbol(given, "accelerations", (column,), -1.0),)
         name = f"driver {unknown.freedom}: prescribed acceleration"
         draft.block((acceleration, "=", given), "prescribed", unknown.owner)
-        equations.append(
-            ScalarEquation(name, unknown.owner, "driver", (Term(draft.accelerations[column], 1.0),), known=known)
-        )
+        terms = (Term(draft.accelerations[column], 1.0),)
+        equations.append(ScalarEquation(name, unknown.owner, "driver", terms, known=known))
     return equations
 
 
@@ -388,16 +366,6 @@ def formulate(
     _multipliers(draft)
     if words is not None:
         _accelerations(draft, words)
-    equations = _equilibrium(draft, words) + _conditions(draft)
-    if words is not None:
-        equations += _closure(draft, words)
-    return Formulation(
-        m,
-        tuple(draft.unknowns),
-        tuple(equations),
-        tuple(draft.blocks),
-        tuple(draft.screws),
-        bookkeeping,
-        unknowns,
-        tuple(map(tuple, draft.acts)),
-    )
+    equations = _equilibrium(draft, words) + _conditions(draft) + (_closure(draft, words) if words is not None else [])
+    found = (tuple(draft.unknowns), tuple(equations), tuple(draft.blocks), tuple(draft.screws))
+    return Formulation(m, *found, bookkeeping, unknowns, tuple(map(tuple, draft.acts)))

@@ -8,6 +8,7 @@ and 2.6.
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -238,13 +239,8 @@ class MotionWords:
             row = tuple(Term(self.first[k] + j, 1.0, coupling=(g, i)) for i, (k, j) in enumerate(places))
             bias = [Symbol("N", "C", name=coupling.name)] if which == ACCELERATION and self.moves(g) else []
             known = tuple(KnownSymbol(symbol, "row_biases", (g,), 1.0) for symbol in bias)
-            blocks.append(
-                Block(
-                    (*summed(self.coupled(g, which)), *(w for b in bias for w in ("+", b)), "=", "0"),
-                    KINDS[which],
-                    coupling.name,
-                )
-            )
+            words = (*summed(self.coupled(g, which)), *(w for b in bias for w in ("+", b)), "=", "0")
+            blocks.append(Block(words, KINDS[which], coupling.name))
             equations.append(ScalarEquation(f"coupling {coupling.name}", coupling.name, "closure", row, known=known))
         return LinearSystem(self.m, tuple(self.unknowns(which)), tuple(equations), tuple(blocks), tuple(screws))
 
@@ -259,10 +255,8 @@ class MotionWords:
             if which == ACCELERATION and self.bias_terms(k):
                 symbol = replace(self.bias(k), kind="vector", moment=part >= 3, axis=AXES[part % 3])
                 known.append(KnownSymbol(symbol, "biases", (part, k), float(sign)))
-        what = f"{'turning' if part < 3 else 'velocity'} {AXES[part % 3]}"
-        return ScalarEquation(
-            f"{self.loop_name(i)}: {what}", self.loop_name(i), "closure", tuple(terms), None, part, tuple(known)
-        )
+        loop, what = self.loop_name(i), f"{'turning' if part < 3 else 'velocity'} {AXES[part % 3]}"
+        return ScalarEquation(f"{loop}: {what}", loop, "closure", tuple(terms), None, part, tuple(known))
 
     # --- links ---------------------------------------------------------------------------------------------------------
 
@@ -289,9 +283,8 @@ class MotionWords:
     def _center(self, link: Link, out: str, dv: str, dw: str) -> Block:
         """Acceleration of the mass center."""
         a, rate, turning, v, w, c = (self.of_link(letter, link.name) for letter in (out, dv, dw, "v", "w", "c"))
-        return Block(
-            (a, "=", rate, "+", turning, "x", c, "+", w, "x", "(", v, "+", w, "x", c, ")"), "inertia", link.name
-        )
+        words = (a, "=", rate, "+", turning, "x", c, "+", w, "x", "(", v, "+", w, "x", c, ")")
+        return Block(words, "inertia", link.name)
 
     def _inertia(self, link: Link, place: str, acceleration: str, turning: str) -> Block:
         force = Symbol("F", f"{place}{self.names.link_number[link.name]}", "dual")
@@ -334,18 +327,14 @@ class MotionWords:
             biases: list[Signed] = [("+" if s > 0 else "-", (self.bias(k),)) for k, s in path if self.bias_terms(k)]
             z, y = self.of_link("z", link.name), self.of_link("y", link.name)
             yield Block((z, "+", "e", y, "=", *summed(biases)), "influence", link.name)
-            for block in ([self._center(link, "k", "y", "z")] if link.mass else []) + [
-                self._inertia(link, "B", "k", "z")
-            ]:
-                yield replace(block, kind="influence")
+            if link.mass:
+                yield replace(self._center(link, "k", "y", "z"), kind="influence")
+            yield replace(self._inertia(link, "B", "k", "z"), kind="influence")
 
     def _influence(self, link: Link, k: int, j: int, f: FreedomSymbols) -> Iterator[Block]:
         K, H = self.influence(link, k, j)
-        c, mass, tensor = (
-            self.of_link("c", link.name),
-            self.of_link("m", link.name, "scalar"),
-            self.of_link("I", link.name),
-        )
+        c, tensor = (self.of_link(letter, link.name) for letter in "cI")
+        mass = self.of_link("m", link.name, "scalar")
         line = replace(f.line, kind="vector")
         if link.mass:
             screw = f.screw("freedoms", k, j)
@@ -454,13 +443,9 @@ class Formulation(LinearSystem, Shown):
     def closure(self) -> Closure:
         """The closure equations of position, velocity and acceleration, and what defines their symbols."""
         words = MotionWords(self.mechanism)
-        return Closure(
-            tuple(words.position_blocks()),
-            words.closure(RATE),
-            words.closure(ACCELERATION),
-            tuple(words.motion_blocks()),
-            tuple(words.inertia_blocks()),
-        )
+        velocity, acceleration = words.closure(RATE), words.closure(ACCELERATION)
+        motion, inertia = tuple(words.motion_blocks()), tuple(words.inertia_blocks())
+        return Closure(tuple(words.position_blocks()), velocity, acceleration, motion, inertia)
 
     @cached_property
     def transmitted(self) -> LinearSystem:
@@ -486,9 +471,7 @@ class Formulation(LinearSystem, Shown):
         >>> ledger.unknowns, ledger.equations
         (18, 18)
         """
-        groups: dict[str, int] = {}
-        for pair in self.mechanism.pairs:
-            groups[pair.type.symbol] = groups.get(pair.type.symbol, 0) + 1
+        groups = dict(Counter(pair.type.symbol for pair in self.mechanism.pairs))
         if self.mechanism.couplings:
             groups["coupling"] = len(self.mechanism.couplings)
         groups["driver"] = sum(u.group == "driver" for u in self.unknowns)
@@ -496,14 +479,8 @@ class Formulation(LinearSystem, Shown):
         if self.sought == "response":
             groups["acceleration"] = sum(u.group == "acceleration" for u in self.unknowns)
             groups["closure"] = len({e.owner for e in self.equations if e.group == "closure"})
-        rows = {
-            name: LedgerRow(
-                count,
-                sum(u.group == name for u in self.unknowns),
-                sum(e.group == name for e in self.equations),
-            )
-            for name, count in groups.items()
-        }
+        unknowns, equations = (Counter(one.group for one in of) for of in (self.unknowns, self.equations))
+        rows = {name: LedgerRow(count, unknowns[name], equations[name]) for name, count in groups.items()}
         return Ledger(self.bookkeeping, rows)
 
     def document(self, components: bool = True) -> Document:
@@ -605,10 +582,8 @@ class Formulation(LinearSystem, Shown):
         return CoefficientTable(tuple(self.closure.acceleration.coefficient_rows("N", "B")))
 
     def __repr__(self) -> str:
-        return (
-            f"Formulation({self.mechanism.name!r}, {self.bookkeeping!r}, {len(self.equations)} equations, "
-            f"{len(self.unknowns)} unknowns)"
-        )
+        size = f"{len(self.equations)} equations, {len(self.unknowns)} unknowns"
+        return f"Formulation({self.mechanism.name!r}, {self.bookkeeping!r}, {size})"
 
     def _repr_html_(self) -> str:
         return to_html(self.document(components=len(self.unknowns) <= 200))  # more are shown in blocks alone
@@ -628,29 +603,18 @@ def _entry(*words: str | Symbol) -> Equation:
 A = Symbol("A", "k", "vector")
 A0 = moment_of(A)
 SYMBOLS = (
-    (
-        _entry(_dual("R", "ab"), "=", "F", "+", "e", "M"),
-        "force and moment about the global origin that link a exerts on link b, one dual vector; e times e is zero",
-    ),
+    (_entry(_dual("R", "ab"), "=", "F", "+", "e", "M"),
+     "force and moment about the global origin that link a exerts on link b, one dual vector; e times e is zero"),
     (_entry(_dual("R", "ba"), "=", "-", _dual("R", "ab")), "action and reaction"),
-    (
-        _entry(A),
-        "unit vector along the axis of pair k, z of its marker; X and Y along x and y; a prime for every freedom before",
-    ),
-    (
-        _entry(A0, "=", Symbol("P", "k", "vector"), "x", A),
-        "its moment about the global origin, P the origin of its frame, for an effort that of the marker on the second link",
-    ),
-    (
-        replace(_entry(_dual("A", "k"), "=", A, "+", "e", A0), text="A_k + e A0_k"),
-        "the axis as a line, what A stands for among dual vectors",
-    ),
-    (
-        _entry(Symbol("F", "k", along="A")),
-        "unknown force of pair k along A; likewise along X and Y, and couples M about them",
-    ),
+    (_entry(A),
+     "unit vector along the axis of pair k, z of its marker; X and Y along x and y; a prime for every freedom before"),
+    (_entry(A0, "=", Symbol("P", "k", "vector"), "x", A),
+     "its moment about the global origin, P the origin of its frame, for an effort that of the marker on the second link"),
+    (replace(_entry(_dual("A", "k"), "=", A, "+", "e", A0), text="A_k + e A0_k"),
+     "the axis as a line, what A stands for among dual vectors"),
+    (_entry(Symbol("F", "k", along="A")), "unknown force of pair k along A; likewise along X and Y, and couples M about them"),
     (_entry(_dual("F", "Ib")), "inertia of link b: minus mass times acceleration of its mass center, and the moment"),
-)
+)  # fmt: skip
 """What the symbols of every formulation mean."""
 LEE = (_entry(_dual("F", "ab")), "part of the reaction with no force along and no moment about the axis of the pair")
 PITCH = (_entry(Symbol("rho", "k")), "pitch of pair k, advance per radian")
@@ -675,72 +639,49 @@ def _vector(letter: str, place: str = "b") -> Symbol:
 
 
 MOTION = (
-    (
-        _entry(*(word for letter in ("theta", "omega", "alpha") for word in (Symbol(letter, "k"), ",")), "..."),
-        "angle of pair k, its rate and acceleration; S, dS, ddS for a slide; with a direction where pair k has several",
-    ),
-    (
-        _entry("exp(", Symbol("theta", "k"), _dual("A", ""), ")"),
-        "displacement by theta about A, a slide for e S A; A, X, Y there are axes of the frame before it",
-    ),
-    (
-        _entry(Symbol("L", "b", name="k,l")),
-        "shape of link b: pose of the marker of pair l on it, seen from the marker of pair k on it",
-    ),
-    (
-        _entry(_dual("V", "b"), "=", _vector("w"), "+", "e", _vector("v")),
-        "twist of link b: angular velocity, and velocity of its point at the global origin",
-    ),
+    (_entry(*(word for letter in ("theta", "omega", "alpha") for word in (Symbol(letter, "k"), ",")), "..."),
+     "angle of pair k, its rate and acceleration; S, dS, ddS for a slide; with a direction where pair k has several"),
+    (_entry("exp(", Symbol("theta", "k"), _dual("A", ""), ")"),
+     "displacement by theta about A, a slide for e S A; A, X, Y there are axes of the frame before it"),
+    (_entry(Symbol("L", "b", name="k,l")),
+     "shape of link b: pose of the marker of pair l on it, seen from the marker of pair k on it"),
+    (_entry(_dual("V", "b"), "=", _vector("w"), "+", "e", _vector("v")),
+     "twist of link b: angular velocity, and velocity of its point at the global origin"),
     (_entry(_dual("dV", "b"), "=", _vector("dw"), "+", "e", _vector("dv")), "rate of the twist of link b"),
-    (
-        _entry(_dual("N", "k")),
-        "velocity part of the acceleration of pair k (N_5 of 2.60); among components N0 is its dual part",
-    ),
-    (
-        _entry(Symbol("m", "b"), ",", _vector("c"), ",", _vector("a"), ",", _vector("I")),
-        "mass of link b, position and acceleration of its mass center, inertia about it in global directions, turning with the link",
-    ),
-)
+    (_entry(_dual("N", "k")),
+     "velocity part of the acceleration of pair k (N_5 of 2.60); among components N0 is its dual part"),
+    (_entry(Symbol("m", "b"), ",", _vector("c"), ",", _vector("a"), ",", _vector("I")),
+     "mass of link b, position and acceleration of its mass center, inertia about it in global directions, turning with the link"),
+)  # fmt: skip
 """What the symbols of closure and motion mean."""
 VARYING = (
     _entry(Symbol("W", "k", "dual", name="dS")),
     "own rate of a screw that is not constant in its frame; D the displacement that it belongs to",
 )
 RESPONSE = (
-    (
-        _entry(Symbol("K", "b,k", "vector", along="A"), ",", Symbol("H", "b,k", "vector", along="A")),
-        "acceleration of mass center b, rate of the moment of momentum of link b about the origin, for a unit acceleration of pair k",
-    ),
-    (
-        _entry(_dual("F", "Bb")),
-        "inertia of link b were the accelerations of all freedoms zero; k, z, y are a, dw, dv then",
-    ),
-)
+    (_entry(Symbol("K", "b,k", "vector", along="A"), ",", Symbol("H", "b,k", "vector", along="A")),
+     "acceleration of mass center b, rate of the moment of momentum of link b about the origin, for a unit acceleration of pair k"),
+    (_entry(_dual("F", "Bb")), "inertia of link b were the accelerations of all freedoms zero; k, z, y are a, dw, dv then"),
+)  # fmt: skip
 
 
 def _symbols(f: Formulation) -> Iterator[tuple[Equation, str]]:
     """The symbols that occur."""
     m = f.mechanism
+    varying = not all(isinstance(step, ConstantScrew) or step.holds_rotation for p in m.pairs for step in p.type.steps)
     yield from SYMBOLS
-    if any(u.meaning.startswith("free dual") for u in f.unknowns):
-        yield LEE
-    if any(pair.pitch is not None for pair in m.pairs):
-        yield PITCH
-    if m.loads:
-        yield LOADS
-    if any(u.group == "driver" for u in f.unknowns):
-        yield DRIVERS
-    if any(not c.steps for c in m.couplings):
-        yield COUPLINGS
-    if any(c.steps for c in m.couplings):
-        yield CONTACTS
-    if m.couplings:
-        yield CONSTANT
-    yield from MOTION
-    if not all(isinstance(step, ConstantScrew) or step.holds_rotation for p in m.pairs for step in p.type.steps):
-        yield VARYING
-    if f.sought == "response":
-        yield from RESPONSE
+    for meaning, occurs in (
+        (LEE, any(u.meaning.startswith("free dual") for u in f.unknowns)),
+        (PITCH, any(pair.pitch is not None for pair in m.pairs)),
+        (LOADS, bool(m.loads)),
+        (DRIVERS, any(u.group == "driver" for u in f.unknowns)),
+        (COUPLINGS, any(not c.steps for c in m.couplings)),
+        (CONTACTS, any(c.steps for c in m.couplings)),
+        (CONSTANT, bool(m.couplings)),
+    ):
+        if occurs:
+            yield meaning
+    yield from (*MOTION, *[VARYING] * varying, *RESPONSE * (f.sought == "response"))
 
 
 def formulation_document(f: Formulation, components: bool) -> Document:

@@ -226,10 +226,8 @@ def _symbol(symbol: Symbol) -> str:
     below = place.replace("mi>", "mn>") if symbol.place[:1].isdigit() else place
     below += name + (f"<mi>{symbol.axis}</mi>" if symbol.axis else "")
     parts = [base, *(f"<mrow>{part}</mrow>" for part in (below, above) if part)]
-    tag = {(False, False): "", (True, False): "msub", (False, True): "msup", (True, True): "msubsup"}[
-        bool(below), bool(above)
-    ]
-    return f"<{tag}>{''.join(parts)}</{tag}>" if tag else base
+    tag = "m" + "sub" * bool(below) + "sup" * bool(above)
+    return f"<{tag}>{''.join(parts)}</{tag}>" if below or above else base
 
 
 def _above(along: str) -> str:
@@ -520,13 +518,8 @@ class LinearSystem:
             for i, equation in enumerate(self.equations)
             for t in equation.terms
         ]
-        rows, cols, signs, values = zip(*cells, strict=True) if cells else ((), (), (), ())
-        return (
-            np.array(rows, dtype=np.intp),
-            np.array(cols, dtype=np.intp),
-            np.array(signs, dtype=float),
-            np.array(values, dtype=np.intp),
-        )
+        rows, cols, signs, values = np.array(cells).reshape(-1, 4).T
+        return rows.astype(np.intp), cols.astype(np.intp), signs.astype(float), values.astype(np.intp)
 
     def entries(self, state: State) -> Array:
         """Values of all coefficients ``(terms, T)`` in the order of ``pattern``."""
@@ -616,10 +609,8 @@ class LinearSystem:
 
     def scalar(self, equation: ScalarEquation) -> Words:
         """One scalar equation as it is printed."""
-        terms = [
-            (self.sign_of(term), (*self.coefficient(term), self.unknowns[term.unknown].symbol))
-            for term in equation.terms
-        ]
+        unknown = (self.unknowns[term.unknown].symbol for term in equation.terms)
+        terms = [(self.sign_of(t), (*self.coefficient(t), u)) for t, u in zip(equation.terms, unknown, strict=True)]
         return (*summed([*terms, *(("+" if k.sign > 0 else "-", (k.symbol,)) for k in equation.known)]), "=", "0")
 
     def solve(self, state: State, position: int = 0) -> Array:
