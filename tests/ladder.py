@@ -70,6 +70,9 @@ LADDER: dict[str, Callable[[], Rung]] = {
     "R-R dyad, 5 poses": lambda: (dyad(), mg.poses("body", _rows(5, 3)), ["A.point", "B.point"], 4),
     "R-R dyad, 3 poses": lambda: (dyad(), mg.poses("body", _rows(3, 3)), ["B.point"], 1),
     "R-R dyad, 4 poses": lambda: (dyad(), mg.poses("body", _rows(4, 3)), ["A.point.y", "B.point"], 3),
+    "R-R dyad, 2 poses and a velocity": lambda: (
+        dyad(), mg.poses("body", _rows(2, 3), twists=[[1, 0.2, 0.5], [np.nan] * 3]), ["B.point"], 1,
+    ),
     "four-bar function, 5 pairs": lambda: (four_bar(), mg.function("A", "D", _rows(5, 2)), ["B.point", "C.point"], 3),
     "slider-crank function, 5 pairs": lambda: (
         slider_crank(), mg.function("A", "D", _rows(5, 2)), ["B.point", "C.point"], 3,
@@ -91,6 +94,9 @@ LADDER: dict[str, Callable[[], Rung]] = {
     ),
 }  # fmt: skip
 LARGE: dict[str, Callable[[], Rung]] = {
+    "four-bar function, 3 pairs and 2 slopes": lambda: (
+        four_bar(), mg.function("A", "D", _rows(3, 2), rates=[np.nan, 0.6, 0.7]), ["B.point", "C.point"], 3,
+    ),
     "S-S dyad, 7 poses": lambda: (
         spatial("S-S", ("S", (0, 0, 0), None), ("S", (1, 0.3, 0.1), None)),
         mg.poses("body", turned(7, 1.0)), ["O.point", "P.point"], 20,

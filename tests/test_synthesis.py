@@ -8,6 +8,9 @@ import pytest
 from ladder import LADDER, dyad, four_bar, slider_crank, spatial
 
 import mechgraph as mg
+from mechgraph.synthesis.classes import TaskClass
+from mechgraph.synthesis.solve import kept
+from mechgraph.synthesis.system import RowProblem
 
 QUICK = [name for name in LADDER if name.split(",")[0] in ("R-R dyad", "four-bar function", "spherical R-R")]
 LONG = [name for name in LADDER if name not in QUICK]
@@ -135,6 +138,22 @@ def test_what_is_not_served_is_refused_by_name() -> None:
     geared = m.replace(couplings=[mg.Coupling({"A": 1, "D": -2})])
     with pytest.raises(mg.DeclarationError, match="couplings: are not served"):
         mg.synthesize(geared, mg.function("A", "D", pairs), ["C.point"])
+
+
+@pytest.mark.parametrize(
+    "name", ["R-Sp-R function, 6 pairs", "slider-crank function, 5 pairs", "four-bar path, 5 points, timed"]
+)
+def test_a_start_set_serves_whatever_the_order_of_pairs_links_and_unknowns(name: str) -> None:
+    m, task, unknown, total = LADDER[name]()
+    turned = [
+        p.replace(a=p.b, b=p.a) if i % 2 and p.type.symbol in ("R", "P") else p for i, p in enumerate(m.pairs[::-1])
+    ]
+    for pairs in (m.pairs[1:] + m.pairs[:1], turned):
+        of = TaskClass(RowProblem(m.replace(pairs=pairs), task, unknown[::-1]), np.random.default_rng(7))
+        start = kept(of)
+        assert start is not None
+        assert start.x.shape[1] == total
+        assert of.error(of.at(start.member, start.x)).max() < 1e-9
 
 
 def test_of_an_element_only_what_matters_is_sought() -> None:

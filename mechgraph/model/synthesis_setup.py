@@ -17,12 +17,13 @@ FitName = Literal["least_squares", "minimax"]
 DefectName = Literal["branch", "circuit", "order", "full_turn"]
 _ROWS: Schema = {"type": "array", "items": {"type": "array"}}
 _HELD: dict[TaskName, tuple[str, ...]] = {
-    "function": ("input", "output", "pairs", "scale"),
-    "path": ("point", "points", "at"),
-    "poses": ("link", "places", "at"),
+    "function": ("input", "output", "pairs", "scale", "rates", "accelerations"),
+    "path": ("point", "points", "at", "velocities", "accelerations"),
+    "poses": ("link", "places", "at", "twists"),
     "positions": ("rows",),
 }
 """Fields of every kind of task; those of other kinds are left out."""
+_OPTIONAL = ("scale", "at", "rates", "velocities", "accelerations", "twists")
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +69,24 @@ class SynthesisTask(Described):
         ),
     ] = None
     at: Annotated[Any, FACTS("freedom → values at the same positions (timing)", default="none")] = None
+    rates: Annotated[
+        Any, OTHER("of a function: derivatives of the output by the input, nan where none is asked", default="none")
+    ] = None
+    velocities: Annotated[Any, OTHER("of a path: velocities of the point", rules=_ROWS, default="none")] = None
+    accelerations: Annotated[
+        Any, OTHER("of a path, beside velocities; of a function: second derivatives by the input", default="none")
+    ] = None
+    twists: Annotated[
+        Any,
+        OTHER(
+            "of poses: angular velocity (radians) and velocity about the origin of the frame, in a plane also rates of [x, y, angle]",
+            rules=_ROWS,
+            default="none",
+        ),
+    ] = None
 
     def __post_init__(self) -> None:
-        for name in ("pairs", "points", "places"):
+        for name in ("pairs", "points", "places", "rates", "velocities", "accelerations", "twists"):
             object.__setattr__(self, name, plain(getattr(self, name)))
         at = self.at if isinstance(self.at, Mapping) or self.at is None else {"": self.at}
         object.__setattr__(self, "at", {str(k): plain(v) for k, v in (at or {}).items()})
@@ -119,7 +135,7 @@ class SynthesisTask(Described):
             if name == "kind":
                 continue
             given = value is not None and value not in ("", "given") and value != {}
-            if name in held and not given and name not in ("scale", "at"):
+            if name in held and not given and name not in _OPTIONAL:
                 found.append(f"{where}: {name} is missing ({about.meaning})")
             elif name not in held and given:
                 found.append(f"{where}: a task {self.kind!r} takes no {name}")

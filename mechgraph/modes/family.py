@@ -378,7 +378,7 @@ class Labelling:
         place = np.argsort(order)
         self.pairs: Index = np.argsort(place[self._links : self._rods])
         self.rods: Index = np.argsort(place[self._rods : self._rods + self._n])
-        may = np.array([_same_back(pair.type) for pair in s.m.pairs], dtype=bool)
+        may = np.array([same_back(pair.type) for pair in s.m.pairs], dtype=bool)
         self._turned = may & (place[s.a] > place[s.b])
         ends = place[family.bearers[2 * self._P :]].reshape(2, self._n)
         points = place[self._points].reshape(2, self._n)
@@ -433,7 +433,7 @@ class Labelling:
             out[i][i] = ("link", i == seen)
         for k, ends in enumerate(s.graph.ends):
             out[self._links + k][self._links + k] = ("pair", *self._pair(k))
-            sides = ("end", "end") if _same_back(s.m.pairs[k].type) else ("a", "b")
+            sides = ("end", "end") if same_back(s.m.pairs[k].type) else ("a", "b")
             for marker, side, link in zip((k, self._P + k), sides, ends, strict=True):
                 join(self._links + k, link, side, self._geometry(marker))
         for i, (point, link) in enumerate(
@@ -512,7 +512,7 @@ class Labelling:
         return Member(own, np.concatenate([out[self.family.rows, :1], drive])), out
 
 
-def _same_back(row: PairType) -> bool:
+def same_back(row: PairType) -> bool:
     """Whether a pair is the same with its links exchanged: turns and slides that commute, or a rotation and nothing else."""
     if len(row.steps) == 1 and row.steps[0].holds_rotation:
         return True

@@ -82,9 +82,22 @@ class TaskClass:
 
     def __init__(self, problem: RowProblem, rng: np.random.Generator) -> None:
         self.problem, s = problem, problem.system
-        self.u, self.R, self.nx, self.F = problem.u, len(problem.rows), s.n_state, s.n_freedoms
-        self.given = ~np.isnan(problem.asked[problem.rows])
-        self.free = [complement(problem.columns[given], s.n_freedoms) for given in self.given]
+        self.u, self.R, self.states = problem.u, len(problem.rows), s.n_state
+        # behind the state of a row stand the coefficients of its rates, as far as any are asked
+        orders, F = len(problem.rates), s.n_freedoms
+        self.nx, self.F = s.n_state + orders * F, F * (1 + orders)
+        self.columns: Index = np.concatenate([problem.columns + k * F for k in range(1 + orders)])
+        rows = [s.single_rows[problem.columns], *(s.n_state + k * F + problem.columns for k in range(orders))]
+        self.asked_rows: Index = np.concatenate(rows)
+        self.is_length = np.concatenate(
+            [s.is_length[problem.columns], np.ones(orders * len(problem.columns), dtype=bool)]
+        )
+        self.asked = np.concatenate([problem.asked, *problem.rates], axis=1)[problem.rows]
+        self.given = ~np.isnan(self.asked)
+        asked = self.given.reshape(self.R, 1 + orders, -1).any(axis=2)
+        # the highest order of which anything is asked of a row
+        self.orders = np.where(asked, np.arange(1 + orders), 0).max(axis=1, initial=0)
+        self.free = self._free_columns()
         start = problem.inside(problem.unknowns.declared[:, None])
         # declared values may be anything, all in one place too: the class is read at others
         spread = problem.numbers.with_values(problem.places, start + rng.normal(size=start.shape))
@@ -96,6 +109,16 @@ class TaskClass:
         self._read(rng)
 
     # --- the class ---------------------------------------------------------------------------------------------------
+
+    def _free_columns(self) -> list[Index]:
+        """Of every row the coordinates of which nothing is asked; of rates those of as high an order as any asked there."""
+        p, out = self.problem, list[Index]()
+        for i, given in enumerate(self.given):
+            free = complement(self.columns[given], p.system.n_freedoms * (1 + int(self.orders[i])))
+            # a declared row that is closed by itself stays where it is, but for what names its points
+            at_rest = p.closed_at_start and p.rows[i] == 0
+            out.append(free[free >= p.system.first_column[len(p.m.pairs)]] if at_rest else free)
+        return out
 
     def _algebras(self, here: Configuration) -> list[Array]:
         """For every pair a basis ``(6, k)`` of the motions by which its place may be moved, in the global frame.
@@ -124,9 +147,20 @@ class TaskClass:
         values = problem.asked[:, at].T
         if k < len(problem.m.pairs) or len(values) < 6 or np.isnan(values).any():
             return S[:, columns]
-        turns = [rotation_exp(np.eye(3)[:, [j]] * values[3 + j]) for j in range(3)]
-        R = np.einsum("iat,abt,bjt->ijt", *turns)
-        e = finite_twist(R, values[:3], np.zeros_like(values[:3]))
+
+        def pose(values: Array) -> tuple[Array, Array]:
+            turns = [rotation_exp(np.eye(3)[:, [j]] * values[3 + j]) for j in range(3)]
+            return np.einsum("iat,abt,bjt->ijt", *turns), values[:3]
+
+        R, place = pose(values)
+        e = finite_twist(R, place, np.zeros_like(place))
+        # where twists are asked their rates add to the motions: derivatives by complex steps
+        for rates in (rates[:, at].T for rates in problem.rates[:1]):
+            step = np.nan_to_num(rates) * MODES.span
+            R1, place1 = pose(values + 1j * step)
+            w = np.einsum("ijt,kjt->ikt", R1.imag, R) / MODES.span
+            w = np.array([w[2, 1], w[0, 2], w[1, 0]])
+            e = np.concatenate([e, [*w, *(place1.imag / MODES.span - cross(w, place))]], axis=1)
         e[3:] += cross(e[:3], problem.origin[:, None]) / problem.L
         size = np.abs(e).max(axis=0)
         return np.asarray(e[:, size > MODES.span] / size[size > MODES.span])
@@ -134,25 +168,34 @@ class TaskClass:
     def _read(self, rng: np.random.Generator) -> None:
         """Ranks of all rows at a random mechanism of the class, and a start there."""
         # random mechanisms of which the best one is the start
-        found, x = self.random_closed(rng, 6)
+        found, x = self.random_closed(rng, 12)
         self.start, self.x = found[0], x[:, 0]
         rows = self.at(self.start, self.x[:, None])
         J, B = rows.by_coordinates[..., 0], rows.by_unknowns[..., 0]
         n, ranks, settled = J.shape[1], [], []
         for i, free in enumerate(self.free):
-            settled.append(_rank(J[i][:, free]))
-            ranks.append(_rank(np.concatenate([J[i][:, free], B[i]], axis=1)))
+            own = slice(self._counted(n, i))
+            settled.append(_rank(J[i][own, free]))
+            ranks.append(_rank(np.concatenate([J[i][own, free], B[i][own]], axis=1)))
         self.conditions = np.array(ranks) - np.array(settled)
-        shapes = [(rank, many, len(free)) for rank, many, free in zip(ranks, settled, self.free, strict=True)]
+        shapes = [
+            (rank, many, len(free), int(order))
+            for rank, many, free, order in zip(ranks, settled, self.free, self.orders, strict=True)
+        ]
         self.blocks = [
             self._block(shape, [i for i, own in enumerate(shapes) if own == shape], n, rng)
             for shape in dict.fromkeys(shapes)
         ]
-        if self.u and self.conditions.any():
-            every, joined = np.arange(len(found)), ClassMember.joined(found)
-            here = self.leg(joined, joined, every).at(x, np.zeros(len(found)), every)
-            best = int(np.argmin(np.linalg.cond(here.matrix)))
-            self.start, self.x = found[best], x[:, best]
+        best = int(self._by_condition(found, x)[0])
+        self.start, self.x = found[best], x[:, best]
+
+    def _by_condition(self, members: Sequence[ClassMember], x: Array) -> Index:
+        """Numbers of members in the order of the condition of their unknowns at their solutions ``x (nx, n)``."""
+        every = np.arange(len(members))
+        if not (self.u and self.conditions.any()):
+            return every
+        joined = ClassMember.joined(members)
+        return np.argsort(np.linalg.cond(self.leg(joined, joined, every).at(x, np.zeros(len(every)), every).matrix))
 
     def random_closed(self, rng: np.random.Generator, n: int) -> tuple[list[ClassMember], Array]:
         """Random mechanisms of the class at random positions: what they do there are tasks that they solve; their states ``(nx, n)``.
@@ -163,6 +206,7 @@ class TaskClass:
         """
         s, problem, R = self.problem.system, self.problem, self.R
         members, states = list[ClassMember](), list[Array]()
+        still = [i for i in range(R) if problem.closed_at_start and problem.rows[i] == 0]
         # rounds of random mechanisms, after which a class is said to have none
         for _ in range(8):
             # some of them do not close
@@ -177,17 +221,34 @@ class TaskClass:
                 if not len(row):
                     break
                 dq = _random(rng, s.n_freedoms * len(row)).reshape(s.n_freedoms, -1)
+                dq[:, np.isin(row, still)] = 0.0
                 begin = s.advance(np.tile(problem.at_rest[:, None].astype(complex), len(row)), dq)
                 x, error = _closed(system.cases(which), begin)
                 good = (error < MODES.member_closed) & ~self.of_row.far(x, MOST_TURNED)
                 X[row[good], :, which[good]] = x[:, good].T
             for i in np.flatnonzero(~np.isnan(X[:, 0]).any(axis=0))[: n - len(members)]:
                 own = numbers.taken(np.array([i]))
-                members.append(ClassMember(own, X[:, s.single_rows[problem.columns], i, None]))
-                states.append(np.concatenate([z[:, i], own.norms.ravel()[: self.W], X[:, :, i].ravel()]))
+                x = self._with_rates(own, X[:, :, i, None], rng)
+                members.append(ClassMember(own, x[:, self.asked_rows]))
+                states.append(np.concatenate([z[:, i], own.norms.ravel()[: self.W], x.ravel()]))
             if len(members) == n:
                 return members, np.array(states).T
         raise NoClass
+
+    def _with_rates(self, numbers: RowNumbers, x: Array, rng: np.random.Generator) -> Array:
+        """Closed states ``x (R, nx, 1)`` with random rates behind them, where any are asked, that the closure allows."""
+        F = self.problem.system.n_freedoms
+        x = np.concatenate([x, np.zeros((self.R, self.nx - self.states, 1), dtype=complex)], axis=1)
+        for k in range(1, 1 + len(self.problem.rates)):
+            mine = [i for i in range(self.R) if self.given[i].reshape(-1, len(self.problem.columns))[k:].any()]
+            own = slice(self.states + (k - 1) * F, self.states + k * F)
+            x[mine, own, 0] = _random(rng, F * len(mine)).reshape(len(mine), F)
+            rows = self.problem.equations(numbers, x)
+            n = rows.residual.shape[1] // (1 + len(self.problem.rates))
+            J, left = rows.by_coordinates[:, :n, :F, 0], rows.residual[:, k * n : (k + 1) * n]
+            step = least_norm_steps(J.transpose(1, 2, 0), left[:, :, 0].T, MODES.generic)
+            x[mine, own, 0] += step.T[mine]
+        return x
 
     def _random_places(self, rng: np.random.Generator) -> Array:
         """Known places moved at random, such that loops keep the groups in which they move ``(3, 4, 2, P, 1)``."""
@@ -205,16 +266,32 @@ class TaskClass:
     def random_members(self, rng: np.random.Generator, n: int) -> list[ClassMember]:
         """Random mechanisms and random tasks like those that they do; what is asked of one row is asked of it alone.
 
+        Of three times as many those that are far from singular: ways to solutions that nearly meet take many steps.
+
         Raises
         ------
         NoClass
         """
-        return self.random_closed(rng, n)[0]
+        found, x = self.random_closed(rng, 3 * n)
+        return [found[i] for i in self._by_condition(found, x)[:n]]
 
-    def _block(self, shape: tuple[int, int, int], rows: list[int], n: int, rng: np.random.Generator) -> RowBlock:
-        """Rows of ``(rank, settled, free)`` such equations and coordinates, of ``n`` equations in all."""
-        rank, settled, free = shape
-        mix = np.linalg.qr(rng.normal(size=(len(rows), n, n)) + 1j * rng.normal(size=(len(rows), n, n)))[0][:, :rank]
+    def _counted(self, n: int, i: int) -> int:
+        """How many of ``n`` equations, order by order, count at a row: of no higher order than is asked there."""
+        return n * (1 + int(self.orders[i])) // (1 + len(self.problem.rates))
+
+    def error(self, rows: ArrowRows) -> Array:
+        """The largest part of what is left open at any row ``(T,)``."""
+        left = [np.abs(own[: self._counted(len(own), i)]).max(axis=0) for i, own in enumerate(rows.residual)]
+        return np.max(left, axis=0, initial=0.0) if left else np.zeros(rows.T)
+
+    def _block(self, shape: tuple[int, int, int, int], rows: list[int], n: int, rng: np.random.Generator) -> RowBlock:
+        """Rows of ``(rank, settled, free, order)`` such equations and coordinates, of ``n`` equations in all."""
+        rank, settled, free, _ = shape
+        k = self._counted(n, rows[0])
+        mix = np.zeros((len(rows), rank, n), dtype=complex)
+        mix[:, :, :k] = np.linalg.qr(rng.normal(size=(len(rows), k, k)) + 1j * rng.normal(size=(len(rows), k, k)))[0][
+            :, :rank
+        ]
         columns = np.array([self.free[i] for i in rows], dtype=np.intp).reshape(len(rows), free)
         ways = np.zeros((len(rows), self.F, free))
         ways[np.arange(len(rows))[:, None], columns, np.arange(free)] = 1.0
@@ -241,30 +318,41 @@ class TaskClass:
 
     def advance(self, x: Array, dq: Array) -> Array:
         """States after increments."""
-        rows = self.problem.system.advance(self._wide(x[self.head :]), self._wide(dq[self.head :]))
-        return np.concatenate([x[: self.head] + dq[: self.head], self._tall(rows)])
+        here, step, F = self._wide(x[self.head :]), self._wide(dq[self.head :]), self.problem.system.n_freedoms
+        rows = self.problem.system.advance(here[: self.states], step[:F])
+        return self._joined(x[: self.head] + dq[: self.head], rows, here[self.states :] + step[F:])
+
+    def _joined(self, head: Array, rows: Array, rates: Array) -> Array:
+        """What stands before rows, in them, and in the rates behind them."""
+        return np.concatenate([head, self._tall(np.concatenate([rows, rates]))])
 
     def state_rates(self, x: Array, dq: Array) -> Array:
         """Rates of states for rates of increments."""
-        rows = self.of_row.state_rates(self._wide(x[self.head :]), self._wide(dq[self.head :]))
-        return np.concatenate([dq[: self.head], self._tall(rows)])
+        here, step, F = self._wide(x[self.head :]), self._wide(dq[self.head :]), self.problem.system.n_freedoms
+        return self._joined(dq[: self.head], self.of_row.state_rates(here[: self.states], step[:F]), step[F:])
 
     def normal(self, x: Array) -> Array:
         """States with unit quaternions."""
-        return np.concatenate([x[: self.head], self._tall(self.of_row.normal(self._wide(x[self.head :])))])
+        here = self._wide(x[self.head :])
+        return self._joined(x[: self.head], self.of_row.normal(here[: self.states]), here[self.states :])
 
     def far(self, x: Array, angle: float = ENDLESS_STATE[0]) -> Mask:
         """Which are on their way to infinity."""
-        rows = self.of_row.far(self._wide(x[self.head :]), angle).reshape(self.R, -1).any(axis=0)
-        return np.asarray(rows | (np.abs(x[: self.u]).max(axis=0, initial=0.0) > ENDLESS_STATE[1]))
+        here = self._wide(x[self.head :])
+        rows = self.of_row.far(here[: self.states], angle) | (
+            np.abs(here[self.states :]).max(axis=0, initial=0.0) > ENDLESS_STATE[1]
+        )
+        return rows.reshape(self.R, -1).any(axis=0) | (np.abs(x[: self.u]).max(axis=0, initial=0.0) > ENDLESS_STATE[1])
 
     def wound(self, change: Array) -> Array:
         """Largest change ``(T,)`` of an angle."""
-        return self.of_row.wound(self._wide(change[self.head :])).reshape(self.R, -1).max(axis=0)
+        return self.of_row.wound(self._wide(change[self.head :])[: self.states]).reshape(self.R, -1).max(axis=0)
 
     def size(self, x: Array, dq: Array) -> Array:
         """Largest increment ``(T,)``, against the size of lengths."""
-        rows = self.of_row.size(self._wide(x[self.head :]), self._wide(dq[self.head :])).reshape(self.R, -1).max(axis=0)
+        here, step, F = self._wide(x[self.head :]), self._wide(dq[self.head :]), self.problem.system.n_freedoms
+        rates = (np.abs(step[F:]) / (1.0 + np.abs(here[self.states :]))).max(axis=0, initial=0.0)
+        rows = np.maximum(self.of_row.size(here[: self.states], step[:F]), rates).reshape(self.R, -1).max(axis=0)
         own = (np.abs(dq[: self.u]) / (1.0 + np.abs(x[: self.u]))).max(axis=0, initial=0.0)
         return np.maximum(rows, own)
 
@@ -288,23 +376,22 @@ class TaskClass:
 
     def goal(self, numbers: RowNumbers) -> ClassMember:
         """Mechanisms with such numbers, and the task at hand."""
-        drive = np.nan_to_num(self.problem.asked[self.problem.rows])[:, :, None].astype(complex)
+        drive = np.nan_to_num(self.asked)[:, :, None].astype(complex)
         return ClassMember(numbers, np.repeat(drive, numbers.point.shape[-1], axis=-1))
 
     def at(self, member: ClassMember, x: Array) -> ArrowRows:
         """The equations of members at states of which what is asked is set to what they ask."""
         near = x[self.u : self.head].reshape(2, 2, -1, x.shape[1]) if self.W else None
         X = x[self.head :].reshape(self.R, self.nx, -1).copy()
-        single = self.problem.system.single_rows[self.problem.columns]
         for i, given in enumerate(self.given):
-            X[i, single[given]] = member.drive[i, given]
+            X[i, self.asked_rows[given]] = member.drive[i, given]
         return self.problem.equations(member.numbers.with_values(self.problem.places, x[: self.u], near), X)
 
     def state(self, rows: ArrowRows) -> Array:
         """The states of equations."""
         z = [rows.numbers.at(places) for places in self.problem.places]
         norms = rows.numbers.norms.reshape(-1, rows.T)[: self.W]
-        return np.concatenate([np.array(z).reshape(self.u, rows.T), norms, self._tall(rows.here.x)])
+        return np.concatenate([np.array(z).reshape(self.u, rows.T), norms, rows.x.reshape(-1, rows.T)])
 
 
 MOST_TURNED = 2.0
@@ -411,7 +498,7 @@ class Arrow:
     @property
     def noise(self) -> Array:
         """Rounding ``(T,)`` to be expected of a Newton step."""
-        size = np.abs(self.rows.here.poses).max(axis=(0, 1, 2)).reshape(self.of.R, -1).max(axis=0)
+        size = np.abs(self.rows.here.poses).max(axis=(0, 1, 2)).reshape(-1, self.rows.T).max(axis=0)
         return rounding(size)
 
     def _mixed(self, block: RowBlock, values: Array) -> Array:
@@ -461,7 +548,7 @@ class Arrow:
 
     def rates(self, idle: Array) -> tuple[Array, Array]:
         """Rates of increments with ``t``."""
-        of, columns = self.of, self.of.problem.columns
+        of, columns = self.of, self.of.columns
         change = np.where(of.given[:, :, None], self._change, 0.0)
         J = self.rows.by_coordinates
         opened = np.einsum("rndt,rdt->rnt", J[:, :, columns], np.broadcast_to(change, (*change.shape[:2], self.rows.T)))

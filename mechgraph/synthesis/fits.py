@@ -61,6 +61,9 @@ class Fit:
 
     def __init__(self, problem: RowProblem, tasks: Any) -> None:
         self.p, s = problem, problem.system
+        if problem.rates:
+            told = "rates (velocities, accelerations, twists) are met exactly or not at all; leave them out of a fit"
+            raise DeclarationError(problem.name, [told])
         # a fit need not begin exactly where its first row asks it to
         problem.known.clear()
         self.drivers = self._drivers(tasks)

@@ -10,8 +10,6 @@ sum of a combination of the unknowns over all solutions depends rationally.
 
 from __future__ import annotations
 
-import hashlib
-import json
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -38,7 +36,7 @@ from mechgraph.modes.start_sets import (
 )
 from mechgraph.modes.targets import TrackRun, run_tracks
 from mechgraph.synthesis.classes import ClassMember, TaskClass
-from mechgraph.synthesis.system import RowNumbers
+from mechgraph.synthesis.labelling import TaskLabelling
 from mechgraph.variants.numbers import MARKER
 
 Progress = Callable[[str], None] | None
@@ -89,21 +87,17 @@ class TaskPencil:
 
     def __init__(self, equations: TaskClass, base: ClassMember, rng: np.random.Generator) -> None:
         self.of, self.base = equations, base
-        row, length = int(np.argmax(equations.conditions)), self._length
+        row, length = int(np.argmax(equations.conditions)), equations.is_length
         other = equations.random_members(rng, 1)[0].drive[row, :, 0] - base.drive[row, :, 0]
         part = rng.normal(size=2) @ [0.7, 0.7j]
         self.rate = np.zeros(base.drive.shape[:2], dtype=complex)
         self.rate[row] = part * np.where(length, other, np.exp(1j * np.where(length, 0.0, other)) - 1.0)
         self.weights = rng.normal(size=(equations.u, 2)) @ [1.0, 1.0j]
 
-    @property
-    def _length(self) -> Array:
-        return self.of.problem.system.is_length[self.of.problem.columns]
-
     def members(self, phi: Array) -> ClassMember:
         """Tasks at ``phi (n,)``."""
         grown = self.rate[:, :, None] * (np.exp(1j * phi) - 1.0)
-        length = self._length
+        length = self.of.is_length
         drive = self.base.drive + np.where(
             length[:, None], grown, -1j * np.log(1.0 + np.where(length[:, None], 0.0, grown))
         )
@@ -139,70 +133,46 @@ def start_set(of: TaskClass, rng: np.random.Generator, progress: Progress) -> Ta
 # --- kept in a folder ----------------------------------------------------------------------------------------------------
 
 
-def key_of(of: TaskClass) -> str:
-    """What a start set serves for: topology, unknowns, what is asked where, and the groups in which loops move."""
-    problem = of.problem
-    spans = [
-        (np.round(basis @ basis.T, 5) + 0.0).tolist() if 0 < basis.shape[1] < 6 else basis.shape[1]
-        for basis in of.algebras
-    ]
-    told = [
-        [(pair.type.symbol, pair.a == problem.m.frame, pair.on_a is None) for pair in problem.whole.pairs],
-        np.array(problem.whole.pair_ends).tolist(),
-        [[(p.array, p.side, p.component, p.pair) for p in places] for places in problem.places],
-        problem.columns.tolist(),
-        of.given.tolist(),
-        spans,
-        of.conditions.tolist(),
-        problem.rows.tolist(),
-        [[(c.coefficients, c.constant) for c in problem.m.couplings]],
-    ]
-    # the first figure is the version of the files
-    return "1-" + hashlib.sha256(json.dumps(told, default=str).encode()).hexdigest()[:32]
-
-
 PACKED = Path(__file__).with_name("start-sets.npz")
 """Start sets that come with the package, names are ``key/array``; made by ``tests/benchmarks/make_task_starts.py``."""
 
 
 def kept(of: TaskClass) -> TaskStart | None:
     """The start set of a class that is kept by the user, or else came with the package, where there is one and it is closed."""
-    key = key_of(of)
-    return _read(of, cache_folder() / f"task-{key}.npz", "") or _read(of, PACKED, f"{key}/")
+    labelling = TaskLabelling(of)
+    key = labelling.key
+    return _read(labelling, cache_folder() / f"task-{key}.npz", "") or _read(labelling, PACKED, f"{key}/")
 
 
-def _read(of: TaskClass, file: Path, prefix: str) -> TaskStart | None:
+def _read(labelling: TaskLabelling, file: Path, prefix: str) -> TaskStart | None:
     try:
         with file.open("rb") as handle, np.load(handle, allow_pickle=False) as f:
-            vectors = [f[prefix + name] for name in MARKER]
             loops, lost, followed, degree, samples = f[prefix + "counts"].tolist()
             chance, last, beyond = f[prefix + "sizes"].tolist()
-            member, trace = (
-                ClassMember(RowNumbers.of(*vectors), f[prefix + "drive"]),
-                Trace(degree, samples, last, beyond),
-            )
-            found = TaskStart(member, f[prefix + "x"], loops, chance, lost, followed, trace)
-        here = of.at(found.member, found.x)
+            vectors = {name: f[prefix + name] for name in MARKER}
+            member, x = labelling.taken(vectors, f[prefix + "drive"], f[prefix + "x"])
+        found = TaskStart(member, x, loops, chance, lost, followed, Trace(degree, samples, last, beyond))
+        here = labelling.of.at(found.member, found.x)
         size = np.maximum(1.0, np.abs(here.here.poses).max())
-        return found if np.abs(here.residual).max() < MODES.member_closed * size else None
+        return found if labelling.of.error(here).max() < MODES.member_closed * size else None
     except (OSError, ValueError, KeyError, IndexError, EOFError, RuntimeError, zipfile.BadZipFile, TypeError):
         return None
 
 
-def arrays(of: TaskClass, start: TaskStart) -> dict[str, Any]:
+def arrays(labelling: TaskLabelling, start: TaskStart) -> dict[str, Any]:
     """A start set as arrays by name."""
-    known = dict(zip(MARKER, start.member.numbers.vectors, strict=True))
     sizes = np.array([start.chance, start.trace.last, start.trace.beyond])
     counts = np.array([start.loops, start.lost, start.followed, start.trace.degree, start.trace.samples])
-    return known | {"drive": start.member.drive, "x": start.x, "sizes": sizes, "counts": counts}
+    return {**labelling.ordered(start.member, start.x), "sizes": sizes, "counts": counts}
 
 
 def _keep(of: TaskClass, start: TaskStart) -> None:
     """Keep a start set, as far as the folder allows."""
+    labelling = TaskLabelling(of)
     try:
         cache_folder().mkdir(parents=True, exist_ok=True)
-        with whole_file(cache_folder() / f"task-{key_of(of)}.npz") as temporary, temporary.open("xb") as handle:
-            np.savez_compressed(handle, **arrays(of, start))
+        with whole_file(cache_folder() / f"task-{labelling.key}.npz") as temporary, temporary.open("xb") as handle:
+            np.savez_compressed(handle, **arrays(labelling, start))
     except (OSError, RuntimeError, MechgraphError):
         return
 
@@ -288,14 +258,12 @@ def real_states(of: TaskClass, goal: ClassMember, x: Array) -> tuple[Array, Arra
     leg, t, tracks = of.leg(goal, goal), np.ones(len(near)), np.arange(len(near))
     with np.errstate(all="ignore"):
         here = leg.at(x[:, near].real.astype(complex), t, tracks)
-        # Newton steps to rounding
+        # Newton steps to rounding, in real numbers: there one that has no real solution near by does not come to rest
         for _ in range(8):
-            here = here.again(of.advance(here.x, here.newton(here.idle())))
-    error = here.rows.here.closure.reshape(of.R, -1).max(axis=0, initial=0.0)
+            step = here.newton(here.idle()).real
+            here = here.again(of.advance(here.x, step).real.astype(complex))
+    error = of.error(here.rows)
     moved = np.abs(here.x[: of.u] - x[: of.u, near]).max(axis=0, initial=0.0)
-    imaginary = np.abs(here.x.imag).max(axis=0, initial=0.0)
-    good = (moved < MODES.real_singular * size[near]) & (
-        imaginary < MODES.real_closed * np.abs(here.x).max(axis=0, initial=1.0)
-    )
+    good = (moved < MODES.real_singular * size[near]) & (of.size(here.x, step) < np.sqrt(MODES.real_closed))
     good &= np.isfinite(here.x).all(axis=0)
     return here.x[:, good].real, error[good], near[good]

@@ -212,11 +212,13 @@ class Synthesis:
             along = (twists**2).reshape(-1, 2, 3).sum(axis=1) / (twists**2).sum(axis=1, keepdims=True)
             sign = np.einsum("fi,ifn->fn", along, np.stack([second, axis * second, axis])[:, s.pair_of_freedom])
             states = x[of.head :].reshape(of.R, of.nx, n).swapaxes(0, 1).reshape(of.nx, -1)
-            states = s.state_of(s.coordinates_of(states) * np.tile(sign, of.R))
+            sign = np.tile(sign, of.R)
+            closed = s.state_of(s.coordinates_of(states[: of.states]) * sign)
+            rates = states[of.states :] * np.tile(sign, (len(of.problem.rates), 1))
+            states = np.concatenate([closed, rates])
             turned[of.u : of.head] = np.abs(x[of.u : of.head])
             turned[of.head :] = states.reshape(of.nx, of.R, n).swapaxes(0, 1).reshape(-1, n)
-        here = of.at(goal, turned.astype(complex)).here
-        return turned, here.closure.reshape(of.R, n).max(axis=0)
+        return turned, of.error(of.at(goal, turned.astype(complex)))
 
     def _merged(self, goal: ClassMember, x: Array) -> Mask:
         """Which solutions ``(n,)`` have elements of a link that fall together, where those of a random mechanism do not."""
@@ -243,8 +245,8 @@ class Synthesis:
         m = p.unknowns.mechanism(values)
         if self.sweep.names:
             m = replace_fields(self.sweep, m, self.swept[:, i])
-        states = x[of.head :].reshape(of.R, of.nx).T
-        if p.closed_at_start:
+        states = x[of.head :].reshape(of.R, of.nx)[:, : of.states].T
+        if p.rows[0]:
             states = np.concatenate([p.at_rest[:, None], states], axis=1)
         s = p.system
         q = s.coordinates_of(states).T

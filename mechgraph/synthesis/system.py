@@ -4,6 +4,10 @@
 
 Where all pairs are placed by point and axis the declared configuration is closed whatever ``z`` is, and row 0 adds nothing.
 The Jacobian is an arrow: a block ``F_q`` per row and a border ``F_z`` of u columns.
+
+Where rates are asked too (multiply separated positions), a row is a curve ``q(h) = q + h c_1 + h^2 c_2``, and the coefficients of ``h^k``
+of all that is above are equations as well. They are those of a discrete Fourier transform over a circle of complex ``h``, on which all
+of it is analytic.
 """
 
 from __future__ import annotations
@@ -21,7 +25,7 @@ from mechgraph.force.loads import user_poses
 from mechgraph.kinematics.prescribed import DriverMotion
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
-from mechgraph.maths.se3 import Array, Index, cross, move_twist
+from mechgraph.maths.se3 import Array, Index, cross, move_twist, rotation_exp, turn_tangent
 from mechgraph.memo import dataclass
 from mechgraph.model.gears import moving_lines
 from mechgraph.model.mechanism import Mechanism
@@ -206,20 +210,32 @@ class RowProblem:
         s = self.system
         places = [self.whole.freedom(name) for name in given.names]
         self.columns: Index = np.array([s.first_column[k] + j for k, j in places], dtype=np.intp)
-        self.asked = user / np.where(s.is_length[self.columns], self.L, 1.0)
+        unit = np.where(s.is_length[self.columns], self.L, 1.0)
+        self.asked = user / unit
+        none, factor = np.full(self.tasks.rows, np.nan), (1.0, 2.0)
+        # Taylor coefficients ``(rows, d)``, one array for each order of rates that are asked
+        self.rates = [
+            np.array([rates.get(name, rates.get(self._user_name(name), none)) for name in given.names]).T / unit / k
+            for k, rates in zip(factor, self.tasks.rates, strict=False)
+        ]
         self.numbers = RowNumbers.of(
             (numbers.point - self.origin[:, None, None]) / self.L, numbers.axis, numbers.second
         )
         self.closed_at_start = all(pair.on_a is None and pair.contact is None for pair in m.pairs)
-        self.rows: Index = np.arange(1 if self.closed_at_start else 0, self.tasks.rows)
+        self.rows: Index = np.arange(self.tasks.rows)[self._row_counts :]
         self._read_declared_row()
 
     def with_rows(self, rows: Index) -> RowProblem:
         """The same of some rows, the declared one first."""
         out = copy(self)
-        out.asked = self.asked[rows]
-        out.rows = np.arange(1 if self.closed_at_start else 0, len(rows))
+        out.asked, out.rates = self.asked[rows], [rates[rows] for rates in self.rates]
+        out.rows = np.arange(len(rows))[out._row_counts :]
         return out
+
+    @property
+    def _row_counts(self) -> int:
+        """The first row with equations of its own: not the declared one, where that is closed by itself and no rates are asked there."""
+        return int(self.closed_at_start and not any((~np.isnan(rates[0])).any() for rates in self.rates))
 
     def _user_name(self, name: str) -> str:
         """The name by which a coordinate of a free pair was asked."""
@@ -368,24 +384,50 @@ class RowProblem:
         return self.system.with_parameters(par)
 
     def equations(self, numbers: RowNumbers, x: Array) -> ArrowRows:
-        """The equations of tracks with such numbers of markers (unknowns among them) at states ``x (R, nx, T)``, in internal units."""
-        R, _, T = x.shape
-        system = self.system_with(numbers)
-        if R > 1 and system.par.batch > 1:
-            system = system.cases(np.tile(np.arange(T), R))
-        return ArrowRows(self, numbers, Configuration(system, x.transpose(1, 0, 2).reshape(x.shape[1], R * T)), R)
+        """The equations of tracks with such numbers of markers (unknowns among them) at states ``x (R, nx, T)``, in internal units.
+
+        Where rates are asked, behind the state of every row stand the Taylor coefficients of its freedoms, order by order.
+        """
+        return ArrowRows(self, numbers, x)
+
+
+NODES = (8, 0.03)
+"""Nodes of the circles on which coefficients of curves are found, and their radius times the rates: the first coefficient of the residual
+that is taken for another one is that of ``h^9``, below ``3^9 / 9!`` for angles that turn at 3."""
 
 
 class ArrowRows:
-    """The closure of all rows at a batch of ``T`` tracks, the rows one after the other in the batch of ``here``."""
+    """The closure of all rows at a batch of ``T`` tracks at states ``x (R, nx, T)``: in the batch of ``here`` row by row, and of each
+    row, where rates are asked, one node after the other.
+    """
 
-    def __init__(self, problem: RowProblem, numbers: RowNumbers, here: Configuration, R: int) -> None:
-        self.problem, self.numbers, self.here, self.R = problem, numbers, here, R
-        self.T = here.T // R
+    def __init__(self, problem: RowProblem, numbers: RowNumbers, x: Array) -> None:
+        self.problem, self.numbers, self.x = problem, numbers, x
+        system, s = problem.system_with(numbers), problem.system
+        self.R, _, self.T = x.shape
+        orders, self.N = len(problem.rates), NODES[0] if problem.rates else 1
+        states, self._steps = np.moveaxis(x[:, : s.n_state, None], 1, 0), None
+        if orders:
+            rates = x[:, s.n_state :].reshape(self.R, orders, s.n_freedoms, self.T)
+            size = np.abs(rates).max(axis=2) ** (1.0 / np.arange(1, orders + 1))[:, None]
+            around = np.exp(2j * np.pi * np.arange(self.N) / self.N)[:, None]
+            h = around * (NODES[1] / np.maximum(1.0, size.max(axis=1)))[:, None]
+            powers = h[:, None] ** np.arange(orders + 1)[:, None, None]
+            self._coefficients, self._powers = 1.0 / (self.N * powers), powers
+            self._steps = np.einsum("rkft,rknt->frnt", rates, powers[:, 1:])
+            states = system.advance(np.broadcast_to(states, (s.n_state, self.R, self.N, self.T)), self._steps)
+        if self.R * self.N > 1 and system.par.batch > 1:
+            system = system.cases(np.tile(np.arange(self.T), self.R * self.N))
+        self.here = Configuration(system, states.reshape(s.n_state, -1))
 
     def _by_row(self, values: Array) -> Array:
-        """``(..., R T) -> (R, ..., T)``."""
-        return np.moveaxis(values.reshape(*values.shape[:-1], self.R, self.T), -2, 0)
+        """``(n, ..., R N T) -> (R, n, ..., T)``, where rates are asked with all orders of ``n`` one after the other."""
+        nodes = np.moveaxis(values.reshape(*values.shape[:-1], self.R, self.N, self.T), -3, 0)
+        if self._steps is None:
+            return nodes[..., 0, :]
+        shape = (self.R, *(1,) * (nodes.ndim - 3), self.N, self.T)
+        orders = [(nodes * c.reshape(shape)).sum(axis=-2) for c in self._coefficients.swapaxes(0, 1)]
+        return np.concatenate(orders, axis=1)
 
     @cached_property
     def residual(self) -> Array:
@@ -394,8 +436,26 @@ class ArrowRows:
 
     @cached_property
     def by_coordinates(self) -> Array:
-        """Derivatives ``(R, n, F, T)`` by all freedoms of the row, those asked too."""
-        return self._by_row(self.here.J)
+        """Derivatives ``(R, n, F, T)`` by all freedoms of the row, those asked too; behind them those by the coefficients of rates."""
+        if self._steps is None:
+            return self._by_row(self.here.J)
+        s, J = self.problem.system, self.here.J
+        shifted, first = J, J
+        if s.rotations is not None:
+            # of a curve of rotations ``exp(w(h)) Q`` the first factor turns what moves ``Q``, and its steps are no rates
+            (turns, _), unit = s.rotations, np.eye(3)
+            w = self._steps.reshape(s.n_freedoms, -1)[turns]
+            back = np.array([turn_tangent(w, np.broadcast_to(e[:, None, None], w.shape)) for e in unit])
+            along = np.linalg.inv(back.transpose(2, 3, 1, 0))
+            own = J[:, turns.T]
+            shifted, first = J.copy(), J.copy()
+            shifted[:, turns.T] = np.einsum("nbat,btac->nbct", own, along)
+            first[:, turns.T] = np.einsum("nbat,acbt->nbct", own, rotation_exp(w))
+        columns = [self._by_row(first)]
+        for k in range(1, len(self.problem.rates) + 1):
+            nodes = shifted.reshape(*J.shape[:2], self.R, self.N, self.T) * self._powers[:, k]
+            columns.append(self._by_row(nodes.reshape(J.shape)))
+        return np.concatenate(columns, axis=2)
 
     @cached_property
     def by_unknowns(self) -> Array:
@@ -415,7 +475,7 @@ class ArrowRows:
         here, s, n = self.here, self.here.system, self.numbers
         vectors = [v[side, :, pair].swapaxes(0, 1) for v in n.vectors]
         eta = marker_twists(vectors, n.norms[:, side, pair], rates)
-        eta = np.tile(np.broadcast_to(eta, (*eta.shape[:2], self.T)), self.R)
+        eta = np.tile(np.broadcast_to(eta, (*eta.shape[:2], self.T)), self.R * self.N)
         V = move_twist(here.poses[:, :, np.where(side == 0, s.a[pair], s.b[pair])], eta)
         out = np.zeros((len(here.residual), len(pair), here.T), dtype=V.dtype)
         C = np.where(side == 0, 1.0, -1.0) * self.problem.loop_signs[:, pair]

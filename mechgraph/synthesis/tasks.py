@@ -1,7 +1,7 @@
 """What a mechanism is asked to do: poses of links, places of points, functions of freedoms, position by position.
 
 Every task is short for numbers by name, one a position: values of freedoms, coordinates of points and links as ``solve`` prescribes them
-(``coupler.tip.Tx``, ``platform.Rz``). NaN asks for nothing. Row 0 is the declared configuration.
+(``coupler.tip.Tx``, ``platform.Rz``), and rates of such numbers. NaN asks for nothing. Row 0 is the declared configuration.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 
 from mechgraph.kinematics.prescribed import Target, coordinate, parts_of, target_of
 from mechgraph.maths.se3 import Array
+from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import door, items_of, real_array, shown, wrong
@@ -54,13 +55,33 @@ def _on(m: Mechanism, name: str, point: bool, faults: list[str]) -> Target | Non
     return None
 
 
+def _rates_of(names: Sequence[str], value: Any, n: int, what: str, faults: list[str]) -> dict[str, Array]:
+    """Rates ``(n, k)``, or ``(n,)`` of one number, by name; nothing where none are given."""
+    shapes = [(3,), (len(names),)] if len(names) > 1 else [()]
+    if value is None or (given := _series(value, shapes, what, faults)) is None:
+        return {}
+    if len(given) != n:
+        faults.append(f"{what}: {len(given)} values at {n} positions")
+        return {}
+    return dict(zip(names, given.reshape(len(given), -1).T, strict=False))
+
+
+class RatedTask:
+    """A task at positions alone."""
+
+    def derivatives(self, m: Mechanism, faults: list[str]) -> tuple[dict[str, Array], ...]:
+        """First and second derivatives by name, by a parameter that is the same for all names at a position."""
+        return {}, {}
+
+
 @dataclass(frozen=True)
-class PoseTask:
+class PoseTask(RatedTask):
     """See ``poses``."""
 
     link: str
     places: Any
     at: Mapping[str, Any] = field(default_factory=dict)
+    twists: Any = None
 
     def named(self, m: Mechanism, faults: list[str]) -> dict[str, Array]:
         """Coordinates of the link; its turns are three successive ones about x, the new y and the new z."""
@@ -73,6 +94,46 @@ class PoseTask:
             given = self._coordinates(m, given, faults)
         out = {f"{self.link}.{part}": column for part, column in zip((*slides, *turns), given.T, strict=True)}
         return out | _timed(m, self.at, len(given), faults)
+
+    def derivatives(self, m: Mechanism, faults: list[str]) -> tuple[dict[str, Array], ...]:
+        """Rates of the coordinates of the link."""
+        X, V = self._whole(m), self._twists(m, faults)
+        if X is None or V is None or len(V) != len(X):
+            faults += (
+                [f"twists of {self.link!r}: {len(V)} values at {np.shape(self.places)[0]} positions"]
+                if V is not None
+                else []
+            )
+            return {}, {}
+        if (np.isnan(X).any(axis=(1, 2)) & ~np.isnan(V).all(axis=1)).any():
+            faults.append(f"twists of {self.link!r}: expected beside whole poses alone")
+            return {}, {}
+        w, v = V[:, :3], V[:, 3:] + np.cross(V[:, :3], X[:, :3, 3])
+        slides, turns = parts_of(m)
+        if m.planar:
+            columns = [v[:, 0], v[:, 1], w[:, 2]]
+        else:
+            a, b = np.arctan2(-X[:, 1, 2], X[:, 2, 2]), np.arcsin(np.clip(X[:, 0, 2], -1.0, 1.0))
+            ones, none = np.ones(len(X)), np.zeros(len(X))
+            # about x, the new y, and the new z: the third column of the rotation
+            axes = np.stack([(ones, none, none), (none, np.cos(a), np.sin(a)), tuple(X[:, :3, 2].T)])
+            if (np.abs(np.cos(b)) < MODES.span).any():
+                faults.append(f"twists of {self.link!r}: not served where the link has turned by 90 degrees about y")
+                return {}, {}
+            columns = [*v.T, *np.linalg.solve(axes.transpose(2, 1, 0), w[:, :, None])[:, :, 0].T]
+        return {f"{self.link}.{part}": c for part, c in zip((*slides, *turns), columns, strict=True)}, {}
+
+    def _twists(self, m: Mechanism, faults: list[str]) -> Array | None:
+        """Twists ``(n, 6)`` about the origin of the frame."""
+        if self.twists is None:
+            return None
+        V = _series(self.twists, [(6,), (3,)] if m.planar else [(6,)], f"twists of {self.link!r}", faults)
+        X = self._whole(m)
+        if V is None or X is None or V.shape[1] == 6:
+            return V
+        w, v = (np.zeros((len(V), 3)) for _ in range(2))
+        v[:, :2], w[:, 2] = V[:, :2], V[:, 2]
+        return np.concatenate([w, v - np.cross(w, X[: len(V), :3, 3])], axis=1)
 
     def first(self, m: Mechanism) -> Array | None:
         """The first pose ``(4, 4)``, where it is whole and not the identity."""
@@ -88,7 +149,7 @@ class PoseTask:
             faults.append(f"poses of {self.link!r}: a link that begins elsewhere is asked for whole poses, or nothing")
         out = X @ np.linalg.inv(X0)
         out[0] = np.eye(4)
-        return replace(self, places=out)
+        return replace(self, places=out, twists=self._twists(m, faults))
 
     def _whole(self, m: Mechanism) -> Array | None:
         """The poses ``(n, 4, 4)``; None where they are none."""
@@ -121,12 +182,14 @@ class PoseTask:
 
 
 @dataclass(frozen=True)
-class PathTask:
+class PathTask(RatedTask):
     """See ``path``."""
 
     point: str
     points: Any
     at: Mapping[str, Any] = field(default_factory=dict)
+    velocities: Any = None
+    accelerations: Any = None
 
     def named(self, m: Mechanism, faults: list[str]) -> dict[str, Array]:
         """Coordinates of the point."""
@@ -139,15 +202,28 @@ class PathTask:
         out = {f"{self.point}.{part}": given[:, k] for k, part in enumerate(slides)}
         return out | _timed(m, self.at, len(given), faults)
 
+    def derivatives(self, m: Mechanism, faults: list[str]) -> tuple[dict[str, Array], ...]:
+        """Velocities and accelerations of the point."""
+        if self.accelerations is not None and self.velocities is None:
+            faults.append(f"path of {self.point!r}: accelerations are asked beside velocities")
+        names = [f"{self.point}.{part}" for part in parts_of(m)[0]]
+        n = np.shape(self.points)[0]
+        return tuple(
+            _rates_of(names, value, n, f"{what} of {self.point!r}", faults)
+            for what, value in (("velocities", self.velocities), ("accelerations", self.accelerations))
+        )
+
 
 @dataclass(frozen=True)
-class FunctionTask:
+class FunctionTask(RatedTask):
     """See ``function``."""
 
     input: str
     output: str
     pairs: Any
     scale: str = "given"
+    rates: Any = None
+    accelerations: Any = None
 
     def named(self, m: Mechanism, faults: list[str]) -> dict[str, Array]:
         """Values of both freedoms, from those of the declared configuration on."""
@@ -164,9 +240,23 @@ class FunctionTask:
             faults.append(f"function: input and output are both {self.input!r}")
         return out
 
+    def derivatives(self, m: Mechanism, faults: list[str]) -> tuple[dict[str, Array], ...]:
+        """Derivatives of the output by the input, whose own rate is one."""
+        x, y = (m.full_name(name) for name in (self.input, self.output))
+        out, n = list[dict[str, Array]](), len(self.pairs)
+        for own, (what, value) in enumerate((("rates", self.rates), ("accelerations", self.accelerations))):
+            found = _rates_of([y], value, n, f"function: {what}", faults)
+            out.append(found)
+            if found:
+                asked = ~np.isnan(found[y])
+                for k in range(own + 1):
+                    known = out[k].setdefault(x, np.full(n, np.nan))
+                    known[asked] = 1.0 if k == 0 else 0.0
+        return tuple(out)
+
 
 @dataclass(frozen=True)
-class PositionTask:
+class PositionTask(RatedTask):
     """See ``positions``."""
 
     rows: tuple[Mapping[str, Any], ...]
@@ -198,7 +288,7 @@ class PositionTask:
 
 
 @door
-def poses(link: str, poses: Any, *, at: Mapping[str, Any] | None = None) -> PoseTask:
+def poses(link: str, poses: Any, *, at: Mapping[str, Any] | None = None, twists: Any = None) -> PoseTask:
     """Ask that a link passes through poses.
 
     Parameters
@@ -210,6 +300,10 @@ def poses(link: str, poses: Any, *, at: Mapping[str, Any] | None = None) -> Pose
         one is not the identity, what is found comes back with the pairs of the link by markers (fits begin at the identity).
     at : mapping, optional
         Values of freedoms at the same positions (prescribed timing).
+    twists : (n, 6) array, optional
+        Angular velocity and velocity of the link there, about the origin of the frame as ``link(...).twist`` of a solution; in a planar
+        mechanism also ``(n, 3)``: rates of x, y, angle. Only their directions matter: the speed of the mechanism is free. NaN asks for
+        nothing.
 
     Returns
     -------
@@ -221,11 +315,18 @@ def poses(link: str, poses: Any, *, at: Mapping[str, Any] | None = None) -> Pose
     >>> mg.poses("coupler", [[0, 0, 0], [1, 0, 0.2]]).link
     'coupler'
     """
-    return PoseTask(link, poses, dict(at or {}))
+    return PoseTask(link, poses, dict(at or {}), twists)
 
 
 @door
-def path(point: str, points: Any, *, at: Mapping[str, Any] | None = None) -> PathTask:
+def path(
+    point: str,
+    points: Any,
+    *,
+    at: Mapping[str, Any] | None = None,
+    velocities: Any = None,
+    accelerations: Any = None,
+) -> PathTask:
     """Ask that a point of a link passes through points.
 
     Parameters
@@ -237,6 +338,9 @@ def path(point: str, points: Any, *, at: Mapping[str, Any] | None = None) -> Pat
         point is unknown.
     at : mapping, optional
         Values of freedoms at the same positions (prescribed timing).
+    velocities, accelerations : (n, 3) arrays, optional
+        First and second derivatives of the places by time; in a planar mechanism also ``(n, 2)``. The speed of the mechanism is free: they
+        ask for tangent and curvature of the path, one condition each in a plane. NaN asks for nothing.
 
     Returns
     -------
@@ -248,11 +352,19 @@ def path(point: str, points: Any, *, at: Mapping[str, Any] | None = None) -> Pat
     >>> mg.path("coupler.tip", [[0, 0], [1, 0.2]]).point
     'coupler.tip'
     """
-    return PathTask(point, points, dict(at or {}))
+    return PathTask(point, points, dict(at or {}), velocities, accelerations)
 
 
 @door
-def function(input: str, output: str, pairs: Any, *, scale: Literal["given", "free"] = "given") -> FunctionTask:
+def function(
+    input: str,
+    output: str,
+    pairs: Any,
+    *,
+    scale: Literal["given", "free"] = "given",
+    rates: Any = None,
+    accelerations: Any = None,
+) -> FunctionTask:
     """Ask that one freedom is a function of another.
 
     Parameters
@@ -263,6 +375,8 @@ def function(input: str, output: str, pairs: Any, *, scale: Literal["given", "fr
         Values of both [rad, length], counted from row 0.
     scale : {"given", "free"}
         With ``"free"`` the output is times an unknown factor; ``synthesize`` refuses "free" so far.
+    rates, accelerations : (n,) arrays, optional
+        First and second derivatives of the output by the input there, one condition each. NaN asks for nothing.
 
     Returns
     -------
@@ -274,7 +388,7 @@ def function(input: str, output: str, pairs: Any, *, scale: Literal["given", "fr
     >>> mg.function("A", "D", [[0, 0], [0.2, 0.3]]).output
     'D'
     """
-    return FunctionTask(input, output, pairs, scale)
+    return FunctionTask(input, output, pairs, scale, rates, accelerations)
 
 
 @door
@@ -301,10 +415,14 @@ def positions(rows: Sequence[Mapping[str, Any]]) -> PositionTask:
 
 @dataclass(frozen=True)
 class Asked:
-    """All that is asked: ``values (n,)`` by name, NaN where nothing is; freedoms in ``scaled`` are times an unknown factor."""
+    """All that is asked: ``values (n,)`` by name, NaN where nothing is; freedoms in ``scaled`` are times an unknown factor.
+
+    ``rates`` are first and second derivatives of values, as many as are asked.
+    """
 
     values: Mapping[str, Array]
     scaled: tuple[str, ...] = ()
+    rates: tuple[Mapping[str, Array], ...] = ()
 
     @property
     def rows(self) -> int:
@@ -316,14 +434,17 @@ def asked_of(m: Mechanism, tasks: Any, faults: list[str]) -> Asked | None:
     """Tasks, one or several, as numbers by name; None where they have faults, which are put to ``faults``."""
     kinds = (PoseTask, PathTask, FunctionTask, PositionTask)
     given = [tasks] if isinstance(tasks, kinds) else items_of(tasks, "tasks", faults)
-    values: dict[str, Array] = {}
+    values: tuple[dict[str, Array], ...] = ({}, {}, {})
     before, scaled = len(faults), []
     for i, task in enumerate(given):
         if not isinstance(task, kinds):
             faults.append(f"tasks[{i}]: {shown(task)} is none; expected mg.poses, mg.path, mg.function or mg.positions")
             continue
-        for name, column in task.named(m, faults).items():
-            known = values.setdefault(name, column)
+        whole, here = len(faults), task.named(m, faults)
+        rates = task.derivatives(m, faults) if len(faults) == whole else ({}, {})
+        every = list(zip((here, *rates), values, strict=True))
+        for name, column, into in ((name, column, into) for found, into in every for name, column in found.items()):
+            known = into.setdefault(name, column)
             if len(known) != len(column):
                 faults.append(f"tasks[{i}]: {len(column)} positions, others have {len(known)}")
             elif (clash := np.flatnonzero(~np.isnan(known + column) & (known != column))).size:
@@ -331,7 +452,7 @@ def asked_of(m: Mechanism, tasks: Any, faults: list[str]) -> Asked | None:
                     f"tasks[{i}]: {name} is asked twice at row {clash[0]}: {known[clash[0]]}, {column[clash[0]]}"
                 )
             else:
-                values[name] = np.where(np.isnan(column), known, column)
+                into[name] = np.where(np.isnan(column), known, column)
         if (
             isinstance(task, FunctionTask)
             and task.scale == "free"
@@ -340,7 +461,8 @@ def asked_of(m: Mechanism, tasks: Any, faults: list[str]) -> Asked | None:
             scaled.append(m.full_name(task.output))
     if len(faults) > before:
         return None
-    if not values or len(next(iter(values.values()))) < 2:
+    orders = 2 if values[2] else 1 if values[1] else 0
+    if not values[0] or (len(next(iter(values[0].values()))) < 2 and not orders):
         faults.append("tasks: nothing is asked beyond the declared configuration; give two positions or more")
         return None
-    return Asked(values, tuple(scaled))
+    return Asked(values[0], tuple(scaled), values[1 : 1 + orders])

@@ -17,7 +17,8 @@ import numpy as np
 from ladder import LADDER, LARGE
 
 from mechgraph.synthesis.classes import TaskClass
-from mechgraph.synthesis.solve import PACKED, arrays, key_of, start_of
+from mechgraph.synthesis.labelling import TaskLabelling
+from mechgraph.synthesis.solve import PACKED, arrays, start_of
 from mechgraph.synthesis.system import RowProblem
 
 
@@ -34,7 +35,8 @@ def main(words: list[str]) -> None:
         N = start.x.shape[1]
         print(f"{name}: {N} of {total}, {start.word}, {time.process_time() - begin:.1f} s", flush=True)
         if start.word == "tested":
-            found |= {f"{key_of(of)}/{part}": value for part, value in arrays(of, start).items()}
+            labelling = TaskLabelling(of)
+            found |= {f"{labelling.key}/{part}": value for part, value in arrays(labelling, start).items()}
             np.savez_compressed(PACKED, **found)
 
 
