@@ -132,7 +132,7 @@ def test_a_mechanism_is_found_ranked_drawn_and_written_by_the_program(tmp_path: 
     assert result.exit_code == 0
     assert "Completeness: searched" in result.output
     assert picture.read_text(encoding="utf-8").startswith("<?xml")
-    told = json.loads(run("synthesize", path, "--json").output)
+    told = json.loads(run("synthesize", path, "--good", "--rank", "size", "--json").output)
     jsonschema.Draft202012Validator(schema("output")).validate(told)
     assert told["fitness"][0]["error"] < 0.02
     # what was written does what was asked of it, to the error that is told
