@@ -595,7 +595,7 @@ def cannot(system: System, loads: Loads, held: bool) -> str | None:
     """Why the kernel does not serve a motion; None where it does."""
     if held:
         return "passive freedoms are held at rest"
-    if loads.dry and system.m.once(pretensions):
+    if system.m.once(pretensions) and loads.dry:
         return "friction follows the pretension of a belt"
     if system.n_freedoms * len(system.m.links) >= SPARSE_FROM:
         return f"it has {system.n_freedoms} freedoms and {len(system.m.links)} links; expected fewer than {SPARSE_FROM} of the product"
