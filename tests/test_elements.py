@@ -375,6 +375,13 @@ def _() -> Iterator[Row]:
     yield "ratio", mg.check(short).ratios["B.Rz"]["A.Rz"], mg.check(placed).ratios["B.Rz"]["A.Rz"], 1e-12
     F = [mg.solve(m, {"A": 0.3}).coupling("g").force for m in (short, placed)]
     yield "force", 0.0, largest(F[0] - F[1]), 1e-10
+    ratios = [mg.mesh_facts(m)["g"].contact_ratio for m in (short, placed)]
+    yield "contact ratio", ratios[1], ratios[0], 1e-12
+    turn = {"A": mg.Motion(0.0, 1.0, 0.5)}
+    bars = [mg.kinematics(m.equivalent(), turn)["B"] for m in (short, placed)]
+    for q in bars:
+        yield "linkage in its place, rate", -0.5, q.velocity[0], 1e-12
+        yield "linkage in its place, acceleration", -0.25, q.acceleration[0], 1e-9
 
 
 @number(26, "spur to helical continuous; rack = wheel of radius 1e6")
