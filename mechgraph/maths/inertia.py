@@ -343,11 +343,11 @@ def physical_faults(inertia: Any, tol: float = 1e-9) -> list[str]:
 
 
 @door
-def physical(inertia: Array) -> NDArray[np.bool_]:
+def physical(inertia: Array, tol: float = 1e-9) -> NDArray[np.bool_]:
     """Which symmetric tensors ``(3, 3, ...)`` a body can have: ``a >= 0`` and ``a + b >= c`` for principal moments a <= b <= c."""
     inertia = _tensors(inertia)
     moments = np.linalg.eigvalsh(np.moveaxis(inertia, (0, 1), (-2, -1)))
-    slack = AXES_TOLERANCE * np.abs(inertia).max(axis=(0, 1))
+    slack = tol * np.abs(inertia).max(axis=(0, 1))
     return np.asarray((moments[..., 0] >= -slack) & (moments[..., 0] + moments[..., 1] >= moments[..., 2] - slack))
 
 

@@ -127,11 +127,8 @@ def test_a_chain_of_many_rods_falls_as_one():
 class Sinking:
     """A coordinate that is beyond its limit from the beginning on, by ever more."""
 
-    def positions(self, t):
-        return -np.asarray(t)[None]
-
-    def rates(self, t):
-        return np.zeros((2, 1, len(t)))
+    def motion(self, t):
+        return -np.asarray(t)[None], np.zeros((2, 1, len(t)))
 
 
 def test_what_is_passed_at_once_is_met_at_the_first_look(monkeypatch):
@@ -139,5 +136,5 @@ def test_what_is_passed_at_once_is_met_at_the_first_look(monkeypatch):
     first = LOOKS_IN_STEP[1]
     limit = Limit(mg.Stop("A", lower=0.0), "lower", 0, 0, 1.0, 0.0)
     assert Rests(None, (limit,)).met(Sinking(), 0.0, 1.0) == first
-    monkeypatch.setattr(Rests, "_pressing", lambda self, motion, times: motion.positions(times)[0])
+    monkeypatch.setattr(Rests, "_pressing", lambda self, motion, times: motion.motion(times)[0][0])
     assert Rests(None, (limit,), holding=_Holding((limit,))).met(Sinking(), 0.0, 1.0) == first
