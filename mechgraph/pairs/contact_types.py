@@ -554,10 +554,6 @@ class Pressed(NamedTuple):
     approach: Array
 
 
-STEEL = (0.3, 0.3)
-"""Poisson's ratios of two elements of steel."""
-
-
 @dataclass(frozen=True)
 class Hertz(Described):
     """Declare what the Hertz pressure in a contact needs beside the radii: materials and line length.
@@ -576,10 +572,13 @@ class Hertz(Described):
     """
 
     moduli: Annotated[Any, TWO_POSITIVE("Young's moduli of the elements on a and on b", PRESSURE)]
-    poisson: Annotated[Any, TWO("Poisson's ratios of the elements on a and on b", PURE, default="0.3, 0.3")] = STEEL
-    groove_radius: Annotated[float | None, POSITIVE("of the section of a groove, larger than the ball's", LENGTH)] = (
-        None
+    poisson: Annotated[Any, TWO("Poisson's ratios of the elements on a and on b", PURE, default="0.3, 0.3")] = (
+        0.3,
+        0.3,
     )
+    groove_radius: Annotated[
+        float | None, POSITIVE("of the cross section of a groove, larger than the ball's", LENGTH)
+    ] = None
     length: Annotated[float | None, POSITIVE("of the line along which a cylinder touches", LENGTH)] = None
 
     def __post_init__(self) -> None:

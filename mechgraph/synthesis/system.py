@@ -391,11 +391,6 @@ class RowProblem:
         return ArrowRows(self, numbers, x)
 
 
-NODES = (8, 0.03)
-"""Nodes of the circles on which coefficients of curves are found, and their radius times the rates: the first coefficient of the residual
-that is taken for another one is that of ``h^9``, below ``3^9 / 9!`` for angles that turn at 3."""
-
-
 class ArrowRows:
     """The closure of all rows at a batch of ``T`` tracks at states ``x (R, nx, T)``: in the batch of ``here`` row by row, and of each
     row, where rates are asked, one node after the other.
@@ -405,13 +400,15 @@ class ArrowRows:
         self.problem, self.numbers, self.x = problem, numbers, x
         system, s = problem.system_with(numbers), problem.system
         self.R, _, self.T = x.shape
-        orders, self.N = len(problem.rates), NODES[0] if problem.rates else 1
+        # nodes of the circles on which coefficients of curves are found, and below their radius times the rates: the first coefficient of
+        # the residual that is taken for another one is that of ``h^9``, below ``3^9 / 9!`` for angles that turn at 3
+        orders, self.N = len(problem.rates), 8 if problem.rates else 1
         states, self._steps = np.moveaxis(x[:, : s.n_state, None], 1, 0), None
         if orders:
             rates = x[:, s.n_state :].reshape(self.R, orders, s.n_freedoms, self.T)
             size = np.abs(rates).max(axis=2) ** (1.0 / np.arange(1, orders + 1))[:, None]
             around = np.exp(2j * np.pi * np.arange(self.N) / self.N)[:, None]
-            h = around * (NODES[1] / np.maximum(1.0, size.max(axis=1)))[:, None]
+            h = around * (0.03 / np.maximum(1.0, size.max(axis=1)))[:, None]
             powers = h[:, None] ** np.arange(orders + 1)[:, None, None]
             self._coefficients, self._powers = 1.0 / (self.N * powers), powers
             self._steps = np.einsum("rkft,rknt->frnt", rates, powers[:, 1:])
