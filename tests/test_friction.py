@@ -456,9 +456,9 @@ def test_a_table_is_dragged_on_four_elastic_feet(k: tuple[float, ...]) -> None:
     ]
     guide = mg.Pair("G", "Fr", "ground", "plate", point=(0, 0, height), axis=Z)
 
-    def dragged(*center: float, rate: float = 1.0) -> mg.Solution:
+    def dragged(*center: float, rate: float = 1.0, mu: float = 0.3) -> mg.Solution:
         push = mg.Wrench("plate", force=(0, 0, -W), point=(*center, 0))
-        dry = [mg.Friction(p.name, mu=0.3) for p in plate]
+        dry = [mg.Friction(p.name, mu=mu) for p in plate]
         m = mg.Mechanism("plate", pairs=[*plate, guide], drives=["G.Tx", "G.Ty", "G.Rz"], loads=[push, *dry])
         motions = {"G.Tx": mg.Motion([0.0], velocity=rate), "G.Ty": 0.0, "G.Rz": 0.0}
         return mg.solve(m, motions, redundant="elastic", on_reach="flag")
@@ -484,6 +484,11 @@ def test_a_table_is_dragged_on_four_elastic_feet(k: tuple[float, ...]) -> None:
             assert effort["G.Rz"] == pytest.approx(-0.3 * rate * N @ at[:, 1], rel=1e-9)
             assert abs(s.checks.power[0]) < 1e-12 * W
     assert lifts > 1
+    # it tips from mu = (1 - x) / height = 1.8 on; feet held down would jam from mu = 2 on, but they lift before
+    assert [dragged(0.1, 0.2, mu=mu).status for mu in (1.75, 1.85, 2.1, 4.0)] == [
+        "ok", "lifts off", "friction not determined", "friction not determined",
+    ]  # fmt: skip
+    assert not dragged(0.1, 0.2, mu=2.1).jams
 
 
 def test_preload_and_viscous() -> None:

@@ -504,9 +504,14 @@ class _FrictionProblem:
             )
             lifted, moved = self._lifts(found)
             if not (turned | moved).any():
-                return found, rubs, self.flank
+                break
             self._put_on(None, np.where(turned, found.multipliers, self.flank), lifted)
-        return _undetermined(found, rubs, turned | moved), rubs, self.flank
+        else:
+            return _undetermined(found, rubs, turned | moved), rubs, self.flank
+        # forces that grow without bound between feet held in place may let them lift before: then it tips, and does not jam
+        grows = (rubs.outcome > 0) & (self.push is not None)
+        rubs.outcome[grows], rubs.factor[grows] = OUTCOMES.index("friction not determined"), np.nan
+        return found, rubs, self.flank
 
     def _lifts(self, found: _FreeForces) -> tuple[Mask | None, Mask]:
         """What has lifted off beside forces, and where ``(T,)`` that is not what it was: what would pull lifts, what would sink in bears

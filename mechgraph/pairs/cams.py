@@ -280,6 +280,8 @@ class OfLaw(Centred):
         names = ("angle", self.named, "slope", "bend")
         given = [name for name in names if getattr(self, name) is not None]
         if self.law is not None:
+            if not isinstance(self.law, CamLaw):
+                return [f"{where}{wrong(self.law, 'law', 'an mg.CamLaw, such as mg.CamLaw([mg.Segment(...), ...])')}"]
             if given:
                 return [f"{where}law: says {', '.join(given)} too; leave these out"]
             turns = self.law.turn / math.tau
