@@ -775,7 +775,7 @@ def least_preload(s: Solution, pair: str, stiffness: float = 0.0, freedom: str |
     Raises
     ------
     DeclarationError
-        No such contact or freedom; the spring does not press everywhere.
+        No such contact or freedom; the spring does not press everywhere, or its stiffness is negative.
 
     Examples
     --------
@@ -793,6 +793,8 @@ def least_preload(s: Solution, pair: str, stiffness: float = 0.0, freedom: str |
     """
     m, c = s.mechanism, s.contact(pair)
     where = f"least preload of {pair!r}"
+    if not 0.0 <= stiffness < np.inf:
+        raise DeclarationError(where, [wrong(stiffness, "stiffness", "0 or a positive number")])
     row = m.pair(pair)
     if row.type.touching is None or len(row.type.touching.forces) != 1:
         raise DeclarationError(where, [wrong(row.type.symbol, "type", "a contact with one normal force")])

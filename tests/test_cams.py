@@ -465,6 +465,8 @@ def test_least_preload_of_a_harmonic_follower(stiffness, expected):
     turn = mg.Motion(np.linspace(0, 2 * np.pi, 73), velocity=100.0)
     with pytest.warns(mg.MechgraphWarning, match="lifts off"):
         s = mg.solve(m, {"A": turn})
+    with pytest.raises(mg.DeclarationError, match="stiffness = -1"):
+        mg.least_preload(s, "K", stiffness=-1.0)
     found = mg.least_preload(s, "K", stiffness=stiffness)
     assert found == pytest.approx(expected, abs=1e-8)
     # with that spring the contact holds, but not with less
