@@ -491,6 +491,23 @@ def test_a_table_is_dragged_on_four_elastic_feet(k: tuple[float, ...]) -> None:
     assert not dragged(0.1, 0.2, mu=2.1).jams
 
 
+def test_two_of_five_dragged_feet_stand_off() -> None:
+    """By hand: 20, 30 and 50 N balance load and friction, the plane through their feet clears the others by 150 and 397 um."""
+    feet = [(-0.4, 0.2, 6e-5), (0.4, -0.3, 0.0), (0.3, -0.5, 1e-4), (-0.6, 0.2, -1e-4), (-0.1, 0.5, 6e-5)]
+    table = [
+        mg.Pair(
+            f"K{i}", "Sp", "frame", "table", point=(x, y, 0), axis=Z, closed="force", stiffness={"Fz": 1e6}, misfit={"Fz": off}
+        )
+        for i, (x, y, off) in enumerate(feet)
+    ]  # fmt: skip
+    guide = mg.Pair("G", "Fr", "frame", "table", point=(0, 0, 0.4), axis=Z)
+    dry = [mg.Friction(p.name, mu=0.2) for p in table]
+    load = mg.Wrench("table", force=(0, 0, -100), point=(0.04, 0.04, 0))
+    m = mg.Mechanism("table", pairs=[*table, guide], drives=["G.Tx", "G.Ty", "G.Rz"], loads=[load, *dry])
+    s = mg.solve(m, {"G.Tx": mg.Motion(0.0, velocity=1.0), "G.Ty": 0.0, "G.Rz": 0.0}, redundant="elastic")
+    assert [s[p.name].components["Fz"] for p in table] == pytest.approx([0, 20, 30, 0, 50], abs=1e-9)
+
+
 def test_preload_and_viscous() -> None:
     s = moved(shaft(force(0, -W, (0, 0, 0)), preload=50.0, viscous=0.7), 2.0)
     assert s.load(1).power == pytest.approx(-s.losses["A"], rel=1e-12)

@@ -61,7 +61,11 @@ STATUSES = (
     ("TOO_FAR", "not followed", "the position is further than steps are made"),
     ("FORMAT_ERROR", "other tables", "tables of another version"),
     ("NOT_PASSIVE", "no longer passive", "a passive freedom moves other links here"),
-    ("FRICTION", "friction not solved", "friction jams here, has no finite force, or none that is surely the only one"),
+    (
+        "FRICTION",
+        "friction not solved",
+        "friction jams here, has no finite force, none that is surely the only one, or turns the force between teeth round",
+    ),
     ("FLANKS", "flanks not settled", "flanks on which gears that are redundant press are not found"),
 )
 """What the kernel returns, by its number: identifier, word, meaning."""

@@ -508,6 +508,7 @@ class _FrictionProblem:
             self._put_on(None, np.where(turned, found.multipliers, self.flank), lifted)
         else:
             return _undetermined(found, rubs, turned | moved), rubs, self.flank
+        found, rubs = self._tried(found, rubs, dq, at_rest)
         # forces that grow without bound between feet held in place may let them lift before: then it tips, and does not jam
         grows = (rubs.outcome > 0) & (self.push is not None)
         rubs.outcome[grows], rubs.factor[grows] = OUTCOMES.index("friction not determined"), np.nan
@@ -520,13 +521,35 @@ class _FrictionProblem:
         if self.push is None or self.lifted is None:
             return None, np.zeros(self.here.T, dtype=bool)
         values, assumed = component_values(PairFrames(self.here), found.reactions), self.lifted
-        size = np.abs(values).max(axis=0)
-        pulls = self.push[:, None] & ~assumed & (values < -STRESSES.rounding * size)
         assert found.all_stress is not None
         gaps = openings(self.here, found.reactions, found.all_stress, assumed)
-        largest = np.abs(gaps).max(axis=0)
-        sinks = (gaps < -STRESSES.rounding * largest) & ~pulls.any(axis=0)
+        # one at a time, as in an active set method: of several that would pull most bear again as soon as one has lifted
+        pulls = _worst(np.where(self.push[:, None] & ~assumed, values, 0.0), np.abs(values))
+        sinks = _worst(np.where(assumed, gaps, 0.0), np.abs(gaps)) & ~pulls.any(axis=0)
         return (assumed | pulls) & ~sinks, (pulls | sinks).any(axis=0)
+
+    def _tried(self, found: _FreeForces, rubs: Rubbed, dq: Array, at_rest: bool) -> tuple[_FreeForces, Rubbed]:
+        """The same, after all other sets of what may lift were tried where forces were not found and these are few: each lifted foot
+        changes the friction of the others, so that one at a time does not always lead to the set that stands.
+        """
+        if self.push is None or self.lifted is None or self.push.sum() > 6:
+            return found, rubs
+
+        def fails(found: _FreeForces, rubs: Rubbed) -> Mask:
+            return (rubs.outcome > 0) | self._lifts(found)[1] | (found.unborne if found.unborne is not None else False)
+
+        left, settled, feet = fails(found, rubs), self.lifted, np.flatnonzero(self.push)
+        sets = sorted(product((False, True), repeat=len(feet)), key=sum)
+        for each in sets if left.any() else ():
+            trial = settled.copy()
+            trial[np.ix_(feet, left)] = np.array(each)[:, None]
+            self._put_on(None, self.flank, trial)
+            stands = left & ~fails(*self._on_flanks(dq, at_rest))
+            settled, left = np.where(stands, trial, settled), left & ~stands
+            if not left.any():
+                break
+        self._put_on(None, self.flank, settled)
+        return self._on_flanks(dq, at_rest)
 
     def _put_on(self, found: _FreeForces | None, flank: Array, lifted: Mask | None) -> None:
         """Take forces without friction, and those of unit efforts, on flanks of signs ``(n, T)``, without what has lifted off."""
@@ -613,6 +636,12 @@ class _FrictionProblem:
         reads = {column: self._read(one) for column, one in self.unit.items()}
         out = rests(self.here, ways, self._read(vars(found)), reads, efforts, own)
         return np.where(dq.any(axis=0), np.nan, out)
+
+
+def _worst(values: Array, sizes: Array) -> Mask:
+    """The least of values ``(K, T)`` at every position, where it is negative beside the largest of their sizes."""
+    least = np.arange(len(values))[:, None] == values.argmin(axis=0)
+    return np.asarray(least & (values < -STRESSES.rounding * sizes.max(axis=0)))
 
 
 def _elastic(here: Configuration, found: _FreeForces, lifted: Mask | None) -> _FreeForces:
