@@ -526,7 +526,7 @@ class _FrictionProblem:
         # one at a time, as in an active set method: of several that would pull most bear again as soon as one has lifted
         pulls = _worst(np.where(self.push[:, None] & ~assumed, values, 0.0), np.abs(values))
         sinks = _worst(np.where(assumed, gaps, 0.0), np.abs(gaps)) & ~pulls.any(axis=0)
-        return (assumed | pulls) & ~sinks, (pulls | sinks).any(axis=0)
+        return (assumed | pulls) & ~sinks, np.asarray((pulls | sinks).any(axis=0))
 
     def _tried(self, found: _FreeForces, rubs: Rubbed, dq: Array, at_rest: bool) -> tuple[_FreeForces, Rubbed]:
         """The same, after all other sets of what may lift were tried where forces were not found and these are few: each lifted foot
