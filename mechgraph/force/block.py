@@ -499,20 +499,24 @@ class _FrictionProblem:
         # how often flanks and what has lifted off are changed
         for _ in range(5 if self.lifted is None else 5 + 2 * len(self.lifted)):
             found, rubs = self._on_flanks(dq, at_rest)
-            turned = (
-                ((found.multipliers < 0.0) != (self.flank < 0.0)).any(axis=0) & (rubs.outcome == 0) & bool(self.lines)
-            )
-            lifted, moved = self._lifts(found)
+            turned, (lifted, moved) = self._turned(found, rubs), self._lifts(found)
             if not (turned | moved).any():
                 break
             self._put_on(None, np.where(turned, found.multipliers, self.flank), lifted)
-        else:
-            return _undetermined(found, rubs, turned | moved), rubs, self.flank
-        found, rubs = self._tried(found, rubs, dq, at_rest)
+        if self.push is not None:
+            self._try_sets(dq, at_rest)
+            found, rubs = self._on_flanks(dq, at_rest)
+            turned, moved = self._turned(found, rubs), self._lifts(found)[1]
+        found = _undetermined(found, rubs, turned | moved)
         # forces that grow without bound between feet held in place may let them lift before: then it tips, and does not jam
         grows = (rubs.outcome > 0) & (self.push is not None)
         rubs.outcome[grows], rubs.factor[grows] = OUTCOMES.index("friction not determined"), np.nan
         return found, rubs, self.flank
+
+    def _turned(self, found: _FreeForces, rubs: Rubbed) -> Mask:
+        """Where ``(T,)`` teeth press on other flanks than those that forces were found on."""
+        other = (found.multipliers < 0.0) != (self.flank < 0.0)
+        return np.asarray(other.any(axis=0) & (rubs.outcome == 0) & bool(self.lines))
 
     def _lifts(self, found: _FreeForces) -> tuple[Mask | None, Mask]:
         """What has lifted off beside forces, and where ``(T,)`` that is not what it was: what would pull lifts, what would sink in bears
@@ -528,28 +532,28 @@ class _FrictionProblem:
         sinks = _worst(np.where(assumed, gaps, 0.0), np.abs(gaps)) & ~pulls.any(axis=0)
         return (assumed | pulls) & ~sinks, np.asarray((pulls | sinks).any(axis=0))
 
-    def _tried(self, found: _FreeForces, rubs: Rubbed, dq: Array, at_rest: bool) -> tuple[_FreeForces, Rubbed]:
-        """The same, after all other sets of what may lift were tried where forces were not found and these are few: each lifted foot
-        changes the friction of the others, so that one at a time does not always lead to the set that stands.
+    def _try_sets(self, dq: Array, at_rest: bool) -> None:
+        """Put on another set of what has lifted off where forces were not found and some set, of few, stands: each lifted foot changes the
+        friction of the others, so that one at a time does not always lead there.
         """
         if self.push is None or self.lifted is None or self.push.sum() > 6:
-            return found, rubs
+            return
 
-        def fails(found: _FreeForces, rubs: Rubbed) -> Mask:
-            return (rubs.outcome > 0) | self._lifts(found)[1] | (found.unborne if found.unborne is not None else False)
+        def fails() -> Mask:
+            found, rubs = self._on_flanks(dq, at_rest)
+            unborne = False if found.unborne is None else found.unborne
+            return (rubs.outcome > 0) | self._lifts(found)[1] | self._turned(found, rubs) | unborne
 
-        left, settled, feet = fails(found, rubs), self.lifted, np.flatnonzero(self.push)
-        sets = sorted(product((False, True), repeat=len(feet)), key=sum)
-        for each in sets if left.any() else ():
+        left, settled, feet = fails(), self.lifted, np.flatnonzero(self.push)
+        for each in sorted(product((False, True), repeat=len(feet)), key=sum):
+            if not left.any():
+                break
             trial = settled.copy()
             trial[np.ix_(feet, left)] = np.array(each)[:, None]
             self._put_on(None, self.flank, trial)
-            stands = left & ~fails(*self._on_flanks(dq, at_rest))
+            stands = left & ~fails()
             settled, left = np.where(stands, trial, settled), left & ~stands
-            if not left.any():
-                break
         self._put_on(None, self.flank, settled)
-        return self._on_flanks(dq, at_rest)
 
     def _put_on(self, found: _FreeForces | None, flank: Array, lifted: Mask | None) -> None:
         """Take forces without friction, and those of unit efforts, on flanks of signs ``(n, T)``, without what has lifted off."""
