@@ -185,6 +185,13 @@ def test_statuses_are_those_of_the_kernel():
     assert [(key, str(i)) for i, (key, _, _) in enumerate(STATUSES)] == known[: len(STATUSES)]
 
 
+def test_every_status_of_a_compiled_mechanism_stands_in_its_table() -> None:
+    page = (ROOT / "docs" / "how-to" / "control-loop.md").read_text(encoding="utf-8")
+    table = page.partition("| `c.status` |")[2].partition("\n\n")[0]
+    words = [word for row in table.splitlines()[2:] for word in row.split("|")[1].strip().split(", ")]
+    assert sorted(words) == sorted(word for _, word, _ in STATUSES)
+
+
 def test_no_heap_and_no_globals():
     text = source_text(tabled(mg.load("four-bar")), "press", "press.h")
     code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)

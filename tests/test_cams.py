@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
-from mechgraph.pairs.curves import Travel
 
 Z = (0, 0, 1)
 D = np.deg2rad
@@ -388,7 +387,7 @@ def test_rounded_samples_are_smoothed():
 def test_the_path_of_a_cutter_less_its_radius_is_the_profile():
     """Acceptance: every point of the profile is the radius of the cutter from its path, and no point is nearer."""
     cam = SHAPES["cam"]
-    s = np.linspace(0, cam.once(Travel).length, 801)
+    s = np.linspace(0, cam.length, 801)
     profile, path = (cam.cutter_path(r).at(s)[0] for r in (0.0, 0.016))
     np.testing.assert_allclose(np.linalg.norm(path - profile, axis=0), 0.016, rtol=1e-12)
     near = np.linalg.norm(path[:, ::40, None] - profile[:, None], axis=0).min(axis=1)
@@ -419,7 +418,7 @@ def test_a_drawing_read_back_is_the_cam_within_the_chord_error(form, tmp_path):
     cam.write(tmp_path / "cam.dxf", error=error, cutter=0.016, form=form, unit="m")
     drawing = ezdxf.readfile(tmp_path / "cam.dxf")
     assert drawing.header["$INSUNITS"] == 6
-    length = cam.once(Travel).length
+    length = cam.length
     for layer, radius in (("PROFILE", 0.0), ("PITCH", 0.01), ("CUTTER", 0.016)):
         (entity,) = drawing.modelspace().query(f'*[layer=="{layer}"]')
         if form == "spline":

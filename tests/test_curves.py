@@ -103,7 +103,7 @@ def test_a_curve_by_its_arc_length(name):
 
 def test_the_length_of_an_ellipse():
     """``4 a E(1 - b^2 / a^2)`` = 9.688448220547675 for half axes 2 and 1."""
-    assert Travel(SAMPLE["ellipse"]).length == pytest.approx(9.688448220547675, rel=1e-14)
+    assert SAMPLE["ellipse"].length == pytest.approx(9.688448220547675, rel=1e-14)
 
 
 # --- limits ----------------------------------------------------------------------------------------------------------
@@ -448,7 +448,7 @@ def test_the_frame_of_an_endless_helix_turns_as_little_as_possible_beyond_its_gr
 def test_a_frame_that_comes_back_turned_is_refused_where_roll_is_held():
     """The closing angle is that of the spherical image: here it is found by following the frame in small steps, too."""
     curve = SAMPLE["closed"]
-    s = np.linspace(0, Travel(curve).length, 20001)
+    s = np.linspace(0, curve.length, 20001)
     t = Travel(mg.Curve.through(points=curve.points, closed=True, frame="guided", guide=(0, 0, 1))).at(s)
     y = t.y[:, 0]
     for i in range(1, len(s)):
@@ -665,7 +665,7 @@ def test_the_length_of_a_wavy_curve_is_found():
     curve = mg.Curve.function(position=wavy(50, 0.004), ends_at=(0, 2 * np.pi), closed=True)
     u = 2 * np.pi * np.arange(20000) / 20000  # the trapezoidal rule is exact for what is periodic
     exact = np.linalg.norm(curve.at(u)[1], axis=0).mean() * 2 * np.pi
-    assert curve.once(Travel).length == pytest.approx(exact, rel=1e-12)
+    assert curve.length == pytest.approx(exact, rel=1e-12)
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])

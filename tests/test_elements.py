@@ -21,7 +21,6 @@ import test_meshes as meshes
 import test_planar as flat
 
 import mechgraph as mg
-from mechgraph.pairs.curves import Travel
 
 X, Y, Z = np.eye(3)
 RAD, DEG = np.deg2rad, np.rad2deg
@@ -574,7 +573,7 @@ def _() -> Iterator[Row]:
 @number(40, "DXF read back; cutter path less radius = profile")
 def _() -> Iterator[Row]:
     cam = cams.SHAPES["cam"]
-    s = np.linspace(0, cam.once(Travel).length, 801)
+    s = np.linspace(0, cam.length, 801)
     profile, path = (cam.cutter_path(r).at(s)[0] for r in (0.0, 0.016))
     yield "path less profile", 0.016, np.linalg.norm(path - profile, axis=0).max(), 1e-9
     ezdxf = pytest.importorskip("ezdxf")
@@ -583,7 +582,7 @@ def _() -> Iterator[Row]:
         cam.write(file, error=1e-5, unit="m")
         (entity,) = ezdxf.readfile(file).modelspace().query('*[layer=="PROFILE"]')
         read = np.array([tuple(p) for p in entity.flattening(1e-7, segments=64)])[::31]
-    fine = cam.cutter_path(0.0).at(np.linspace(0, cam.once(Travel).length, 100001))[0].T
+    fine = cam.cutter_path(0.0).at(np.linspace(0, cam.length, 100001))[0].T
     yield "DXF, at most the chord error", 0.0, max(np.linalg.norm(fine - p, axis=1).min() for p in read), 1.1e-5
 
 

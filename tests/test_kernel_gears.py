@@ -11,7 +11,6 @@ from test_compile import beside
 from test_gears import planetary
 
 import mechgraph as mg
-from mechgraph.compiled.tabled import tabled, write_c
 
 pytestmark = [pytest.mark.usefixtures("compiled"), pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")]
 
@@ -96,7 +95,6 @@ def turning(m: mg.Mechanism, count: int = 5) -> dict[str, mg.Motion]:
 @pytest.mark.seeds(12)
 def test_random_trains(seed):
     m = random_train(seed)
-    assert tabled(m).I is not None
     assert differ(m, turning(m)) < 1e-10
 
 
@@ -145,9 +143,9 @@ def test_derivatives_are_exact(stages, numbers):
 
 def test_a_file_of_c(tmp_path):
     m = random_train(3, ("spur", "bevel", "belt"))
-    t = tabled(m)
-    write_c(t, tmp_path / "train.c")
-    q = (t.home + 0.1).tolist()
+    c = mg.compile(m)
+    c.write(tmp_path / "train.c")
+    q = (c.tables.home + 0.1).tolist()
     status, (effort, reaction, _) = run_c(library_of(tmp_path / "train.c", "train"), "train", m, q)
     s = mg.solve(m, {"S0": mg.Motion(q[0], 2.0, 0.5)}, engine="dense")
     expected = np.concatenate([s[p.name].reaction for p in m.pairs])
@@ -178,7 +176,6 @@ def test_bearings_that_rub():
         for p in m.pairs
     ]
     m = m.replace(loads=[*m.loads, *rough])
-    tabled(m)
     assert differ(m, turning(m)) < 1e-10
 
 

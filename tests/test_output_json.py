@@ -16,6 +16,7 @@ import mechgraph as mg
 from mechgraph.cli import options
 from mechgraph.cli.records import COMMANDS, output_schema
 from mechgraph.files import json_text, patch, plain, schema_of
+from mechgraph.kinematics.motion_path import Status
 from mechgraph.model.file_format import laid_out
 from mechgraph.model.toml import to_data
 
@@ -202,3 +203,12 @@ def test_drive_syntax(text: str, positions: list[float], velocity: float, accele
 def test_a_time_span_is_converted_to_the_declared_unit() -> None:
     assert [options.duration(text, "--for", "ms") for text in ("2s", "2ms", "2")] == [2000.0, 2.0, 2.0]
     assert options.duration("5ms", "--for") == 0.005
+
+
+def test_every_outcome_and_every_error_stands_in_its_table() -> None:
+    """And nothing else; warnings and the common base have no row."""
+    page = (Path(__file__).parents[1] / "docs" / "reference" / "statuses.md").read_text(encoding="utf-8")
+    first = [row.split("|")[1].strip().split(", ") for row in page.splitlines() if row.startswith("| ")]
+    names = [name.strip("`") for row in first for name in row if name not in ("status", "error")]
+    errors = {name for name in mg.__all__ if name.endswith("Error")} - {"MechgraphError"}
+    assert sorted(names) == sorted([*(status.value for status in Status), *errors])

@@ -17,8 +17,6 @@ import pytest
 import rooms
 
 import mechgraph as mg
-from mechgraph.compiled.tabled import STATUSES
-from mechgraph.kinematics.motion_path import Status
 
 ROOT = Path(__file__).resolve().parents[1]
 README = ROOT / "README.md"
@@ -57,22 +55,6 @@ def test_a_page_without_its_output_is_found() -> None:
 
 def test_the_readme_is_short() -> None:
     assert len(README.read_text(encoding="utf-8").splitlines()) <= 200
-
-
-def test_every_outcome_and_every_error_stands_in_its_table() -> None:
-    """And nothing else; warnings and the common base have no row."""
-    page = (ROOT / "docs" / "reference" / "statuses.md").read_text(encoding="utf-8")
-    first = [row.split("|")[1].strip().split(", ") for row in page.splitlines() if row.startswith("| ")]
-    names = [name.strip("`") for row in first for name in row if name not in ("status", "error")]
-    errors = {name for name in mg.__all__ if name.endswith("Error")} - {"MechgraphError"}
-    assert sorted(names) == sorted([*(status.value for status in Status), *errors])
-
-
-def test_every_status_of_a_compiled_mechanism_stands_in_its_table() -> None:
-    page = (ROOT / "docs" / "how-to" / "control-loop.md").read_text(encoding="utf-8")
-    table = page.partition("| `c.status` |")[2].partition("\n\n")[0]
-    words = [word for row in table.splitlines()[2:] for word in row.split("|")[1].strip().split(", ")]
-    assert sorted(words) == sorted(word for _, word, _ in STATUSES)
 
 
 def equations() -> str:

@@ -179,6 +179,11 @@ class Curve(Described, Once):
         return False
 
     @property
+    def length(self) -> float:
+        """Arc length [L] from end to end, of one round where the curve is closed; infinite where it does not end."""
+        return float(self.once(Travel).length) if np.isfinite(self.ends[0]) else math.inf
+
+    @property
     def speed(self) -> float | None:
         """``|x'|`` where it is the same everywhere."""
         return None
