@@ -33,7 +33,7 @@ from mechgraph.show.curves import effort_curve, friction_losses, reaction_ranges
 from mechgraph.show.diagrams import draw_graph, study_histogram, study_tornado
 from mechgraph.show.page.content import view_data
 from mechgraph.show.skeleton import draw_skeleton
-from mechgraph.variants.study import Study
+from mechgraph.variants.study import IGNORED_TAIL, Study
 
 WEB = "web"
 """Folder of the scripts, which build.js of it builds."""
@@ -187,9 +187,6 @@ def _picture(draw: Callable[[], Any]) -> str:
     return f"data:image/svg+xml,{quote(visible(buffer.getvalue().decode()), safe=' =:/,.;()-')}"
 
 
-Q = (0.00135, 0.5, 0.99865)
-
-
 def _blocks(study: Study) -> Iterator[Block]:
     rows, slopes = [], []
     for name in study.outputs:
@@ -197,7 +194,8 @@ def _blocks(study: Study) -> Iterator[Block]:
         if not np.isfinite(nominal).any():
             continue
         at = np.unravel_index(int(np.nanargmax(np.abs(nominal))), nominal.shape)
-        values = [nominal, study.mean(name), study.std(name), *study.quantiles(name, Q)]
+        middle = study.quantiles(name, (IGNORED_TAIL, 0.5, 1 - IGNORED_TAIL))
+        values = [nominal, study.mean(name), study.std(name), *middle]
         where = ", ".join(map(str, map(int, at))) or "-"
         rows.append((name, where, *(f"{float(v[at]):.5g}" for v in values)))
         slopes += [(name, parameter, f"{float(v[at]):.5g}") for parameter, v in study.sensitivities(name).items()]
