@@ -54,6 +54,34 @@ def links(*heavy: mg.Link, pairs: list[mg.Pair]) -> list[mg.Link]:
     return [mg.Link(name) for name in others] + list(heavy)
 
 
+class Drawn:
+    """A machine in its x-z plane as a mechanism of space, or as its planar twin."""
+
+    def __init__(self, planar: bool) -> None:
+        self.planar, self.up = planar, "Ty" if planar else "Tz"
+
+    def made(self, m: mg.Mechanism) -> mg.Mechanism:
+        return m.to_planar() if self.planar else m
+
+    def inside(self, s: mg.Solution, name: str) -> Array:
+        """Components x and up of the force of a pair; of the twin no number is missing, and none leaves the plane."""
+        force = np.asarray(s[name].force)
+        if self.planar:
+            assert not force[..., 2].any()
+            assert not np.asarray(s[name].moment)[..., :2].any()
+            return force[..., :2]
+        return force[..., [0, 2]]
+
+
+SPACE, PLANE = Drawn(False), Drawn(True)
+both = pytest.mark.parametrize("drawn", [SPACE, PLANE], ids=["space", "plane"])
+
+def stays_in_space(m: mg.Mechanism) -> None:
+    """Of eight of the fourteen: no plane holds their motion, so that they have no planar twin."""
+    with pytest.raises(mg.DeclarationError, match="does not move in a plane; expected a mechanism that moves in one"):
+        m.to_planar()
+
+
 def test_hexapod() -> None:
     """Six legs under a platform at given poses: six axial forces balance weight and payload."""
     angles = np.deg2rad([10, 50, 130, 170, 250, 290])
@@ -74,6 +102,7 @@ def test_hexapod() -> None:
         "hexapod", links(platform, pairs=pairs), pairs, [f"leg{i}" for i in range(6)],
         [WEIGHT, mg.Wrench("platform", force=(200, -100, -800), point="tool")],
     )  # fmt: skip
+    stays_in_space(m)
     assert mg.check(m).determinate
     poses = np.tile(np.eye(4), (3, 1, 1))
     middle = np.array([0, 0, 0.7])
@@ -125,6 +154,7 @@ def test_delta_robot() -> None:
             pairs += rod(name, f"arm{i}", "plate", elbow + offset, home + plate * e + offset)
     tool = mg.Link("plate", 1.2, home, np.diag([0.001, 0.001, 0.002]), points={"tool": home})
     m = mg.Mechanism("delta robot", links(tool, pairs=pairs), pairs, [f"hip{i}" for i in range(3)], [WEIGHT])
+    stays_in_space(m)
     assert mg.check(m).mobility == 3 + 6  # the spins of six rods
     t = np.linspace(0, 0.2, 9)
     w, reach = 12.0, np.array([0.12, -0.05, 0.08])
@@ -166,6 +196,7 @@ def test_five_rod_suspension() -> None:
         "five-rod suspension", links(carrier, pairs=pairs), pairs, ["strut.Tz"],
         [WEIGHT, mg.Wrench("carrier", force=tyre, point="patch")],
     )  # fmt: skip
+    stays_in_space(m)
     travel = np.linspace(-0.06, 0.08, 281)
     s = mg.solve(m, {"carrier.hub.Tz": travel}, actuate=["strut.Tz"])
     at = {name: s.link("carrier").at(name).position for name in names}
@@ -211,6 +242,7 @@ def test_double_wishbone_with_steering() -> None:
         "double wishbone", links(*heavy, pairs=pairs), pairs, ["strut.Tz", "rack"],
         [mg.Wrench("knuckle", force=tyre, point="patch")],
     )  # fmt: skip
+    stays_in_space(m)
     travel, turn = patch[2] + np.array([-0.05, 0.0, 0.06]), np.array([0.03, 0.0, -0.04])
     s = mg.solve(m, {"knuckle.patch.Tz": travel, "rack": turn}, actuate=["strut.Tz", "rack"])
     for k in range(3):
@@ -250,6 +282,7 @@ def test_double_cardan_shaft() -> None:
         mg.Pair("D", "C", "frame", "output", point=end + 0.2 * X, axis=X),
     ]
     m = mg.Mechanism("double Cardan shaft", pairs=pairs, drives=["A"], loads=[mg.Effort("D.Rz", -torque)])
+    stays_in_space(m)
     assert mg.check(m).determinate
     q = np.deg2rad([0, 20, 55, 100, 140, 200, 290, 350])
     s = mg.solve(m, {"A": mg.Motion(q, velocity=speed)})
@@ -276,7 +309,8 @@ def moment(arm: Array, force: Array) -> float:
     return float(arm[0] * force[2] - arm[2] * force[0])
 
 
-def test_landing_gear() -> None:
+@both
+def test_landing_gear(drawn: Drawn) -> None:
     """Leg, folding brace of two halves, and a jack on the upper one: elbow by two circles, forces body by body."""
     top, jack, half, grip = flat(0.8, 0.15), flat(0.3, 0.35), 0.60, 0.25
     mass, drag = 120.0, np.array([-2500.0, 0, 0])
@@ -303,6 +337,7 @@ def test_landing_gear() -> None:
     ]
     loads = [WEIGHT, mg.Wrench("leg", force=drag, point="wheel")]
     m = mg.Mechanism("landing gear", links(leg, pairs=pairs), pairs, ["O"], loads)
+    m = drawn.made(m)
     angles = np.deg2rad([5, 15, 30, 45, 60, 75, 85])
     s = mg.solve(m, {"O": angles - down}, actuate=["jack"])
     for k, angle in enumerate(angles):
@@ -316,7 +351,7 @@ def test_landing_gear() -> None:
         assert s["jack"].position[k, 0] == pytest.approx(stroke, abs=1e-10)
         hinges = {"O": -weight - drag - lower, "E": -lower, "F": lower - push * unit(hold - jack)}
         for name, by_hand in hinges.items():
-            np.testing.assert_allclose(s[name].force[k, [0, 2]], by_hand[[0, 2]], rtol=1e-7, atol=1e-6)
+            np.testing.assert_allclose(drawn.inside(s, name)[k], by_hand[[0, 2]], rtol=1e-7, atol=1e-6)
 
 
 def test_swash_plate_pump() -> None:
@@ -338,6 +373,7 @@ def test_swash_plate_pump() -> None:
         heavy.append(mg.Link(f"piston{i}", mass, ball))
         loads.append(mg.ForceLaw(f"bore{i}.Tz", law=lambda x, v, t: -pressed(v)))
     m = mg.Mechanism("swash-plate pump", links(*heavy, pairs=pairs), pairs, ["shaft"], loads)
+    stays_in_space(m)
     assert mg.check(m).mobility == 1 + 3  # the pistons may spin
     turn = np.deg2rad(np.arange(3, 363, 15.0))
     s = mg.solve(m, {"shaft": mg.Motion(turn, velocity=speed)})
@@ -358,7 +394,8 @@ def test_swash_plate_pump() -> None:
     np.testing.assert_allclose(s["shaft"].effort[:, 0], by_hand, rtol=1e-9, atol=1e-9)
 
 
-def test_scissor_lift() -> None:
+@both
+def test_scissor_lift(drawn: Drawn) -> None:
     """Three stages of crossed arms, pushed at the foot: F = (n W + n^2 w) g cot(angle) by virtual work."""
     stages, long, arm, deck, load = 3, 2.0, 30.0, 150.0, 500.0
     low = np.deg2rad(20)
@@ -387,19 +424,21 @@ def test_scissor_lift() -> None:
             pairs.append(mg.Pair(f"R{i}", "R", f"a{i - 1}", f"b{i}", point=flat(wide, i * high), axis=Y))
     loads = [WEIGHT, mg.Wrench("deck", force=(0, 0, -load * G), point="load")]
     m = mg.Mechanism("scissor lift", links(*heavy, pairs=pairs), pairs, ["ram"], loads)
+    m = drawn.made(m)
     angles = np.deg2rad([20, 30, 45, 60])
-    s = mg.solve(m, {"deck.edge.Tz": stages * long * np.sin(angles)}, actuate=["ram"])
+    s = mg.solve(m, {f"deck.edge.{drawn.up}": stages * long * np.sin(angles)}, actuate=["ram"])
     push = (stages * (deck + load) + stages**2 * arm) * G / np.tan(angles)
     np.testing.assert_allclose(s["ram"].effort[:, 0], -push, rtol=1e-9)
     np.testing.assert_allclose(s["ram"].position[:, 0], long * (np.cos(angles) - np.cos(low)), atol=1e-10)
     # the whole lift about its fixed foot: the load stays 0.4 from it, the deck's center where it was, the arms' half way
     foot = G * (load * 0.4 + deck * wide / 2 + stages * arm * long * np.cos(angles)) / (long * np.cos(angles))
-    np.testing.assert_allclose(s["B"].force[:, 2], foot, rtol=1e-9)
-    np.testing.assert_allclose(s["A"].force[:, 0], push, rtol=1e-9)
-    np.testing.assert_allclose(s["A"].force[:, 2], (load + deck + 2 * stages * arm) * G - foot, rtol=1e-9)
+    np.testing.assert_allclose(drawn.inside(s, "B")[:, 1], foot, rtol=1e-9)
+    np.testing.assert_allclose(drawn.inside(s, "A")[:, 0], push, rtol=1e-9)
+    np.testing.assert_allclose(drawn.inside(s, "A")[:, 1], (load + deck + 2 * stages * arm) * G - foot, rtol=1e-9)
 
 
-def test_excavator() -> None:
+@both
+def test_excavator(drawn: Drawn) -> None:
     """In-plane pins and cylinders R-P-R, boom lifted and stick drawn in at once: cylinder forces by the work of each stroke."""
     elbow, tip = flat(5.2, 2.6), flat(7.0, -1.0)
     eyes = {"lift": (flat(0.5, -0.6), flat(2.4, 1.9)), "crowd": (flat(2.7, 2.9), flat(4.8, 3.4))}
@@ -421,9 +460,13 @@ def test_excavator() -> None:
         "excavator", links(*heavy, pairs=pairs), pairs, list(eyes),
         [WEIGHT, mg.Wrench("stick", force=soil, point="tip")],
     )  # fmt: skip
+    m = drawn.made(m)
     report = mg.check(m)
-    assert report.verdict.startswith("Moves with mobility 2, planar: all in-plane forces and driver efforts are unique")
-    assert report.redundancy == 6  # three for each of the two loops
+    if drawn.planar:
+        assert report.verdict.startswith("Determinate (planar): 2 drivers, 18 unknowns, 18 equations")
+    else:
+        assert report.verdict.startswith("Moves with mobility 2, planar: all in-plane forces and driver efforts are unique")
+        assert report.redundancy == 6  # three for each of the two loops
 
     def state(angles: Array) -> tuple[Array, float]:
         """Strokes, and potential of weight and soil, for turns of boom and stick."""
@@ -451,11 +494,13 @@ def test_excavator() -> None:
         found = [s[name].effort[k, 0] for name in eyes]
         np.testing.assert_allclose(found, by_hand, rtol=1e-6)
         np.testing.assert_allclose([s[name].position[k, 0] for name in eyes], state(angles)[0] - home, atol=1e-10)
-    assert not np.isnan(s["A"].force[:, [0, 2]]).any()
-    assert np.isnan(s["A"].force[:, 1]).all()  # along the pins nothing decides
+    assert not np.isnan(drawn.inside(s, "A")).any()
+    if not drawn.planar:
+        assert np.isnan(s["A"].force[:, 1]).all()  # along the pins nothing decides
 
 
-def test_tailgate() -> None:
+@both
+def test_tailgate(drawn: Drawn) -> None:
     """One gas spring at the left of a lid: the couple that holds it and both hinges, by six balances."""
     mass = 28.0
     left, right = np.array([0, 0.6, 0]), np.array([0, -0.6, 0])
@@ -472,9 +517,10 @@ def test_tailgate() -> None:
         "tailgate", [mg.Link("body", points={"seat": seat}), heavy], pairs, ["opening.Rz"],
         [WEIGHT, mg.ForceLaw(("body", "lid", "seat", "eye"), law=gas)],
     )  # fmt: skip
-    assert mg.check(m).determinate
+    m = drawn.made(m)
+    assert mg.check(m).determinate is not drawn.planar  # in the plane two hinges are one pin twice
     angles = np.deg2rad([0, 20, 40, 60, 75])
-    s = mg.solve(m, {"opening.Rz": angles})
+    s = mg.solve(m, {"opening.Rz": angles}, redundant="minimum_norm")
     for k, angle in enumerate(angles):
         r = turned(-Y, angle)
         length = np.linalg.norm(r @ eye - seat)
@@ -488,13 +534,18 @@ def test_tailgate() -> None:
             + [np.array([0, 0, 0, 0, -1.0, 0])]
         )
         by_hand = np.linalg.solve(np.transpose(lines), -load)
-        assert s["opening"].effort[k, 5] == pytest.approx(by_hand[5], rel=1e-8)
+        assert s["opening"].effort[k, -1] == pytest.approx(by_hand[5], rel=1e-8)
+        if drawn.planar:
+            hinges = drawn.inside(s, "left hinge")[k] + drawn.inside(s, "right hinge")[k]
+            np.testing.assert_allclose(hinges, by_hand[[0, 2]] + by_hand[[3, 4]], rtol=1e-8)
+            continue
         np.testing.assert_allclose(s["left hinge"].force[k], by_hand[:3], rtol=1e-8, atol=1e-7)
         np.testing.assert_allclose(s["right hinge"].force[k, [0, 2]], by_hand[3:5], rtol=1e-8, atol=1e-7)
-    assert s["opening"].effort[0, 5] > 0 > s["opening"].effort[-1, 5]  # lifted at first, held back when open
+    assert s["opening"].effort[0, -1] > 0 > s["opening"].effort[-1, -1]  # lifted at first, held back when open
 
 
-def test_door() -> None:
+@both
+def test_door(drawn: Drawn) -> None:
     """A door of 40 kg swung open: the lower hinge carries it, both pull sideways by its lever, and speed up its mass."""
     mass, wide, apart, swing = 40.0, 0.9, 1.6, 0.25
     low, high = np.array([0, 0, 0.2]), np.array([0, 0, 0.2 + apart])
@@ -507,21 +558,28 @@ def test_door() -> None:
     ]
     loads = [WEIGHT, mg.Damper("swing.Rz", coefficient=6.0)]
     m = mg.Mechanism("door", [mg.Link("wall"), mg.Link("door", mass, middle, inertia)], pairs, ["swing.Rz"], loads)
+    m = drawn.made(m)
     q, rate, growth = np.deg2rad([0, 30, 90, 130]), 1.5, swing
     s = mg.solve(m, {"swing.Rz": mg.Motion(q, velocity=rate, acceleration=growth)})
     out = np.column_stack([np.cos(q), np.sin(q), np.zeros(4)])
     ahead = np.column_stack([-np.sin(q), np.cos(q), np.zeros(4)])
-    np.testing.assert_allclose(s["swing"].effort[:, 5], mass * wide**2 / 3 * growth + 6 * rate, rtol=1e-10)
+    np.testing.assert_allclose(s["swing"].effort[:, -1], mass * wide**2 / 3 * growth + 6 * rate, rtol=1e-10)
     # sideways: the weight's lever over the distance; m a at mid-height 0.8 above the lower hinge, half to each
     pull, thrust = -mass * rate**2 * wide / 2, mass * growth * wide / 2
     lever = mass * G * wide / 2 / apart
     share = (middle[2] - low[2]) / apart
+    if drawn.planar:  # the two hinges are one pin twice: together they pull the door round
+        s = mg.solve(m, {"swing.Rz": mg.Motion(q, velocity=rate, acceleration=growth)}, redundant="minimum_norm")
+        hinges = drawn.inside(s, "upper hinge") + drawn.inside(s, "lower hinge")
+        np.testing.assert_allclose(hinges, (pull * out + thrust * ahead)[:, :2], rtol=1e-10)
+        return
     np.testing.assert_allclose(s["upper hinge"].force, (share * pull - lever) * out + share * thrust * ahead, atol=1e-8)
     lower = ((1 - share) * pull + lever) * out + (1 - share) * thrust * ahead + mass * G * Z
     np.testing.assert_allclose(s["lower hinge"].force, lower, atol=1e-8)
 
 
-def test_coupled_rods() -> None:
+@both
+def test_coupled_rods(drawn: Drawn) -> None:
     """Two wheels of a locomotive, the rods of a piston and between them: the first wheel's pin feels both."""
     crank, long, base, brake = 0.3, 1.8, 1.5, np.array([900.0, 1400.0])
     start = np.deg2rad(35)
@@ -537,7 +595,7 @@ def test_coupled_rods() -> None:
         mg.Pair("piston", "P", "frame", "piston", point=head, axis=X),
     ]
     loads = [mg.Effort("axle1", -brake[0]), mg.Effort("axle2", -brake[1])]
-    m = mg.Mechanism("coupled rods", pairs=pairs, drives=["axle1"], loads=loads)
+    m = drawn.made(mg.Mechanism("coupled rods", pairs=pairs, drives=["axle1"], loads=loads))
     angles = np.deg2rad([35, 70, 100, 145, 220, 310])
     s = mg.solve(m, {"axle1": angles - start}, actuate=["piston"])
     np.testing.assert_allclose(s["axle2"].position[:, 0], angles - start, atol=1e-9)
@@ -546,11 +604,11 @@ def test_coupled_rods() -> None:
         head = flat(pin[0] - np.sqrt(long**2 - pin[2] ** 2), 0)
         pull = brake[1] / moment(pin, X)  # the coupling rod along x turns the second wheel against its brake
         push = (brake[0] + brake[1]) / moment(pin, unit(pin - head))
-        np.testing.assert_allclose(s["pin2"].force[k, [0, 2]], [pull, 0], rtol=1e-8, atol=1e-6)
+        np.testing.assert_allclose(drawn.inside(s, "pin2")[k], [pull, 0], rtol=1e-8, atol=1e-6)
         by_hand = -push * unit(pin - head)
-        np.testing.assert_allclose(s["big end"].force[k, [0, 2]], by_hand[[0, 2]], rtol=1e-8, atol=1e-6)
+        np.testing.assert_allclose(drawn.inside(s, "big end")[k], by_hand[[0, 2]], rtol=1e-8, atol=1e-6)
         assert s["piston"].effort[k, 0] == pytest.approx(-by_hand[0], rel=1e-8)
-        np.testing.assert_allclose(s["axle1"].force[k, [0, 2]], (by_hand + pull * X)[[0, 2]], rtol=1e-8, atol=1e-6)
+        np.testing.assert_allclose(drawn.inside(s, "axle1")[k], (by_hand + pull * X)[[0, 2]], rtol=1e-8, atol=1e-6)
 
 
 def test_screw_press() -> None:
@@ -564,6 +622,7 @@ def test_screw_press() -> None:
     loads = [WEIGHT, mg.ForceLaw("guide", law=mg.ForceTable(x=[-0.02, -0.01, 0], force=[force, 0, 0]))]
     ram = mg.Link("ram", mass, (0, 0, 0.5))
     m = mg.Mechanism("screw press", links(ram, pairs=pairs), pairs, ["nut"], loads)
+    stays_in_space(m)
     turns = np.array([0.0, -1.0, -2.5])
     s = mg.solve(m, {"nut": 2 * np.pi * turns})
     np.testing.assert_allclose(s["guide"].position[:, 0], lead * turns, atol=1e-12)
@@ -587,6 +646,7 @@ def test_bracket() -> None:
     m = mg.Mechanism(
         "bracket", links(beam, pairs=pairs), pairs, [], [WEIGHT, mg.Wrench("beam", force=load, point="end")]
     )
+    stays_in_space(m)
     s = mg.solve(m)
     pulls = unit(walls - end)
     # moments about the wall: at the end the ties take the load and half the weight, but for a push along the beam

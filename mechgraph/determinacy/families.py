@@ -88,6 +88,7 @@ def planar(twists: Array) -> MotionKind:
         normal = U[:, 2]
     normal = normal * np.sign(normal[np.argmax(np.abs(normal) > 1e-6)])
     normal = np.where(np.abs(normal) < RANKS.position, 0.0, normal)
+    normal /= np.linalg.norm(normal)
     across = skew(normal)[np.argsort(-np.linalg.norm(skew(normal), axis=1))[:2]]
     return MotionKind(
         "planar",
@@ -141,6 +142,21 @@ def kind_of_mechanism(freedoms: Freedoms, motion: FiniteMotion | None) -> Motion
     alike = np.abs(pins[:3].T @ pins[:3]) > 1 - RANKS.position
     candidates = (planar(pins[:, alike[np.argmax(alike.sum(axis=1))]]), spherical(pins))
     return next((replace(c, by_pairs=False) for c in candidates if _moves_so(c, freedoms, nearby)), kind)
+
+
+def plane_of_motion(freedoms: Freedoms, motion: FiniteMotion, normal: Array | None = None) -> Array | None:
+    """The normal of the plane to which the motions nearby are parallel, whatever the pairs could; the one given, if it is that.
+
+    Not given, it is the direction about which the pairs turn most.
+    """
+    if motion.closure_nearby is None:
+        return None
+    rows, motions = motion.closure_nearby.reduced.rows, motion.closure_nearby.motions
+    if normal is None:
+        some = rows.first_column[:-1][np.diff(rows.first_column) > 0]
+        normal = _principal(np.add.reduceat(rows.S[:3, :, None] * motions, some, axis=1).reshape(3, -1))[0][:, 0]
+    kind = planar(np.concatenate([normal, np.zeros(3)])[:, None])
+    return np.array(kind.place) if _moves_so(kind, freedoms, motion.closure_nearby) else None
 
 
 def _moves_so(kind: MotionKind, freedoms: Freedoms, nearby: ClosureRank) -> bool:

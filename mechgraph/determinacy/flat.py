@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.determinacy.families import kind_of_mechanism
+from mechgraph.determinacy.families import kind_of_mechanism, plane_of_motion
 from mechgraph.determinacy.finite_motion import finite_motion
 from mechgraph.determinacy.mobility import free_motion
 from mechgraph.errors import DeclarationError, listed
@@ -25,7 +25,7 @@ from mechgraph.memo import dataclass
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import SEATS, Marker, Pair, Stiffness
-from mechgraph.model.plane import dropped, lifted
+from mechgraph.model.plane import dropped, in_space, lifted
 from mechgraph.pairs.contact_types import row_of
 from mechgraph.pairs.factors import Component
 from mechgraph.pairs.pair_type import PairType
@@ -46,17 +46,18 @@ def to_planar(m: Mechanism, normal: Any = None) -> Mechanism:
 
 
 def _normal_of(m: Mechanism, normal: Any) -> Array:
-    """The normal of the plane in which a mechanism moves, pointing to the side of z; as given, where that is one."""
+    """The normal of the plane in which a mechanism moves, pointing to the side of z; of an upright plane, so that z becomes y and x grows."""
     where = f"to_planar of {m.name!r}"
     if normal is not None and not (is_numeric(normal, (3,)) and np.linalg.norm(normal) > 0):
         raise DeclarationError(where, [wrong(normal, "normal", "a direction of three numbers")])
     given = None if normal is None else np.asarray(normal, dtype=float) / np.linalg.norm(normal)
     if not m.has_geometry:
-        return UPRIGHT if given is None else given
+        return UPRIGHT if given is None else _seen_from_above(given)
     system, x = assembled(m)
     freedoms = free_motion(system, x, np.zeros(0, dtype=np.intp))
-    kind = kind_of_mechanism(freedoms, finite_motion(system, x, freedoms.closure, "auto"))
-    found = np.array(kind.place) if kind.name == "planar" else None
+    motion = finite_motion(system, x, freedoms.closure, "auto")
+    kind = kind_of_mechanism(freedoms, motion)
+    found = np.array(kind.place) if kind.name == "planar" else plane_of_motion(freedoms, motion, given)
     if found is None and given is not None and freedoms.mobility == 0:
         found = given
     if found is None or (given is not None and np.linalg.norm(np.cross(found, given)) > LEVEL):
@@ -64,8 +65,15 @@ def _normal_of(m: Mechanism, normal: Any) -> Array:
         raise DeclarationError(
             where, [f"{what}; expected a mechanism that moves in {'one' if given is None else 'that one'}"]
         )
-    found = found if found @ UPRIGHT >= -LEVEL else -found
-    return UPRIGHT if np.linalg.norm(np.cross(found, UPRIGHT)) <= LEVEL else found
+    return _seen_from_above(found)
+
+
+def _seen_from_above(n: Array) -> Array:
+    if np.linalg.norm(np.cross(n, UPRIGHT)) <= LEVEL:
+        return UPRIGHT
+    across = np.cross(UPRIGHT, n)
+    ahead = n[2] if abs(n[2]) > LEVEL else across[np.argmax(np.abs(across) > LEVEL)]
+    return np.asarray(n * np.sign(ahead))
 
 
 def _shown(vector: Array) -> str:
@@ -79,6 +87,11 @@ def _turn_to(n: Array) -> Array:
     axis, c = np.cross(n, UPRIGHT), float(n @ UPRIGHT)
     K = np.cross(np.eye(3), axis)  # the matrix of the product with the axis
     return np.asarray(np.eye(3) + K + K @ K / (1.0 + c))
+
+
+def _turn_of_plane(n: Array) -> Array:
+    """The rotation that makes a plane with the normal n x-y: z of an upright one becomes y, any other takes the least one."""
+    return np.stack([np.cross(UPRIGHT, n), UPRIGHT, n]) if abs(n[2]) <= LEVEL else _turn_to(n)
 
 
 class _End:
@@ -106,7 +119,7 @@ class _Flat:
 
     def made(self) -> Mechanism:
         """The planar mechanism."""
-        G = np.column_stack([_turn_to(self.normal), np.zeros(3)])
+        G = np.column_stack([_turn_of_plane(self.normal), np.zeros(3)])
         turned = self.m if np.array_equal(G[:, :3], np.eye(3)) else self.m.moved(G)
         ends = [_End(_turn_to(R[2]), R) for R in self._poses(turned)]
         place = turned.link_index
@@ -149,7 +162,7 @@ class _Flat:
         return np.asarray(user_poses(Configuration(system, x[:, None]))[:, 0, :3, :3])
 
     def _dropped(self, item: Any) -> Any:
-        made, lost = dropped(item)
+        made, lost = dropped(in_space(item))
         self.lost += lost
         return made
 

@@ -108,14 +108,12 @@ def _padded(value: Any, about: FieldFormat) -> Any:
         if array.ndim == 0 or array.shape[-1:] == (1,):
             one = array.reshape(*array.shape[:-1], 1)
             return plain(np.concatenate([np.zeros((*one.shape[:-1], 2)), one], axis=-1))
-        return value
-    if array.ndim and array.shape[-1] == 2:
+    elif array.ndim and array.shape[-1] == 2:
         return plain(np.concatenate([array, np.zeros((*array.shape[:-1], 1))], axis=-1))
-    if array.ndim and array.shape[-1] == 3 and array[..., 2].any() and about.kind is not DIRECTION:
-        size = np.abs(array).max(axis=-1, initial=0.0)
-        if (np.abs(array[..., 2]) <= ROUNDING * size).all():
-            array[..., 2] = 0.0
-            return plain(array)
+    if array.ndim and array.shape[-1] == 3 and about.kind is not DIRECTION:
+        off = array[..., :2] if about.normal else array[..., 2:]
+        if off.any() and (np.abs(off) <= ROUNDING * np.abs(array).max(axis=-1, keepdims=True)).all():
+            return plain(array * ((0, 0, 1) if about.normal else (1, 1, 0)) + 0.0)
     return value
 
 
