@@ -76,6 +76,7 @@ class Drawn:
 SPACE, PLANE = Drawn(False), Drawn(True)
 both = pytest.mark.parametrize("drawn", [SPACE, PLANE], ids=["space", "plane"])
 
+
 def stays_in_space(m: mg.Mechanism) -> None:
     """Of eight of the fourteen: no plane holds their motion, so that they have no planar twin."""
     with pytest.raises(mg.DeclarationError, match="does not move in a plane; expected a mechanism that moves in one"):
@@ -465,7 +466,9 @@ def test_excavator(drawn: Drawn) -> None:
     if drawn.planar:
         assert report.verdict.startswith("Determinate (planar): 2 drivers, 18 unknowns, 18 equations")
     else:
-        assert report.verdict.startswith("Moves with mobility 2, planar: all in-plane forces and driver efforts are unique")
+        assert report.verdict.startswith(
+            "Moves with mobility 2, planar: all in-plane forces and driver efforts are unique"
+        )
         assert report.redundancy == 6  # three for each of the two loops
 
     def state(angles: Array) -> tuple[Array, float]:

@@ -5,9 +5,11 @@ import warnings
 
 import numpy as np
 import pytest
+import scipy
 
 import mechgraph as mg
 from mechgraph.model import meshes as kinds
+from mechgraph.model.gear_facts import without_play
 from mechgraph.model.gears import LinePlaces
 
 X, Y, Z = np.eye(3)
@@ -482,16 +484,78 @@ def test_flanks_that_press_are_a_mesh_without_backlash(torque):
     np.testing.assert_allclose(other.coupling("m").normal_force[-1], tight.coupling("m").normal_force[-1], rtol=1e-9)
 
 
-def test_backlash_of_centers_that_move_is_refused_in_time():
-    pairs = [
-        mg.Pair("A", "R", "frame", "one", point=(0, 0, 0), axis=Z),
-        mg.Pair("P", "P", "frame", "slide", point=(0.0605, 0, 0), axis=X),
-        mg.Pair("B", "R", "slide", "two", point=(0.0605, 0, 0), axis=Z),
-    ]
-    gears = [g.replace(point=(x, 0, 0)) for g, x in zip(spur(), (0, 0.0605), strict=True)]
-    m = mg.Mechanism("m", pairs=pairs, gears=gears, couplings=[mg.Mesh("m", "a", "b", backlash=1e-4)])
-    with pytest.raises(mg.DeclarationError, match="leave backlash out, or hold the centers"):
-        mg.respond(m, [0.0, 0.1])
+def gear_on_a_slide(flank):
+    """A pinion and a wheel whose axis moves away and back on a spring; the pinion is let go so that its flanks part at first."""
+    d = 0.0605
+    gears = [g.replace(link=link, point=(x, 0, 0)) for g, link, x in zip(spur(), ("one", "two"), (0, d), strict=True)]
+    bodies = [("one", 1.0, 0, 1e-4), ("slide", 0.5, d, 1e-4), ("two", 1.0, d, 9e-4)]
+    return mg.Mechanism(
+        "slide",
+        [mg.Link("frame"), *(mg.Link(name, mass, (x, 0, 0), np.diag([i] * 3)) for name, mass, x, i in bodies)],
+        [
+            mg.Pair("A", "R", "frame", "one", point=(0, 0, 0), axis=Z),
+            mg.Pair("P", "P", "frame", "slide", point=(d, 0, 0), axis=X),
+            mg.Pair("B", "R", "slide", "two", point=(d, 0, 0), axis=Z),
+        ],
+        gears=gears,
+        couplings=[mg.Mesh("m", "a", "b", backlash=2e-4, restitution=0.7, flank=flank)],
+        loads=[mg.Effort("A", 0.3), mg.Effort("B", -0.2), mg.ForceLaw("P", law=lambda x, v, t: -2e5 * x - 5 * v)],
+    )
+
+
+@pytest.mark.parametrize(("flank", "sense"), [("auto", 1.0), ("backward", -1.0)])
+def test_flanks_part_and_strike_where_a_center_moves(flank, sense):
+    """Three bodies by a solver of their own between blows, the openings of both flanks by involutes at the distance of the moment."""
+    m, D, FULL_BASE = gear_on_a_slide(flank), 0.0605, np.array([0.02, 0.04]) * np.cos(FULL)
+    r = mg.respond(m, np.linspace(0, 0.0045, 3), rates={"A": -30.0 * sense, "B": 0.0, "P": 0.2})
+    inertia, k = np.array([1e-4, 1.5, 9e-4]), FULL_BASE.sum()
+    working = lambda x: np.arccos(k / (D + x))
+    inv = lambda a: np.tan(a) - a
+    gap = mg.mesh_facts(m)["m"].backlash * np.cos(working(0))
+
+    def opening(of):
+        """Of the flanks in front (1) or behind (-1): what teeth turn apart, and what the distance parts."""
+
+        def room(t, y):
+            parted = k * (inv(working(y[1])) - inv(working(0)))
+            return parted - of * (FULL_BASE @ y[[0, 2]]) + gap * (of != sense)
+
+        room.terminal, room.direction = True, -1
+        return room
+
+    rhs = lambda t, y: np.r_[y[3:], np.array([0.3, -2e5 * y[1] - 5 * y[4], -0.2]) / inertia]
+    y, t, flanks = np.array([0, 0, 0, -30.0 * sense, 0.2, 0.0]), 0.0, []
+    for event in r.events:
+        how = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14, "max_step": 3e-4}
+        free = scipy.integrate.solve_ivp(rhs, (t, 0.02), y, events=[opening(1), opening(-1)], **how)
+        of = 1 if free.t_events[0].size else -1
+        t, y = free.t[-1], free.y[:, -1].copy()
+        J = np.array([-of * FULL_BASE[0], np.sin(working(y[1])), -of * FULL_BASE[1]])
+        impulse = -1.7 * (J @ y[3:]) / (J @ (J / inertia))
+        y[3:] += J / inertia * impulse
+        np.testing.assert_allclose([event.t, event.impulse], [t, impulse], rtol=1e-7)
+        assert str(event).startswith("m.play.Tz" if of > 0 else "m.backward.play.Tz")
+        flanks.append(of)
+    assert {1, -1 if flank == "auto" else 1} <= set(flanks)
+    assert np.abs(r.energy.balance).max() < 1e-7 * r.energy.kinetic.max()
+
+
+@pytest.mark.parametrize("torque", [1.0, -1.0])
+def test_flanks_that_press_on_a_moving_center_are_a_mesh_without_backlash(torque):
+    """The flank of the load from the start: motion, forces of teeth and pairs; what is told of both flanks is one mesh."""
+    m, t = gear_on_a_slide("forward" if torque > 0 else "backward"), np.linspace(0, 0.01, 4)
+    loads = [mg.Effort("A", torque), mg.Effort("B", -torque)]
+    loose, tight = (
+        mg.respond(m.replace(couplings=[m.couplings[0].replace(backlash=j)]), t, loads=loads) for j in (2e-4, 0)
+    )
+    assert [event.t for event in loose.events if event.impulse > 0] == []
+    np.testing.assert_allclose(loose["P"].position, tight["P"].position, rtol=1e-7, atol=1e-12)
+    one, other = loose.coupling("m"), tight.coupling("m")
+    for what in ("force", "point", "normal_force", "effort"):
+        np.testing.assert_allclose(getattr(one, what), getattr(other, what), rtol=1e-6, atol=1e-9)
+    assert list(mg.over_time(loose).couplings) == list(mg.over_time(tight).couplings)
+    np.testing.assert_allclose(loose["A"].force, tight["A"].force, rtol=1e-6, atol=1e-9)
+    assert "m.backward" not in {c.name for c in without_play(loose.mechanism).couplings}
 
 
 # --- planets -----------------------------------------------------------------------------------------------------------------

@@ -46,7 +46,7 @@ def to_planar(m: Mechanism, normal: Any = None) -> Mechanism:
 
 
 def _normal_of(m: Mechanism, normal: Any) -> Array:
-    """The normal of the plane in which a mechanism moves, pointing to the side of z; of an upright plane, so that z becomes y and x grows."""
+    """The normal of the plane in which a mechanism moves, pointing to the side of z; of an upright one so that with z as y, x grows."""
     where = f"to_planar of {m.name!r}"
     if normal is not None and not (is_numeric(normal, (3,)) and np.linalg.norm(normal) > 0):
         raise DeclarationError(where, [wrong(normal, "normal", "a direction of three numbers")])

@@ -35,6 +35,8 @@ class LineRows:
         )
         first = system.first_column
         terms = [(i, k, step.sense) for i, step in steps for k in range(first[step.pair], first[step.pair + 1])]
+        self._on_ways = len(terms)
+        terms += [(i, self._column(c.play), -1.0) for i, c in enumerate(self.couplings) if c.play]
         rows, columns, senses = (np.array(part) for part in zip(*terms, strict=True))
         self._last: tuple[Array, bool, LinesAt] | None = None
         self._start_poses: Array | None = None
@@ -135,6 +137,8 @@ class LineRows:
             own = [LinePlaces(*(part[:, i : i + 1] for part in end)) for end in ends]
             more = c.whole_turns(at.along[:, i : i + 1], own[0], own[1], turned)
             period = c.period / self.system.par.L
+            if c.play:
+                out[i] -= turned(c.play)
             if more is not None:
                 out[i] += more / self.system.par.L
             elif np.isfinite(period):
@@ -143,10 +147,13 @@ class LineRows:
 
     def _gained(self, x: Array, x0: Array, name: str) -> Array:
         """By how much a freedom has grown since the start, ``(T,)``."""
-        s = self.system
-        pair, number = s.m.freedom(name)
-        row = s.single_rows[s.first_column[pair] + number]
+        row = self.system.single_rows[self._column(name)]
         return np.asarray((x[row] - x0[row]).real)
+
+    def _column(self, name: str) -> int:
+        """The column of a freedom."""
+        pair, number = self.system.m.freedom(name)
+        return int(self.system.first_column[pair]) + number
 
     def strayed(self, here: Any, tolerance: float) -> str | None:
         """Which shafts leave the places that a relation is about, by more than a tolerance (radians, lengths over L); None for none."""
@@ -171,10 +178,12 @@ class LineRows:
         return np.asarray(np.abs(self.residual(here)).max(axis=0))
 
     def _entries(self, here: Any, other: bool = False) -> Array:
-        """``s_j G . S_j`` for every freedom on the ways ``(K, T)``."""
+        """``s_j G . S_j`` for every freedom on the ways, -1 for those by which flanks part, ``(K, T)``."""
         rows, columns, senses = self._terms
         G = self.wrenches(here.poses, other)
-        return np.asarray(senses[:, None] * (G[:, rows] * here.S[:, columns]).sum(axis=0))
+        powers = (G[:, rows] * here.S[:, columns]).sum(axis=0)
+        powers[self._on_ways :] = 1.0
+        return np.asarray(senses[:, None] * powers)
 
     def jacobian(self, here: Any, other: bool = False) -> Array:
         """``J (n, F, T)``."""

@@ -243,24 +243,43 @@ def with_play(m: Mechanism) -> tuple[Mechanism, list[Stop]]:
     """The mechanism with the gap between the flanks of meshes with backlash as a freedom, ``m.play``, and the stops of these.
 
     The gap is that along the line of action: the backlash, of the distance and declared, by the part of a velocity along the pitch circle
-    that the line takes up. It begins closed, on the flank that is given, else forward.
+    that the line takes up. It begins closed, on the flank that is given, else forward. Where axes move, the lines of both flanks and the
+    gap go with them: the flanks behind have a row, a freedom ``m.backward.play`` and a stop of their own.
     """
-    pairs, links, couplings, stops = list(m.pairs), list(m.links), [], []
+    pairs, links, couplings, stops, loads = list(m.pairs), list(m.links), [], [], list(m.loads)
+
+    def freed(c: Mesh, name: str, flank: str, *ends: float | None) -> Mesh:
+        play = f"{name}.play"
+        links.append(Link(play))
+        pairs.append(Pair(play, "P", m.frame, play, point=(0.0, 0.0, 0.0), axis=(1.0, 0.0, 0.0)))
+        stops.append(Stop(f"{play}.Tz", *ends, restitution=c.restitution))
+        return c.replace(name=name, play=f"{play}.Tz", flank=flank)
+
     for c in m.couplings:
-        if isinstance(c, Mesh) and c.backlash > 0.0 and not c.play:
-            name, met = f"{c.name}.play", c.seen(m)
-            links.append(Link(name))
-            pairs.append(Pair(name, "P", m.frame, name, point=(0.0, 0.0, 0.0), axis=(1.0, 0.0, 0.0)))
-            line = met.flanks(True)[0](met.a, met.b, np.array(met.numbers)[:, None, None])
-            n, z, arm = (v[:, 0, 0] for v in (line.along, met.a.axis, line.point - met.a.point))
-            way = z if isinstance(met.one, GearRack) else np.cross(z, arm)
-            known = _facts(m, c).backlash
-            gap = (c.backlash if np.isnan(known) else known) * float(abs(n @ way) / np.linalg.norm(way))
-            ends = (-gap, 0.0) if c.flank == "backward" else (0.0, gap)
-            stops.append(Stop(f"{name}.Tz", *ends, restitution=c.restitution))
-            c = c.replace(play=f"{name}.Tz")
-        couplings.append(c)
-    return (m.replace(links=links, pairs=pairs, couplings=couplings) if stops else m), stops
+        if not isinstance(c, Mesh) or c.backlash == 0.0 or c.play:
+            couplings.append(c)
+            continue
+        met = c.seen(m)
+        line = met.flanks(True)[0](met.a, met.b, np.array(met.numbers)[:, None, None])
+        n, z, arm = (v[:, 0, 0] for v in (line.along, met.a.axis, line.point - met.a.point))
+        way = z if isinstance(met.one, GearRack) else np.cross(z, arm)
+        known = _facts(m, c).backlash
+        gap = (c.backlash if np.isnan(known) else known) * float(abs(n @ way) / np.linalg.norm(way))
+        low, high = (-gap, 0.0) if c.flank == "backward" else (0.0, gap)
+        if c.placed(m).linear:
+            couplings.append(freed(c, c.name, c.flank, low, high))
+            continue
+        behind = behind_of(c.name)
+        couplings += [freed(c, c.name, "forward", low), freed(c, behind, "backward", None, high)]
+        loads += [load.replace(of=behind) for load in m.loads if getattr(load, "of", None) == c.name]
+    if not stops:
+        return m, stops
+    return m.replace(links=links, pairs=pairs, couplings=couplings, loads=loads), stops
+
+
+def behind_of(name: str) -> str:
+    """The name of the row of the flanks behind, of a mesh with backlash whose axes move."""
+    return f"{name}.backward"
 
 
 def without_play(m: Mechanism) -> Mechanism:
@@ -268,10 +287,12 @@ def without_play(m: Mechanism) -> Mechanism:
     plays = {c.play.rpartition(".")[0]: c for c in m.couplings if isinstance(c, Mesh) and c.play == f"{c.name}.play.Tz"}
     if not plays:
         return m
+    behind = {behind_of(c.name) for c in plays.values()}
     return m.replace(
         links=[one for one in m.links if one.name not in plays],
         pairs=[one for one in m.pairs if one.name not in plays],
-        couplings=[c.replace(play="") if c in plays.values() else c for c in m.couplings],
+        couplings=[c.replace(play="") if c in plays.values() else c for c in m.couplings if c.name not in behind],
+        loads=[one for one in m.loads if getattr(one, "of", None) not in behind],
         drives=[one for one in m.drives if one.freedom.rpartition(".")[0] not in plays],
     )
 

@@ -108,7 +108,7 @@ class LineCoupling(BaseCoupling):
     from the poses. ``numbers``: its lengths. ``period``: by what its value grows from tooth to tooth, where the residue tells as much.
     ``other``: the relation of the other flank of teeth, which negative multipliers press on, its line reversed so that the sense of the
     relation stays. ``longer``: by how much the closed row is above its value at the start. ``turning``: which of both turn
-    about their axes; a rack slides along its own.
+    about their axes; a rack slides along its own. ``play``: a slide by whose growth the value of a closed row grows.
     """
 
     ends: tuple[LinkPlace, LinkPlace]
@@ -119,6 +119,7 @@ class LineCoupling(BaseCoupling):
     longer: float = 0.0
     linear: bool = False
     turning: tuple[bool, bool] = (True, True)
+    play: str = ""
     is_force = True
 
     @property

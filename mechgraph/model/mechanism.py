@@ -693,8 +693,9 @@ class Mechanism(DeclaredParts, Shown):
     def to_planar(self, normal: ArrayLike | None = None) -> Mechanism:
         """Return the planar mechanism of a spatial one that moves in a plane; ``description`` tells what is left out.
 
-        Points are moved into the plane along its normal, and the plane becomes x-y; z of an upright one becomes y. Forces along the normal, moments across it and
-        products of inertia with it are dropped. A pair that can leave the plane gives way to the one that holds the same in it (S to R).
+        Points are moved into the plane along its normal, and the plane becomes x-y; z of an upright one becomes y. Forces along the normal,
+        moments across it and products of inertia with it are dropped. A pair that can leave the plane gives way to the one
+        that holds the same in it (S to R).
         Coordinates of pairs keep their values.
 
         Parameters

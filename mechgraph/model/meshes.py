@@ -96,12 +96,12 @@ class Meshing(LineCoupling):
         if not m.has_geometry:
             return self._put(m, steps, self._sketched(m, steps) if plain else None)
         met = self.seen(m)
-        both = self.flank == "auto" or bool(self.play)
-        flanks = met.flanks(both or self.flank == "forward")
         ends, coefficients = (met.one.place, met.two.place), None
         if plain:
-            line = flanks[0](met.a, met.b, np.array(met.numbers)[:, None, None])
+            line = met.flanks(self.flank != "backward")[0](met.a, met.b, np.array(met.numbers)[:, None, None])
             coefficients = self._coefficients(m, steps, line, ends)
+        both = self.flank == "auto" or (bool(self.play) and coefficients is not None)
+        flanks = met.flanks(both or self.flank == "forward")
         if coefficients is not None and self.play:
             coefficients[m.full_name(self.play)] = -1.0
         known = {
@@ -246,15 +246,8 @@ class Mesh(Meshing):
             elif m.has_geometry and m.once(_placed_soundly):
                 found += self.seen(m).misfits(fitting_of(m))
                 if self.play and not found:
-                    found += [fault] if (fault := m.freedom_fault(self.play, single=True)) else self._play_faults(m)
+                    found += [fault] if (fault := m.freedom_fault(self.play, single=True)) else []
         return [where + fault for fault in found]
-
-    def _play_faults(self, m: Any) -> list[str]:
-        if self.placed(m).linear:
-            return []
-        return [
-            "its flanks part where both gears turn on pairs R about their axes, or slide on P; leave backlash out, or hold the centers"
-        ]
 
     def _met(self, m: Any) -> Meeting:
         """See ``Meshing``."""

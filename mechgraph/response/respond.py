@@ -723,7 +723,9 @@ def respond(
         task = replace(task, held=free_motion(system, x, columns, task.engine).passive)
     task = replace(task, library=library_for(system, task.loads, bool(task.held), engine))
     try:
-        dq = _rates_with_flanks(m, task, x, wanted_rates, begin, {stop.freedom: 0.0 for stop in flanks})
+        dq = _rates_with_flanks(
+            m, task, x, wanted_rates, begin, {one.freedom: 0.0 for one in flanks if 0.0 in (one.lower, one.upper)}
+        )
     except Stopped as stop:
         raise ResponseError(f"mechanism {m.name!r}: {stop}") from None
     standing = Rests.of(m, task, limits, bounces)

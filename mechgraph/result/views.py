@@ -16,6 +16,8 @@ from mechgraph.maths.tolerances import MOTIONS
 from mechgraph.memo import dataclass
 from mechgraph.model.belts import BeltCourse, BeltDrive
 from mechgraph.model.friction import WAYS, Friction, coupling_of
+from mechgraph.model.gear_facts import behind_of
+from mechgraph.model.meshes import Mesh
 from mechgraph.model.pair import Pair
 from mechgraph.model.short_forms import Belt
 from mechgraph.pairs.pair_type import PairType
@@ -424,6 +426,30 @@ class CouplingResult(Shown):
         return np.asarray(Vb[..., 3:] - Va[..., 3:] + np.cross(Vb[..., :3] - Va[..., :3], point))
 
 
+class FlanksResult(CouplingResult):
+    """Values of a mesh with backlash whose axes move: sums over the rows of its flanks, of which one at most presses, but for a jam."""
+
+    def __init__(self, values: Trajectory, index: int, behind: int) -> None:
+        super().__init__(values, index)
+        self._rows = CouplingResult(values, index), CouplingResult(values, behind)
+
+    def _sum(self, name: str) -> Array:
+        return np.asarray(sum(getattr(one, name) for one in self._rows))
+
+    effort = property(lambda self: self._sum("effort"), doc=CouplingResult.effort.__doc__)
+    force = property(lambda self: self._sum("force"), doc=CouplingResult.force.__doc__)
+    normal_force = property(lambda self: self._sum("normal_force"), doc=CouplingResult.normal_force.__doc__)
+    loss = property(lambda self: self._sum("loss"), doc=CouplingResult.loss.__doc__)
+    moment = property(lambda self: self._sum("moment"), doc=CouplingResult.moment.__doc__)
+
+    @property
+    def point(self) -> Array:
+        """The point ``(..., 3)`` at which it acts."""
+        first, other = self._rows
+        behind = other.normal_force > first.normal_force
+        return np.where(behind[..., None], other.point, first.point)
+
+
 def losses(values: Trajectory) -> dict[str, Array]:
     """Power lost in what rubs, by name, ``(...)``."""
     dry = {i: load.of for i, load in enumerate(values.loads) if isinstance(load, Friction)}
@@ -638,13 +664,19 @@ def geometry_of_couplings(values: Trajectory) -> Iterator[Fact]:
 
 
 def couplings_of(values: Trajectory) -> dict[str, CouplingResult | BeltResult]:
-    """What is told of every coupling, of a belt as a whole, by name."""
+    """What is told of every coupling, of a belt and of both flanks of teeth as a whole, by name."""
     found: dict[str, CouplingResult | BeltResult] = {}
-    for k, c in enumerate(values.whole.couplings):
-        belt = isinstance(c, BeltDrive)
-        name = c.belt if isinstance(c, BeltDrive) else c.name
-        if name not in found:
-            found[name] = BeltResult(values, name) if belt else CouplingResult(values, k)
+    places = {c.name: k for k, c in enumerate(values.whole.couplings)}
+    parting = [c.name for c in values.whole.couplings if isinstance(c, Mesh) and c.play]
+    behind = {places[other]: name for name in parting if (other := behind_of(name)) in parting}
+    for name, k in places.items():
+        c = values.whole.couplings[k]
+        if isinstance(c, BeltDrive):
+            found.setdefault(c.belt, BeltResult(values, c.belt))
+        elif k in behind:
+            found[behind[k]] = FlanksResult(values, places[behind[k]], k)
+        else:
+            found[name] = CouplingResult(values, k)
     return found
 
 
