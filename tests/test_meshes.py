@@ -718,7 +718,9 @@ def test_shafts_that_leave_their_places():
         mg.Pair("B", "R", "frame", "two", point=(0, 0.1, 0), axis=Y),
     ]
     m = mg.Mechanism("m", pairs=pairs, gears=gears, couplings=[mg.Mesh("m", "a", "b")], drives=["A.Rz", "A.Tz"])
-    with pytest.raises(mg.DeclarationError, match="need axes that keep their places"):
+    with pytest.raises(
+        mg.DeclarationError, match=r"axis on 'one' moves against .* by up to 0.01; it needs axes that keep their places"
+    ):
         mg.solve(m, {"A.Rz": [0.0, 0.5], "A.Tz": [0.0, 0.01]})
     free = m.replace(
         drives=[],
@@ -726,8 +728,49 @@ def test_shafts_that_leave_their_places():
     )
     held = free.replace(pairs=[mg.Pair("A", "R", "frame", "one", point=(0.1, 0, 0), axis=X), pairs[1]])
     assert mg.respond(held, [0.0, 0.01], rates={"A.Rz": 3.0}).t[-1] == 0.01
-    with pytest.raises(mg.DeclarationError, match="need axes that keep their places"):
+    with pytest.raises(mg.DeclarationError, match="it needs axes that keep their places"):
         mg.respond(free, [0.0, 0.01], rates={"A.Rz": 3.0, "A.Tz": 0.1})
+
+
+def tilting(what):
+    """A pinion, and a wheel or rack beside it on a cradle that tilts; two pulleys, one on a cradle that slides along its axis."""
+    x, wheel = (0.06, 0, 0), what in ("wheel", "pulley")
+    tilts = "P" if what == "pulley" else "R"
+    held = (
+        mg.Pair("B", "R", "cradle", "w", point=x, axis=Z)
+        if wheel
+        else mg.Pair("B", "P", "cradle", "w", point=(0, -0.02, 0), axis=X)
+    )
+    pairs = [
+        mg.Pair("A", "R", "frame", "p", point=(0, 0, 0), axis=Z),
+        mg.Pair("S", tilts, "frame", "cradle", point=x, axis=Z if tilts == "P" else X),
+        held,
+    ]
+    if what == "pulley":
+        pulley = {"teeth": 20, "pitch": 0.003}
+        gears = [mg.Pulley("a", "p", (0, 0, 0), Z, **pulley), mg.Pulley("b", "w", x, Z, **pulley)]
+        return mg.Mechanism(
+            "m", pairs=pairs, gears=gears, couplings=[mg.BeltDrive("m", over=["a", "b"])], drives=["A", "S"]
+        )
+    mates = {
+        "wheel": mg.Gear("b", "w", 40, x, Z, module=0.002),
+        "rack": mg.GearRack("b", "w", (0, -0.02, 0), X, Y, module=0.002),
+    }
+    gears = [mg.Gear("a", "p", 20, (0, 0, 0), Z, module=0.002), mates[what]]
+    return mg.Mechanism("m", pairs=pairs, gears=gears, couplings=[mg.Mesh("m", "a", "b")], drives=["A", "S"])
+
+
+@pytest.mark.parametrize(
+    ("what", "words"),
+    [
+        ("wheel", "by up to 5.73 degrees; it needs axes that stay parallel"),
+        ("rack", "by up to 5.73 degrees; it needs a rack that slides at right angles to the axis of its pinion"),
+        ("pulley", "by up to 0.1; it needs pulleys that stay in its plane"),
+    ],
+)
+def test_axes_that_do_not_stay_parallel_are_named(what, words):
+    with pytest.raises(mg.DeclarationError, match=f"the axis on 'w' moves against the other one, {words}"):
+        mg.kinematics(tilting(what), {"A": [0.0, 0.5], "S": [0.0, 0.1]})
 
 
 def rack(order=("a", "b"), force=5.0, helix=0.2, wheel=None):

@@ -19,7 +19,8 @@ import scipy
 
 from mechgraph.maths.se3 import Array, Index, cross, rotate
 from mechgraph.maths.tolerances import COMPLEX_STEP
-from mechgraph.model.gears import LineCoupling, LinePlaces, LinesAt, Relation
+from mechgraph.model.gears import LineCoupling, LinePlaces, LinesAt, Relation, dot
+from mechgraph.quantities import LENGTH, unit_of
 
 
 class LineRows:
@@ -161,16 +162,24 @@ class LineRows:
         assert self._start_poses is not None
         rows = np.arange(len(self.couplings))
         now, then = ([self._places(X, side, rows) for side in (0, 1)] for X in (here.poses, self._start_poses))
+        L, unit = float(self.system.par.L), unit_of(self.system.m.units, LENGTH)
         for i, c in enumerate(self.couplings):
             own = [LinePlaces(*(part[:, i : i + 1] for part in end)) for end in (*now, *then)]
-            off = c.strayed(*own)
-            worst = 0.0 if off is None else float(np.abs(off).max(initial=0.0))
-            if worst > tolerance:
-                links = " or ".join(repr(end.link) for end in c.ends)
-                return (
-                    f"coupling {c.name!r}: the axis of its gear on {links} moves against the other one, by up to {worst:.3g} (radians, or "
-                    "lengths over L); these gears need axes that keep their places: hold the shaft in bearings, or give cylindrical gears"
+            leans, off = (float(part.max(initial=0.0)) for part in c.strayed(*own))
+            if max(leans, off) > tolerance:
+                moved = [
+                    np.abs(
+                        [*(p.axis - p0.axis), *cross(p.point - p0.point, p0.axis), dot(p.point - p0.point, p0.axis)]
+                    ).max()
+                    for p, p0 in zip(own[:2], own[2:], strict=True)
+                ]
+                links = [repr(end.link) for end, by in zip(c.ends, moved, strict=True) if by > tolerance]
+                size = (
+                    f"{np.rad2deg(np.arcsin(min(leans, 1.0))):.3g} degrees"
+                    if leans > off
+                    else f"{off * L:.3g} {unit}".rstrip()
                 )
+                return f"coupling {c.name!r}: the axis on {' or '.join(links)} moves against the other one, by up to {size}; it needs {c.keeps}"
         return None
 
     def error(self, here: Any) -> Array:

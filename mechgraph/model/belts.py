@@ -443,6 +443,13 @@ class BeltDrive(LineCoupling):
             out += (w if place is b else -w) * 2 * np.pi * turns
         return out
 
+    keeps = "pulleys that stay in its plane: hold their shafts in bearings"
+
+    def strayed(self, a: LinePlaces, b: LinePlaces, a0: LinePlaces, b0: LinePlaces) -> tuple[Array, Array]:
+        """See ``LineCoupling``: the angle between the axes, and how far beside each other the pulleys move."""
+        lean, _ = super().strayed(a, b, a0, b0)
+        return lean, np.abs(dot(b.point - a.point, a.axis) - dot(b0.point - a0.point, a0.axis))
+
     def in_own_units(self, units: Mapping[str, str], turns: Sequence[bool]) -> Self:
         """See ``BaseCoupling``."""
         return self.without_quantities(units)

@@ -133,11 +133,15 @@ class LineCoupling(BaseCoupling):
         """
         return None
 
-    def strayed(self, a: LinePlaces, b: LinePlaces, a0: LinePlaces, b0: LinePlaces) -> Array | None:
-        """By how much ``(n, T)`` the places are out of those that its relation is about, radians and lengths, where they were ``a0, b0``
-        ``(3, n, 1)`` at the start; None where it holds wherever they are.
+    keeps: str = "axes that stay parallel: hold the shafts in bearings"
+    """What its relation is about, and what to do for it."""
+
+    def strayed(self, a: LinePlaces, b: LinePlaces, a0: LinePlaces, b0: LinePlaces) -> tuple[Array, Array]:
+        """Sines of angles and lengths ``(n, T)`` by which places are out of those that its relation is about, where they were ``a0, b0``
+        ``(3, n, 1)`` at the start.
         """
-        return None
+        lean = cross(a.axis, b.axis)
+        return np.sqrt(dot(lean, lean)), np.zeros(lean.shape[1:])
 
     def _put(self, m: Any, steps: tuple[MeshStep, ...], coefficients: Mapping[str, float] | None, **known: Any) -> Self:
         """The same with what it has in a mechanism; ``coefficients`` by freedom where the relation is linear."""

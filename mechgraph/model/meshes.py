@@ -140,18 +140,32 @@ class Meshing(LineCoupling):
             for step, (sign, power) in zip(steps, signs, strict=True)
         }
 
-    def strayed(self, a: LinePlaces, b: LinePlaces, a0: LinePlaces, b0: LinePlaces) -> Array:
-        """See ``LineCoupling``: the angle between the axes, and of those that cross their distance and where they are along them."""
+    @property
+    def keeps(self) -> str:  # type: ignore[override]
+        """See ``LineCoupling``."""
+        if self.relation in CROSSING.values():
+            return "axes that keep their places: hold the shaft in bearings, with its gear on their axis"
+        return "a rack that slides at right angles to the axis of its pinion" if self._racked else super().keeps
+
+    @property
+    def _racked(self) -> bool:
+        return self.relation in RACKED.values()
+
+    def strayed(self, a: LinePlaces, b: LinePlaces, a0: LinePlaces, b0: LinePlaces) -> tuple[Array, Array]:
+        """See ``LineCoupling``: of axes that cross their angle, their distance and where they are along them."""
+        if self._racked:
+            pinion, rack = (a, b) if self.turning[0] else (b, a)
+            off = np.hypot(dot(pinion.axis, rack.axis), dot(pinion.axis, rack.mark))
+            return off, 0.0 * off
         if self.relation not in CROSSING.values():
-            lean = cross(a.axis, b.axis) if self.relation in CYLINDRICAL.values() else 0.0 * a.axis
-            return np.asarray(np.sqrt(dot(lean, lean)))
+            return super().strayed(a, b, a0, b0)
         places = []
         for p, q in ((a, b), (a0, b0)):
             foot_a, foot_b, w = feet(p, q)
             apart = dot(q.point - p.point, w)
             places.append((dot(p.axis, q.axis), apart, dot(foot_a - p.point, p.axis), dot(foot_b - q.point, q.axis)))
-        found = [now - then for now, then, held in zip(*places, (True, True, *self.held), strict=True) if held]
-        return np.asarray(np.abs(found).max(axis=0))
+        lean, *found = [now - then for now, then, held in zip(*places, (True, True, *self.held), strict=True) if held]
+        return np.abs(lean), np.abs(found).max(axis=0)
 
     def in_own_units(self, units: Any, turns: Any) -> Self:
         """See ``BaseCoupling``."""
