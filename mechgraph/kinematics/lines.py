@@ -19,7 +19,7 @@ import scipy
 
 from mechgraph.maths.se3 import Array, Index, cross, rotate
 from mechgraph.maths.tolerances import COMPLEX_STEP
-from mechgraph.model.gears import LineCoupling, LinePlaces, LinesAt, Relation, dot
+from mechgraph.model.gears import LineCoupling, LinePlaces, LinesAt, Relation
 from mechgraph.quantities import LENGTH, unit_of
 
 
@@ -167,19 +167,15 @@ class LineRows:
             own = [LinePlaces(*(part[:, i : i + 1] for part in end)) for end in (*now, *then)]
             leans, off = (float(part.max(initial=0.0)) for part in c.strayed(*own))
             if max(leans, off) > tolerance:
-                moved = [
-                    np.abs(
-                        [*(p.axis - p0.axis), *cross(p.point - p0.point, p0.axis), dot(p.point - p0.point, p0.axis)]
-                    ).max()
-                    for p, p0 in zip(own[:2], own[2:], strict=True)
-                ]
-                links = [repr(end.link) for end, by in zip(c.ends, moved, strict=True) if by > tolerance]
-                size = (
-                    f"{np.rad2deg(np.arcsin(min(leans, 1.0))):.3g} degrees"
-                    if leans > off
-                    else f"{off * L:.3g} {unit}".rstrip()
+                moved = [np.abs(np.subtract(p[:2], p0[:2])).max() for p, p0 in zip(own[:2], own[2:], strict=True)]
+                names = " or ".join(
+                    repr(end.link) for end, by in zip(c.ends, moved, strict=True) if 2.0 * by > tolerance
                 )
-                return f"coupling {c.name!r}: the axis on {' or '.join(links)} moves against the other one, by up to {size}; it needs {c.keeps}"
+                size = (
+                    f"{np.rad2deg(np.arcsin(min(leans, 1.0))):.3g} degrees" if leans > off else f"{off * L:.3g} {unit}"
+                )
+                why = f"the axis on {names} moves against the other one, by up to {size.rstrip()}; it needs {c.keeps}"
+                return f"coupling {c.name!r}: {why}"
         return None
 
     def error(self, here: Any) -> Array:
