@@ -75,6 +75,25 @@ def test_a_plane_position_of_a_spatial_mechanism_is_no_plane_mechanism() -> None
     assert scene(mg.load("slider-crank")).normal is not None
 
 
+def test_points_on_one_line_lie_in_the_plane_in_which_things_turn_and_slide() -> None:
+    """A slider-crank stretched out is seen along its pins; with pins of two directions, or a slide along a pin, it is in space."""
+    x, y, z = np.eye(3)
+
+    def stretched(last_pin: np.ndarray, slide: np.ndarray) -> mg.Mechanism:
+        pairs = [
+            mg.Pair(k, "R", a, b, point=(i, 0, 0), axis=z)
+            for i, (k, a, b) in enumerate([("A", "frame", "u"), ("B", "u", "v")])
+        ]
+        pairs.append(mg.Pair("C", "R", "v", "w", point=(2, 0, 0), axis=last_pin))
+        return mg.Mechanism("m", pairs=[*pairs, mg.Pair("D", "P", "frame", "w", point=(3, 0, 0), axis=slide)])
+
+    flat = scene(stretched(z, x)).normal
+    assert flat is not None
+    assert np.allclose(flat, z)
+    for lost in (stretched(y, x), stretched(z, z), stretched(x, x)):
+        assert scene(lost).normal is None
+
+
 def test_symbols_follow_from_the_rows() -> None:
     """Guides where something slides, one drum a turn, balls where a rotation is kept, dashes where nothing touches: for every row alike."""
     roles = {}

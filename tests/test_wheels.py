@@ -350,12 +350,24 @@ def test_a_roller_runs_between_the_walls_of_its_groove() -> None:
         mg.Pair("K", "Rg", "barrel", "rod", curve=groove, point=(50, 0, 0)),
     ], drives=["A"])  # fmt: skip
     found = scene(mg.kinematics(m, {"A": np.linspace(0.1, 3.0, 4)}))
-    walls = parts(found, "wheel", "K")
+    (body,), (dark,) = parts(found, "wheel", "K"), parts(found, "dark", "K")
+    _, *walls, _ = dark.shape.lines
     assert len(walls) == 2
     for t in range(4):
         center = found.points["K", "rod"][t]
         for wall in walls:
-            assert away(center[None], found.vertices(wall, t))[0] == pytest.approx(6.0, rel=0.01)
+            assert away(center[None], found.vertices(dark, t)[list(wall)])[0] == pytest.approx(6.0, rel=0.03)
+    skin = np.concatenate([body.shape.vertices, dark.shape.vertices])
+    np.testing.assert_allclose(np.hypot(skin[:, 0], skin[:, 1]), 50.0, rtol=1e-6)
+    assert (skin[:, 2].min(), skin[:, 2].max()) == pytest.approx((-12.0, 32.0), abs=0.01)
+    areas = []
+    for shape in (body.shape, dark.shape):  # together the whole skin, no piece twice
+        corners = np.array([shape.vertices[list(face)] for face in shape.faces if len(face) == 4])
+        diagonals = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
+        areas.append(np.linalg.norm(np.cross(*diagonals), axis=1).sum() / 2)
+    assert sum(areas) == pytest.approx(2 * np.pi * 50 * 44, rel=1e-3)
+    points = groove.at(np.linspace(*groove.ends, 2001))[0]
+    assert areas[1] == pytest.approx(12.0 * np.linalg.norm(np.diff(points, axis=1), axis=0).sum(), rel=0.02)
 
 
 def test_a_shaft_goes_through_its_wheel_in_space() -> None:

@@ -24,6 +24,7 @@ from mechgraph.model.gear_facts import without_play
 from mechgraph.model.loads import Effort, Law, Wrench
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
+from mechgraph.pairs.cams import Groove
 from mechgraph.pairs.contact_types import is_open, takes_curves
 from mechgraph.pairs.curves import Travel, outside
 from mechgraph.pairs.travelling import Beside
@@ -40,6 +41,7 @@ from mechgraph.show.stage import (
     Label,
     Role,
     distinct,
+    is_groove,
     is_profile,
     slide_of,
     stretched,
@@ -233,10 +235,15 @@ def cams(stage: DrawnPose) -> Iterator[DrawnPart]:
             here = travel.at(_covered(stage, pair, link, travel))
             if wide and travel.is_plane and not curve.is_closed:
                 yield DrawnPart("wheel", pair.name, link, f"link:{link}", _slot(here.x.T, here.y.T, wide))
+            elif isinstance(curve, Groove):
+                skin = shapes.grooved(here.x.T, here.y.T, np.asarray(curve.center, dtype=float), curve.normal, wide)
+                for role, shape in zip(ON_GROOVED, skin, strict=True):
+                    yield DrawnPart(role, pair.name, link, f"link:{link}", shape)
             elif wide:
-                # a groove in space has its walls where it holds a roller, across its y; one that holds a ball is round
-                two = travel.is_plane or pair.type.component_names == ("Fy",)
-                walls = [shapes.polyline((here.x + side * here.y).T) for side in (-wide, wide)] if two else []
+                # a groove in space that holds a ball is round
+                walls = (
+                    [shapes.polyline((here.x + side * here.y).T) for side in (-wide, wide)] if travel.is_plane else []
+                )
                 yield from (DrawnPart("wheel", pair.name, link, f"link:{link}", wall) for wall in walls)
             else:
                 x = (here.x - (outside(curve) * curve.roller * here.y if curve.roller else 0.0)).T
@@ -245,12 +252,18 @@ def cams(stage: DrawnPose) -> Iterator[DrawnPart]:
                 yield DrawnPart("wheel" if filled else "face", pair.name, link, f"link:{link}", shape)
         if radius := pair.radius_b:
             turning = [j for j, line in enumerate(lines_of(pair.type, pair.pitch_per_radian)) if line.turns]
-            if len(turning) == 1:
+            if pair.type.component_names == ("Fy",):
+                shape = shapes.prism(32, radius, 0.0, radius)  # what stands out of its groove
+            elif len(turning) == 1:
                 axis = lines_of(pair.type, pair.pitch_per_radian)[turning[0]].direction
                 shape = shapes.prism(48, radius, -0.15 * stage.symbol, 0.15 * stage.symbol).along(axis)
             else:
                 shape = shapes.ball(radius)
             yield DrawnPart("roller", pair.name, "", f"pair:{pair.name}@{pair.type.f}", shape)
+
+
+ON_GROOVED: tuple[Role, Role] = ("wheel", "dark")
+"""The roles of a body with a groove around it, and of this."""
 
 
 def _covered(stage: DrawnPose, pair: Pair, link: str, travel: Travel) -> Array:
@@ -362,7 +375,8 @@ def pairs(stage: DrawnPose) -> Iterator[DrawnPart]:
         if stage.grounded(pair):
             yield _ground(stage, pair, lines, size)
         moved = stage.piston(pair) * slide_of(pair)
-        touches = len(takes_curves(pair.type)) > 1  # two bodies, which are drawn themselves
+        curves = takes_curves(pair.type)
+        touches = len(curves) > 1 or any(map(is_groove, curves))  # bodies, which are drawn themselves
         for e in symbol(pair.type, pair.pitch_per_radian, size, _strokes(stage, pair, lines, size)):
             if touches and e.role != "body":
                 continue

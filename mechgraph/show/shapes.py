@@ -280,6 +280,49 @@ def slab(outline: Array, normal: Array, half: float) -> Shape:
     return Shape(vertices, (*faces, *both, *sides), (loop, tuple(i + n for i in loop)))
 
 
+def grooved(x: Array, across: Array, center: Array, axis: Array, wide: float) -> tuple[Shape, Shape]:
+    """A body of revolution about an axis and the groove around it, along points ``x (n, 3)`` on its surface over whole turns, ``wide`` to
+    both sides along the unit vectors ``across (n, 3)``: one skin, so that neither hides the other.
+    """
+    columns, rows = 96, 4
+    d = x - center
+    z, d = d @ axis, d - np.outer(d @ axis, axis)
+    first, r = d[0] / np.linalg.norm(d[0]), np.linalg.norm(d, axis=1)
+    frame = np.column_stack([first, np.cross(axis, first), axis])
+    angle = np.unwrap(np.arctan2(d @ frame[:, 1], d @ first))
+    order = np.argsort(angle)
+    turns = max(round(float(np.ptp(angle)) / (2 * np.pi)), 1)
+    phi = np.linspace(0.0, 2 * np.pi, columns + 1)
+    at = phi + angle.min() + 2 * np.pi * np.arange(turns)[:, None]
+    middle = np.sort(np.interp(at, angle[order], z[order]), axis=0)
+    half = np.interp(at, angle[order], (wide / np.maximum(np.abs(across @ axis), 0.2))[order])
+    reach = z.min() - 2.0 * wide, z.max() + 2.0 * wide
+    cuts = np.stack([middle - half, middle + half], axis=1).reshape(2 * turns, -1)
+    ends = (np.full((1, columns + 1), end) for end in reach)
+    cuts = np.clip(np.maximum.accumulate(np.concatenate([next(ends), cuts, next(ends)]), axis=0), *reach)
+    levels, sunk = [], []
+    for k, (low, high) in enumerate(pairwise(cuts)):
+        n = 1 if k % 2 else rows
+        levels += [low + (high - low) * i / n for i in range(n)]
+        sunk += [bool(k % 2)] * n
+    height = np.array([*levels, cuts[-1]])
+    by_height = np.argsort(z)
+    rho = np.interp(height, z[by_height], r[by_height])
+    local = np.stack([rho * np.cos(phi + angle.min()), rho * np.sin(phi + angle.min()), height], axis=-1)
+    vertices, m = center + local.reshape(-1, 3) @ frame.T, columns + 1
+    quads = [
+        [(i * m + j, i * m + j + 1, (i + 1) * m + j + 1, (i + 1) * m + j) for j in range(columns)]
+        for i in range(len(sunk))
+    ]
+    body = [face for row, low in zip(quads, sunk, strict=True) for face in row if not low]
+    groove = [face for row, low in zip(quads, sunk, strict=True) for face in row if low]
+    rims = tuple(range(columns)), tuple(range(len(sunk) * m, len(sunk) * m + columns))
+    edges = [
+        tuple(range(i * m, (i + 1) * m)) for i in range(len(height)) if i in (0, len(sunk)) or sunk[i] != sunk[i - 1]
+    ]
+    return Shape(vertices, (*body, rims[0][::-1], rims[1])), Shape(vertices, tuple(groove), tuple(edges))
+
+
 def thread(radius: float, low: float, high: float, hand: float, turns: int = 3) -> Shape:
     """A ribbon that winds about z on a cylinder: the thread of a screw, right-hand for ``hand > 0``."""
     n = turns * ROUND

@@ -57,10 +57,12 @@ SOLID = {
 """Colors of the polygons of parts by their role; others have that of their link."""
 LINE_COLOUR = {"axis": INK, "spring": "#3e4c59", "load": LOAD, "drive": INK, "reaction": REACTION, "foot": MUTED}
 ABOVE = {
-    "wheel": 1.7, "strand": 1.9, "plate": 2.0, "foot": 2.1, "face": 2.2, "guide": 3.0, "spring": 5.0, "load": 6.0, "drive": 6.0,
+    "guide": 1.6, "wheel": 1.7, "strand": 1.9, "plate": 2.0, "foot": 2.1, "face": 2.2, "spring": 5.0, "load": 6.0, "drive": 6.0,
     "reaction": 6.5,
 }  # fmt: skip
 """Height of roles over others; links and symbols lie together at 4, sorted by depth."""
+SOLIDS = ("guide", "wheel", "strand", "foot")
+"""Roles that in space lie with the links and symbols, as one hides the other."""
 
 
 @door
@@ -238,8 +240,7 @@ class Drawing:
             vertices = self.scene.vertices(part, t)
             if np.isnan(vertices).any() or not part.scales[0] <= scale < part.scales[1]:
                 continue
-            # in space a shaft goes through its wheel
-            level = {} if self.scene.normal is None and part.role == "wheel" else ABOVE
+            level = {} if self.scene.normal is None and part.role in SOLIDS else ABOVE
             heights.setdefault(level.get(part.role, 4.0), []).append((part, vertices))
             if part.role in ("center", "point"):
                 self._mark(part, vertices)

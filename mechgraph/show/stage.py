@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from typing import Any, Literal
 
@@ -14,6 +14,7 @@ from mechgraph.model.loads import Gravity, Law
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Pair
 from mechgraph.pairs import pair_type as evaluation
+from mechgraph.pairs.cams import Groove
 from mechgraph.pairs.contact_types import is_open, takes_curves
 from mechgraph.pairs.curves import Travel, outside
 from mechgraph.pairs.travelling import AlongCurve, Beside
@@ -113,6 +114,7 @@ class DrawnPose:
             self.on(k.name, c) for k in m.links for c in (*k.points.values(), *([k.center] if k.mass > 0 else []))
         ]
         rims = [self.on(w.link, p) for w in self.wheels for p in w.extent()]
+        rims += [self.on(link, p) for pair in m.pairs for link, points in _profiles(pair) for p in points]
         self.everything = np.concatenate([*self.points.values(), *of_links, *rims])
         self.normal = self._plane()
         self.size = float(np.linalg.norm(np.ptp(self.everything, axis=0))) or 1.0
@@ -122,19 +124,22 @@ class DrawnPose:
         self.gravity = next((g for g in weights if g.any()), None)
 
     def _plane(self) -> Array | None:
-        """The normal of the plane of the mechanism: all points lie in it, and what can only turn does so about the normal."""
+        """The normal of the plane of the mechanism: all points lie in it, what can only turn does so about the normal, and what can only
+        slide does so across it. Points on one line lie in the plane about the normal of which things turn.
+        """
         if self.m.planar:
             return np.array([0.0, 0.0, 1.0])
-        normal = plane_normal(self.everything)
-        for pair in self.m.pairs:
-            if (
-                normal is not None
-                and pair.type.f == 1
-                and (line := lines_of(pair.type, pair.pitch_per_radian)[0]).turns
-            ):
-                axis = self.frames[f"pair:{pair.name}@0"][0, :, :3] @ line.direction
-                normal = normal if np.linalg.norm(np.cross(axis, normal)) < FLAT_THICKNESS else None
-        return normal
+        ways = [
+            (self.frames[f"pair:{pair.name}@0"][0, :, :3] @ line.direction, line.turns)
+            for pair in self.m.pairs
+            if pair.type.f == 1
+            for line in lines_of(pair.type, pair.pitch_per_radian)
+        ]
+        normal = plane_normal(self.everything, next((axis for axis, turns in ways if turns), None))
+        if normal is None:
+            return None
+        off = [np.linalg.norm(np.cross(way, normal)) if turns else abs(way @ normal) for way, turns in ways]
+        return normal if max(off, default=0.0) < FLAT_THICKNESS else None
 
     def _pair_frames(self, pair: Pair) -> list[Array]:
         """Frames 0, 1, ... of a pair ``(T, 3, 4)``."""
@@ -158,14 +163,15 @@ class DrawnPose:
     def corners(self, link: str) -> list[Array]:
         """What a link joins, in its own frame: points of the pairs that bear it, middles of its gears, and where springs hold it.
 
-        Not where something runs on its profile, which is drawn as such, nor where a guide of its own stands on the ground.
+        Not where something runs on its profile, which is drawn as such, nor where a guide of its own stands on the ground; of a body
+        with a groove around it the middle.
         """
         ends = (
             np.asarray(p.markers[k].point, dtype=float)
             + k * self.piston(p) * (p.markers[k].pose()[:, :3] @ slide_of(p))
             for p, k in self.ends_on.get(link, ())
             if not (
-                any(step.back == bool(k) and is_profile(p, step) for step in takes_curves(p.type))
+                any(step.back == bool(k) and (is_profile(p, step) or is_groove(step)) for step in takes_curves(p.type))
                 or (not k and self.grounded(p))
             )
         )
@@ -174,7 +180,13 @@ class DrawnPose:
         X = self.place.poses[link][0]
         held = ((self.held(load)[side][0] - X[:3, 3]) @ X[:3, :3] for load, side in sides)
         shafts = (w.at for w in self.wheels if w.link == link and link != self.m.frame)
-        return [*ends, *shafts, *held]
+        curves = (
+            (step.curve, p.b if step.back else p.a)
+            for p, _ in self.ends_on.get(link, ())
+            for step in takes_curves(p.type)
+        )
+        middles = (np.asarray(curve.center) for curve, own in curves if isinstance(curve, Groove) and own == link)
+        return [*ends, *shafts, *middles, *held]
 
     @cached_property
     def ends_on(self) -> dict[str, list[tuple[Pair, int]]]:
@@ -257,6 +269,11 @@ class DrawnPose:
         return np.column_stack([right, np.cross(up, right), up])
 
 
+def is_groove(step: AlongCurve) -> bool:
+    """Whether a curve is a groove around a body, in which a roller runs."""
+    return isinstance(step.curve, Groove)
+
+
 def is_profile(pair: Pair, step: AlongCurve) -> bool:
     """Whether a curve is the outline of a body that something runs on from outside."""
     curve = step.curve
@@ -264,6 +281,14 @@ def is_profile(pair: Pair, step: AlongCurve) -> bool:
         return False
     hollow = isinstance(curve, Beside) and curve.distance * outside(curve.base) < 0
     return not hollow and curve.once(Travel).is_plane
+
+
+def _profiles(pair: Pair) -> Iterator[tuple[str, Array]]:
+    """Points ``(n, 3)`` of the closed curves of a pair, on their links."""
+    for step in takes_curves(pair.type):
+        if step.curve is not None and step.curve.is_closed:
+            travel = step.curve.once(Travel)
+            yield pair.b if step.back else pair.a, travel.at(np.linspace(travel.begin, travel.end, 13)[:-1]).x.T
 
 
 def slide_of(pair: Pair) -> Array:
@@ -281,11 +306,20 @@ def distinct(points: Iterable[Array], tolerance: float) -> Array:
     return np.array(out).reshape(-1, 3)
 
 
-def plane_normal(points: Array) -> Array | None:
-    """The normal of the plane in which all points lie, its largest component positive; None where there is no such plane."""
+def plane_normal(points: Array, across: Array | None = None) -> Array | None:
+    """The normal of the plane in which all points lie, its largest component positive; None where there is no such plane.
+
+    Of points on one line it is the direction ``across``, where that is at right angles to the line.
+    """
     _, spread, Vt = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
-    flat = len(spread) > 2 and spread[2] <= FLAT_THICKNESS * spread[0] < spread[1]
-    return np.asarray(Vt[2] * np.sign(Vt[2][np.argmax(np.abs(Vt[2]))])) if flat else None
+    if len(spread) < 3 or spread[2] > FLAT_THICKNESS * spread[0]:
+        return None
+    normal = Vt[2]
+    if spread[1] <= FLAT_THICKNESS * spread[0]:
+        if across is None or not spread[0] or abs(Vt[0] @ across) > FLAT_THICKNESS:
+            return None
+        normal = across
+    return np.asarray(normal * np.sign(normal[np.argmax(np.abs(normal))]))
 
 
 def stretched(along: Array, at: Array, length: Array, width: Array) -> Array:
