@@ -163,12 +163,13 @@ def _() -> Iterator[Row]:
     twin = m.to_spatial()
     for engine in flat.ENGINES:
         seconds: dict[bool, list[float]] = {False: [], True: []}
-        for _ in range(5):
+        for _ in range(8):
             for one in (m, twin):
                 begin = time.process_time()
                 mg.solve(one, turn, engine=engine)
                 seconds[one is m].append(time.process_time() - begin)
-        yield f"time over spatial, {engine}: at most 1.2", 1.0, max(1.0, min(seconds[True]) / min(seconds[False])), 0.2
+        over = min(seconds[True]) / min(seconds[False])  # .93 sparse, .91 dense, .93 compiled
+        yield f"time over spatial, {engine}: at most 1.05", 1.0, max(1.0, over), 0.05
 
 
 # --- gears ---------------------------------------------------------------------------------------------------------------
