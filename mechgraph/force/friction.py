@@ -23,6 +23,7 @@ import numpy as np
 import scipy
 
 from mechgraph.errors import DeclarationError
+from mechgraph.kinematics.rates import Velocities
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.touching import ContactLines
 from mechgraph.maths.se3 import Array, Index, cross, skew
@@ -30,6 +31,7 @@ from mechgraph.maths.tolerances import MOTIONS, STRESSES
 from mechgraph.memo import dataclass
 from mechgraph.model.friction import Friction, Rubs, places_in
 from mechgraph.model.gear_facts import mean_sliding
+from mechgraph.pairs.contact_types import pressing
 
 OUTCOMES = ("ok", "jams", "no finite force", "friction not determined")
 """What becomes of a position, by number."""
@@ -86,6 +88,11 @@ def _freedoms(here: Configuration, k: int) -> slice:
 def _twist(here: Configuration, dq: Array, k: int) -> Array:
     """Twist ``(6, T)`` of link b of a pair relative to its link a."""
     return np.asarray(np.einsum("cft,ft->ct", here.S[:, _freedoms(here, k)], dq[_freedoms(here, k)]))
+
+
+def _passed_by(here: Configuration, dq: Array, way: tuple[tuple[int, float], ...]) -> Array:
+    """Twist ``(6, T)`` of the link at the end of a way of pairs, in these senses, relative to that at its beginning."""
+    return np.asarray(sum(sense * _twist(here, dq, k) for k, sense in way))
 
 
 def moving_rates(dq: Array, ddq: Array | float = 0.0) -> Array:
@@ -171,10 +178,21 @@ class _Rubbing:
         eye = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, self.T))
         return _rows(np.zeros((3, 3, self.T)), eye)
 
+    @property
+    def touches_in(self) -> int:
+        """The frame in which it touches, by its number."""
+        row = self.row
+        return next(iter(row.reactions or ())).frame if row.gap is None else row.gap
+
+    @property
+    def radius_b(self) -> float:
+        """Radius of what link b touches with, over L."""
+        return float(_or_zero(self.pair.radius_b)) / self.L
+
 
 def _touching(x: _Rubbing, rubs: Rubs) -> Place:
     """A point, or the center of pressure of a line, on the side of link b's curve to which the force points."""
-    c, r = x.frame(next(iter(x.row.reactions or ())).frame)[:, 3], _or_zero(x.pair.radius_b) / x.L
+    c, r = x.frame(x.touches_in)[:, 3], x.radius_b
     n, size = _unit(x.w[3:])
     c = c + cross(n, x.w[:3] - cross(c, x.w[3:])) / np.where(size > 0, size, np.inf)
     u, speed = _unit(x.twist[3:] + cross(x.twist[:3], c - r * n), x.rolls_below)
@@ -191,7 +209,8 @@ def _touching(x: _Rubbing, rubs: Rubs) -> Place:
 def _opening(x: _Rubbing, rubs: Rubs) -> Place:
     """A point that may open, which presses along the freedom in which it does."""
     assert x.row.gap is not None
-    at, n = x.frame(x.row.gap)[:, 3], x.S[3:, x.row.gap]
+    n = x.S[3:, x.row.gap]
+    at = x.frame(x.row.gap)[:, 3] - x.radius_b * n
     u, speed = _unit(x.twist[3:] + cross(x.twist[:3], at), x.rolls_below)
     pushes = x.place(_rows(np.zeros((1, 3, x.T)), n[None]), -x.mu(speed) * _force_at(at, u), speed)
     return replace(pushes, signed=True)
@@ -273,11 +292,10 @@ def _between_teeth(
     """Teeth on the flanks of signs ``(n, T)``: ``mu N`` against the sliding at the pitch point, or the couple ``mu N arm`` against the
     relative turn; with an efficiency as much of it as leaves that.
     """
-    s = here.system
-    g = next(g for g, c in enumerate(s.m.couplings) if c.name == load.of)
+    s, g = here.system, _coupling(here, load)
     push, P = lines.push(g, flank)
-    way = tuple((step.pair, step.sense) for step in s.m.couplings[g].steps)
-    twist = sum(sense * _twist(here, dq, k) for k, sense in way)
+    way = _way(here, load)
+    twist = _passed_by(here, dq, way)
     rounding, arm = MOTIONS.rounding * np.abs(twist).max(axis=0), mean_sliding(s.m, s.m.couplings[g])
     if arm is None:
         u, speed = _unit(twist[3:] + cross(twist[:3], P), rounding)
@@ -294,6 +312,85 @@ def _between_teeth(
     A = np.concatenate([np.zeros((3, here.T)), across])[None]
     preload = np.broadcast_to(load.preload / s.par.L, here.T)
     return Place(load.of, len(s.m.pairs) + g, way, A, -part * U, np.zeros((6, 1, here.T)), preload, speed)
+
+
+def _coupling(here: Configuration, load: Friction) -> int:
+    """The number of the coupling that rubs."""
+    return next(g for g, c in enumerate(here.system.m.couplings) if c.name == load.of)
+
+
+def _way(here: Configuration, load: Friction) -> tuple[tuple[int, float], ...]:
+    """The pairs that friction would pass through, in these senses: the pair that rubs, or those on the way between gears."""
+    m = here.system.m
+    if load.of in m.pair_index:
+        return ((m.pair_index[load.of], 1.0),)
+    return tuple((step.pair, step.sense) for step in m.couplings[_coupling(here, load)].steps)
+
+
+@dataclass(frozen=True)
+class Grip:
+    """What keeps bodies from sliding on each other where they touch, though they may roll: unit wrenches ``W (6, d, T)`` about the internal
+    origin on the second of the ``links``, by number, which would pass through the pairs ``way``, in these senses. The rates of what slides
+    are ``rows (d, F, T)`` times those of all freedoms. The place itself moves with the pair's link a and its freedoms ``before``, at ``at
+    (3, T)``; of teeth, which stand still, there is none.
+    """
+
+    load: Friction
+    links: tuple[int, int]
+    way: tuple[tuple[int, float], ...]
+    W: Array
+    at: Array
+    before: slice | None
+
+    @classmethod
+    def of(cls, here: Configuration, load: Friction) -> Grip:
+        """Where a pair touches, the forces along its tangents; of teeth couples, or forces at the pitch point."""
+        m, T = here.system.m, here.T
+        way, none = _way(here, load), np.zeros((here.system.n_freedoms, T))
+        if load.of not in m.pair_index:
+            g, directions = _coupling(here, load), np.broadcast_to(np.eye(3)[:, :, None], (3, 3, T))
+            gears = m.couplings[g].gears(m)
+            links = m.link_index[gears[0]], m.link_index[gears[1]]
+            if mean_sliding(m, m.couplings[g]) is not None:
+                return cls(load, links, way, _couple(directions), np.zeros((3, T)), None)
+            P = ContactLines(here).push(g, np.ones((len(m.couplings), T)))[1]
+            return cls(load, links, way, _force_at(P[:, None], directions), P, None)
+        x = _Rubbing(here, load, way[0][0], none, np.zeros((6, len(m.pairs), T)), True)
+        frame, first = x.frame(x.touches_in), _freedoms(here, x.k).start
+        row = x.row
+        push = row.freedoms[row.gap].twist[3:] if row.gap is not None else next(iter(row.reactions or ())).wrench[3:]
+        side = 1.0 if row.opens else pressing(row)
+        along = int(np.argmax(np.abs(push)))
+        n = side * push[along] * frame[:, along]
+        at, tangents = frame[:, 3] - x.radius_b * n, np.delete(frame[:, :3], along, axis=1)
+        links = m.link_index[x.pair.a], m.link_index[x.pair.b]
+        return cls(load, links, way, _force_at(at[:, None], tangents), at, slice(first, first + x.touches_in))
+
+    def rows(self, here: Configuration) -> Array:
+        """Rates ``(d, F, T)`` of what slides for unit rates of the freedoms."""
+        out = np.zeros((self.W.shape[1], here.system.n_freedoms, here.T))
+        for k, sense in self.way:
+            mine = _freedoms(here, k)
+            out[:, mine] = sense * np.einsum("cdt,cft->dft", self.W, here.S[:, mine])
+        return out
+
+    def bias(self, at: Velocities) -> Array:
+        """What sliding accelerates by ``(d, T)`` at constant rates at which nothing slides."""
+        here, p = at.here, self.at
+        out = np.einsum("cdt,ct->dt", self.W, sum(sense * at.bias[:, k] for k, sense in self.way))
+        if self.before is not None:
+            place = at.V[:, self.links[0]] + (here.S[:, self.before] * at.dq[self.before]).sum(axis=1)
+            turn = _passed_by(here, at.dq, self.way)[:3]
+            out += np.einsum("cdt,ct->dt", self.W[3:], cross(turn, place[3:] + cross(place[:3], p)))
+        return np.asarray(out)
+
+    def on_links(self, here: Configuration, sizes: Array) -> Array:
+        """Wrenches ``(6, N, ..., T)`` on the links of forces of sizes ``(d, ..., T)``."""
+        wrench = np.einsum("cdt,d...t->c...t", self.W, sizes)
+        out = np.zeros((6, len(here.system.m.links), *wrench.shape[1:]))
+        for link, sign in zip(self.links, (-1.0, 1.0), strict=True):
+            out[:, link] += sign * wrench
+        return out
 
 
 def _part_lost(load: Friction, U: Array, twist: Array, push: Array, screws: tuple[Array, Array]) -> Array:
@@ -335,6 +432,32 @@ class Rubbed:
     speeds: Array
     names: tuple[str, ...]
 
+    def with_grip(self, here: Configuration, grip: Grip, sizes: Array) -> Rubbed:
+        """With forces of sizes ``(d, T)`` that keep bodies from sliding beside it."""
+        g = None if grip.load.of in here.system.m.pair_index else _coupling(here, grip.load)
+        wrench, out = (
+            np.einsum("cdt,dt->ct", grip.W, sizes),
+            replace(self, **{n: getattr(self, n).copy() for n in _SUMS}),
+        )
+        out._pass(_passed_on(here, grip.way, wrench[:, None]), np.ones((1, here.T)), g is not None)
+        if g is not None:
+            out.rubbing[:, g] += wrench
+        return out
+
+    def _pass(self, parts: Passed, sizes: Array, teeth: bool) -> None:
+        """Add wrenches of sizes ``(n, T)`` on their way."""
+        for k, columns, own, held in parts:
+            part = np.einsum("fnt,nt->ft", own, sizes), np.einsum("cnt,nt->ct", held, sizes)
+            self.efforts[columns] += part[0]
+            self.taken[:, k] += part[1]
+            if teeth:
+                self.teeth[columns] += part[0]
+                self.beside[:, k] += part[1]
+
+
+_SUMS = ("efforts", "taken", "teeth", "beside", "rubbing")
+"""What is summed over all that rubs."""
+
 
 def rubbed(here: Configuration, places: Sequence[Place], base: Array, unit: dict[int, Array], stress: Array) -> Rubbed:
     """Solve for the normal forces; ``base (6, P, T)`` reactions without friction, ``unit`` those of a unit effort in freedoms, by column.
@@ -367,23 +490,17 @@ def rubbed(here: Configuration, places: Sequence[Place], base: Array, unit: dict
             outcome = np.where((outcome == 0) & unknown, OUTCOMES.index("friction not determined"), outcome)
     n, V = np.where(outcome > 0, np.nan, n) + preload, np.where(outcome > 0, np.nan, V)
     P, F = len(here.system.m.pairs), here.system.n_freedoms
-    efforts, teeth = np.zeros((2, F, T))
-    taken, beside = np.zeros((2, 6, P, T))
-    rubbing = np.zeros((6, len(here.system.m.couplings), T))
-    for t, place in enumerate(places):
-        mine = V[starts[t] : starts[t + 1]]
-        for parts, size in zip(split[t], (n[t : t + 1], mine), strict=True):
-            for k, columns, own, held in parts:
-                part = np.einsum("fnt,nt->ft", own, size), np.einsum("cnt,nt->ct", held, size)
-                efforts[columns] += part[0]
-                taken[:, k] += part[1]
-                if place.between_teeth(P):
-                    teeth[columns] += part[0]
-                    beside[:, k] += part[1]
-        if place.between_teeth(P):
-            rubbing[:, place.reads - P] += place.D * n[t] + np.einsum("cdt,dt->ct", place.K, mine)
     speeds, names = np.array([place.speed for place in places]), tuple(place.of for place in places)
-    return Rubbed(efforts, taken, n, outcome, factor, teeth, beside, rubbing, growth, speeds, names)
+    zeros = (np.zeros(shape) for shape in ((F, T), (6, P, T), (F, T), (6, P, T), (6, len(here.system.m.couplings), T)))
+    sums = dict(zip(_SUMS, zeros, strict=True))
+    out = Rubbed(normals=n, outcome=outcome, factor=factor, growth=growth, speeds=speeds, names=names, **sums)
+    for t, place in enumerate(places):
+        mine, teeth = V[starts[t] : starts[t + 1]], place.between_teeth(P)
+        for parts, size in zip(split[t], (n[t : t + 1], mine), strict=True):
+            out._pass(parts, size, teeth)
+        if teeth:
+            out.rubbing[:, place.reads - P] += place.D * n[t] + np.einsum("cdt,dt->ct", place.K, mine)
+    return out
 
 
 def rests(

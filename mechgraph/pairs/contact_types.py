@@ -656,7 +656,9 @@ def contact_faults(pair: Any, where: str) -> Iterator[str | None]:
         yield f"{where}gap = {shown(pair.gap)}: the contact stays closed; give its restitution too"
     form, given = pair.type.touching, {"radius": pair.radius, "hertz": pair.hertz}
     if form is None:
-        said = [name for name, value in given.items() if value is not None]
+        said = [
+            name for name, value in given.items() if value is not None and not (name == "radius" and pair.type.opens)
+        ]
         said += ["closed"] if isinstance(pair.closed, str) and pair.closed == "force" else []
         if said:
             have = ", ".join(symbol for symbol, row in {**TABLE, **ROWS}.items() if row.touching)

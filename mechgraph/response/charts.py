@@ -351,7 +351,7 @@ class ChartStage:
         self._sizes = len(x), len(dq)
         self._last = _Known(t, np.concatenate([x, dq, np.zeros_like(dq)]), *self._sizes)
         self._path = [self._last]
-        self._ways = [task.loads.ways if task.loads.ways is None else task.loads.followed(dq[:, None])[:, 0]]
+        self._ways = [self._followed(task.loads, x, dq)]
         self._of_time = tuple(load for some in (task.loads.stored, task.loads.rest) for load in some if load.of_time)
         self._kernel: KernelRates | None = None
         self.trouble: Stopped | None = None
@@ -410,6 +410,12 @@ class ChartStage:
         ways = None if self._ways[0] is None else np.stack([self._ways[i] for i in before])
         found = self._kernel.many(known, h, y[:-2].T, np.moveaxis(self.task.prescribed_at(t), -1, 0), ways)
         return None if found is None else found.T
+
+    def _followed(self, loads: Loads, x: Array, dq: Array) -> Array | None:
+        """The ways ``(F,)`` at a state; None without friction."""
+        if loads.ways is None:
+            return None
+        return loads.followed(Configuration(self.task.system, x[:, None]), dq[:, None])[:, 0]
 
     @property
     def _loads(self) -> Loads:
@@ -478,7 +484,7 @@ class ChartStage:
         self.trouble = None
         self._path.append(self._last)
         loads = self._loads
-        self._ways.append(None if loads.ways is None else loads.followed(self._last.dq[:, None])[:, 0])
+        self._ways.append(self._followed(loads, self._last.x, self._last.dq))
         return not self.chart.worn(*self._shape(), y[: self.n])
 
     def following(self, t: float, y: Array) -> ChartStage:
@@ -562,7 +568,7 @@ def trajectory_of(
             stuck = np.intersect1d(own.loads.stuck, held).astype(np.intp)
             forces.rubs.efforts[stuck] += (given - forces.given)[stuck]
         forces = replace(forces, given=given)
-        if len(own.loads.stuck) > len(np.intersect1d(own.loads.stuck, held)):
+        if own.loads.shared:
             forces = _undetermined(forces)
             out.mark(places, OUTCOMES[-1])
         out.put(BlockMotion(places, rates), forces)

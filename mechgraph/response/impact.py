@@ -33,6 +33,7 @@ from mechgraph.memo import dataclass
 from mechgraph.model.response_setup import Event, Occurrence, Stop
 from mechgraph.response.charts import Task
 from mechgraph.response.motion_equations import NO_INERTIA, ClosedChart, Moved, Stopped, accelerations, moved
+from mechgraph.response.rough import Rough
 
 
 @dataclass(frozen=True)
@@ -71,10 +72,10 @@ def evaluated(task: Task, t: Array, x: Array, dq: Array) -> tuple[Moved, Configu
 
 @dataclass(frozen=True)
 class FrictionCone:
-    """Friction of a closed limit in an impact: its place among those that are closed, the freedoms along it, the coefficient."""
+    """Friction of a closed limit in an impact: its place among those that are closed, what slides along it, the coefficient."""
 
     limit: int
-    columns: tuple[int, ...]
+    slides: Rough
     mu: float
 
 
@@ -111,7 +112,9 @@ class FreeEquations:
         self.columns = np.array([limit.column for limit in closed])
         self.sign = np.array([limit.sign for limit in closed])
         self.Z = found.columns.Z[..., 0]
-        G = self.sign[:, None] * self.Z[self.columns]
+        self.rows = np.zeros((len(closed), len(dq)))
+        self.rows[np.arange(len(closed)), self.columns.astype(np.intp)] = self.sign
+        G = self.rows @ self.Z
         # rate of a freedom for unit rates of the independent ones below which these do not move it
         self.moves = np.abs(G).max(axis=1, initial=0.0) > 1e-12
         self.impulse_to_rate = self._yielding(G)
@@ -151,27 +154,24 @@ class FreeEquations:
         if (~self.moves & self.hit).any():
             raise Stopped("a freedom is moved against its stop by prescribed motions alone, which no force can hold up")
         p = self._least(self.D, self.w + e * np.minimum(self.w, 0.0))
-        efforts = np.zeros(len(self.dq))
-        np.add.at(efforts, self.columns, self.sign * p)
-        return self._after(self.impulse_to_rate @ p, efforts)
+        return self._after(self.impulse_to_rate @ p, p @ self.rows)
 
     def struck_rough(self, e: Array, cones: Sequence[FrictionCone]) -> tuple[Array, float, Array]:
         """The same where some of what is closed rubs: by Poisson's law, compression and then expansion (see ``_phase``)."""
-        columns = np.concatenate([self.columns, *(one.columns for one in cones)]).astype(np.intp)
-        sign = np.append(self.sign, np.ones(len(columns) - len(self.sign)))
-        ends = np.cumsum([len(self.sign), *(len(one.columns) for one in cones)])
+        every = np.eye(len(self.dq))[..., None]
+        along = [one.slides.slides(self.here, every)[..., 0] for one in cones]
+        rows = np.concatenate([self.rows, *along])
+        ends = np.cumsum([len(self.sign), *map(len, along)])
         places = [
             (one.limit, np.arange(begin, end), one.mu)
             for one, begin, end in zip(cones, ends[:-1], ends[1:], strict=True)
         ]
-        G = sign[:, None] * self.Z[columns]
+        G = rows @ self.Z
         to_rate = self._yielding(G)
-        D, w, none = G @ to_rate, sign * self.dq[columns], np.zeros(len(self.sign))
+        D, w, none = G @ to_rate, rows @ self.dq, np.zeros(len(self.sign))
         first = _phase(D, w, none, places)
         p = first + _phase(D, w + D @ first, e * first[: len(e)], places)
-        efforts = np.zeros(len(self.dq))
-        np.add.at(efforts, columns, sign * p)
-        return self._after(to_rate @ p, efforts)
+        return self._after(to_rate @ p, p @ rows)
 
     def _after(self, change: Array, efforts: Array) -> tuple[Array, float, Array]:
         """Rates after a ``change (n,)`` of the independent ones, and the energy lost, with the impulses in the freedoms."""

@@ -127,8 +127,8 @@ def with_turns(height: Callable[[Array], Array], t: Array, h: Array) -> tuple[Ar
     near = np.flatnonzero(same & (size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])) + 1
     times, heights = [t], [h]
     for i in near.tolist():
-        # a height that does not change with its looks beside it does not turn
-        if size[i] == size[i - 1] == size[i + 1]:
+        # part of a height by which rounding changes it between looks: so far above zero it does not turn there
+        if max(size[i - 1], size[i + 1]) <= (1.0 + 1e-9) * size[i]:
             continue
         side = float(np.sign(h[i]))
         # part of a step to which the place of a turn is found; the height there is found to the square of it

@@ -36,7 +36,7 @@ The equations of motion by the compiled kernel, where it carries what moves (``k
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property, partial
 from types import SimpleNamespace
@@ -63,9 +63,11 @@ from mechgraph.maths.se3 import Array, Index, cross, rotate, rotate_back
 from mechgraph.maths.tolerances import PATH, RESPONSE
 from mechgraph.memo import dataclass
 from mechgraph.model.belts import pretensions
-from mechgraph.model.friction import rubbing_loads
+from mechgraph.model.friction import Friction, rubbing_loads
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.response.rolling import Rolling
+from mechgraph.response.rough import Rough, rough_freedoms
 
 
 class Stopped(Exception):
@@ -285,16 +287,19 @@ class Loads:
     """Loads by whether they have a potential energy; ``dry`` friction, which acts against the ``ways`` in which freedoms slip.
 
     ``ways (F,)`` or ``(F, T)``: rates of what slips, zero where nothing does, of any size; they tell the direction of what is about to
-    slip, and the side to which the freedoms of each of the ``rough`` ones, by their places, move. ``stuck`` are the freedoms that friction
-    holds. With ``ways`` loads are those of a motion with friction, without them friction is refused.
+    slip, and the side to which each of the ``rough`` ones slides. ``stuck`` are the freedoms that friction holds, ``rolls`` the friction
+    that keeps bodies from sliding on each other; ``shared``: whether several hold the same, and share the load as they like. With ``ways``
+    loads are those of a motion with friction, without them friction is refused.
     """
 
     stored: tuple[Load, ...]
     rest: tuple[Load, ...]
     dry: tuple[Any, ...] = ()
     ways: Array | None = None
-    rough: tuple[tuple[int, ...], ...] = ()
+    rough: tuple[Rough, ...] = ()
     stuck: tuple[int, ...] = ()
+    rolls: tuple[Friction, ...] = ()
+    shared: bool = False
 
     @classmethod
     def of(cls, m: Mechanism) -> Loads:
@@ -307,27 +312,28 @@ class Loads:
             dry,
         )
 
-    def followed(self, dq: Array) -> Array:
+    def followed(self, here: Configuration, dq: Array) -> Array:
         """The ways ``(F, T)`` at rates ``dq (F, T)``: where several freedoms slip as one, the way in which they move now."""
         assert self.ways is not None
         out = np.array(np.broadcast_to(self.ways.reshape(len(dq), -1), dq.shape))
-        for columns in (list(some) for some in self.rough if len(some) > 1):
-            slips = out[columns].any(axis=0) & dq[columns].any(axis=0)
-            out[columns] = np.where(slips, dq[columns], out[columns])
+        for one in self.rough:
+            columns = list(one.columns)
+            if len(columns) > 1:
+                slips = out[columns].any(axis=0) & ~one.rests(here, dq)
+                out[columns] = np.where(slips, dq[columns], out[columns])
         return out
 
-    def directions(self, dq: Array) -> Array:
+    def directions(self, here: Configuration, dq: Array) -> Array:
         """Rates ``(F, T)`` that tell where friction acts: those of freedoms that slip, on the side of their ways also where they have just
         passed zero, so that the equations of motion are smooth there; the ways where they are about to slip.
         """
         assert self.ways is not None
         ways = np.broadcast_to(self.ways.reshape(len(dq), -1), dq.shape)
         out = np.zeros_like(dq)
-        for columns in map(list, self.rough):
-            rates, way = dq[columns], ways[columns]
-            side = np.where((rates * way).sum(axis=0) < 0.0, -1.0, 1.0)
-            slow = np.abs(rates).max(axis=0) <= 1e-100
-            out[columns] = np.where(slow, 1e-100 * way, side * rates) * way.any(axis=0)
+        for one in self.rough:
+            columns, along = list(one.columns), (one.slides(here, dq) * one.slides(here, ways)).sum(axis=0)
+            side, way = np.where(along < 0.0, -1.0, 1.0), ways[columns]
+            out[columns] = np.where(one.rests(here, dq), 1e-100 * way, side * dq[columns]) * way.any(axis=0)
         return out
 
 
@@ -336,8 +342,8 @@ class Moved:
     """Rates and accelerations at a batch of states, with the power of loads and prescribed drivers.
 
     ``rates``; ``columns`` of the independent rates, with their masses, and the generalized ``force (n, T)``; ``power (T,)`` of prescribed
-    drivers and of the loads without a potential energy; the efforts ``held (p, T)`` of the prescribed freedoms; the friction that acts,
-    ``rubs``, if any; internal units.
+    drivers and of the loads without a potential energy; the efforts ``held (p + m, T)`` of the prescribed freedoms, and behind them the
+    forces of what rolls; the friction that acts, ``rubs``, if any; internal units.
     """
 
     rates: Rates
@@ -393,7 +399,14 @@ class Columns:
     only the others of them count, each with the passive motions that leave it at rest in these.
     """
 
-    def __init__(self, here: Configuration, f: FactoredClosure, n: int, held: Held | None = None) -> None:
+    def __init__(
+        self,
+        here: Configuration,
+        f: FactoredClosure,
+        n: int,
+        held: Held | None = None,
+        rolls: Sequence[Friction] = (),
+    ) -> None:
         self.here, self.f, self.n = here, f, n
         self.Z, self.Zp = np.split(f.sensitivity(), [n], axis=1)
         self.rest: PassiveMotions | None = None
@@ -401,6 +414,10 @@ class Columns:
             self.rest = rest = PassiveMotions(here, held.motions, self.Z[:, held.places])
             self.n = n - len(held.places)
             self.Z, self.Zp = (_at_rest(here, rest, Z) for Z in (np.delete(self.Z, held.places, axis=1), self.Zp))
+        self.rolling = Rolling(here, rolls, self.Z, self._moved_by) if rolls else None
+        if self.rolling is not None:
+            slid = self.rolling.held(np.einsum("mft,fpt->mpt", self.rolling.rows, self.Zp))[1]
+            self.Zp = self.Zp + np.einsum("fnt,npt->fpt", self.Z, slid)
 
     @cached_property
     def V(self) -> Array:
@@ -420,8 +437,27 @@ class Columns:
         by_freedom = efforts + self.here.tree_efforts(wrenches)
         return np.asarray((self.Z * by_freedom[:, None]).sum(axis=0))
 
+    def rolled(self, a: Array, bias: Array | float = 0.0) -> tuple[Array, Array]:
+        """Rates, or accelerations, ``(n, ..., T)`` at which nothing slides that rolls, ``bias (m, ..., T)`` apart, and the forces
+        ``(m, ..., T)`` that see to it.
+        """
+        if self.rolling is None:
+            return a, np.zeros((0, *a.shape[1:]))
+        forces, change = self.rolling.held(np.einsum("mnt,n...t->m...t", self.rolling.C, a) + bias)
+        return a + change, forces
+
+    def on_links(self, forces: Array) -> Array:
+        """Wrenches ``(6, N, ..., T)`` of forces ``(m, ..., T)`` of what rolls."""
+        if self.rolling is None:
+            return np.zeros((6, len(self.here.system.m.links), *forces.shape[1:]))
+        return self.rolling.on_links(forces)
+
+    def _moved_by(self, efforts: Array) -> Array:
+        """Accelerations ``(n, T)`` under efforts ``(F, T)`` alone, with nothing that rolls."""
+        return self.accelerations(np.zeros((6, len(self.here.system.m.links), self.here.T)), efforts)[0]
+
     def accelerations(self, wrenches: Array, efforts: Array) -> tuple[Array, Array]:
-        """See ``accelerations``; of many freedoms in the sparse form where every motion has inertia."""
+        """See ``accelerations``; of many freedoms in the sparse form where every motion has inertia. Nothing rolls in them."""
         if self.n * len(self.here.system.m.links) >= SPARSE_FROM:
             found = self.sparse_accelerations(wrenches, efforts)
             if found is not None:
@@ -448,7 +484,7 @@ class Columns:
         return -_momenta(here, here.link_twists((self.Z * a).sum(axis=1))[:, :, None])[:, :, 0]
 
     def yields(self, efforts: Array) -> Array:
-        """Inertia wrenches ``(6, N, k, T)`` with which the links yield to efforts ``(F, k, T)`` in the freedoms."""
+        """Wrenches ``(6, N, k, T)`` of inertia, and of what rolls, with which the links yield to efforts ``(F, k, T)`` in the freedoms."""
         nothing = np.zeros((6, len(self.here.system.m.links), self.here.T))
         if self.n * len(self.here.system.m.links) >= SPARSE_FROM:
             each = [self.accelerations(nothing, efforts[:, i])[0] for i in range(efforts.shape[1])]
@@ -457,7 +493,8 @@ class Columns:
             forces = np.einsum("fnt,fkt->nkt", self.Z, efforts)
             many = forces.reshape(self.n, forces.shape[1] * forces.shape[2])
             a = accelerations(np.tile(self.mass, efforts.shape[1]), many)[0].reshape(forces.shape)
-        return -_momenta(self.here, link_twists(self.here, np.einsum("fnt,nkt->fkt", self.Z, a)))
+        a, forces = self.rolled(a)
+        return self.on_links(forces) - _momenta(self.here, link_twists(self.here, np.einsum("fnt,nkt->fkt", self.Z, a)))
 
     def largest(self, wrenches: Iterable[Array], efforts: Iterable[Array]) -> float:
         """The largest part that a component of wrenches or of efforts has in a generalized force."""
@@ -465,15 +502,20 @@ class Columns:
         parts = [float(np.abs(by_wrenches * one).max(initial=0.0)) for one in wrenches]
         return max([*parts, *(float(np.abs(by_efforts * one).max(initial=0.0)) for one in efforts)], default=0.0)
 
-    def bound(self, dq: Array, ddq: Array | None = None) -> tuple[Velocities, Array, Array]:
-        """At rates ``dq (F, T)``, the independent ones constant: velocities, accelerations ``ddq`` of all freedoms, and the inertia."""
+    def bound(self, dq: Array, ddq: Array | None = None) -> tuple[Velocities, Array, Array, Array]:
+        """At rates ``dq (F, T)``, the independent ones constant, or as what rolls has it: velocities, accelerations ``ddq`` of all
+        freedoms, the inertia, and the forces ``(m, T)`` of what rolls.
+        """
         here, velocities = self.here, Velocities(self.here, dq)
         free = self.f.solve(-here.closure_bias(velocities.bias, velocities.V)[:, None])[:, 0]
         ddq = free if ddq is None else free + ddq
         if self.rest is not None:
             A = here.accelerations_with(ddq, velocities.bias)
             ddq = ddq + self.rest.still_at_rest(self.f, dq, velocities.V, velocities.bias, A)
-        return velocities, ddq, _inertia(here, velocities.V, here.accelerations_with(ddq, velocities.bias))
+        still, rolling = np.zeros((self.Z.shape[1], here.T)), self.rolling
+        own, forces = self.rolled(still, 0.0 if rolling is None else rolling.accelerations(velocities, ddq))
+        ddq = ddq if rolling is None else ddq + (self.Z * own).sum(axis=1)
+        return velocities, ddq, _inertia(here, velocities.V, here.accelerations_with(ddq, velocities.bias)), forces
 
 
 def applied(
@@ -502,10 +544,10 @@ def moved(closed: ClosedChart, v: Array, p: Array, loads: Loads, t: Array) -> Mo
     The factors as in ``Columns``.
     """
     here, held = closed.here, closed.held
-    columns = Columns(here, closed.f, len(v) + (0 if held is None else len(held.places)), held)
+    columns = Columns(here, closed.f, len(v) + (0 if held is None else len(held.places)), held, loads.rolls)
     Z, Zp = columns.Z, columns.Zp
-    dq = (Z * v).sum(axis=1) + (Zp * p[0]).sum(axis=1)
-    velocities, ddq, inertia = columns.bound(dq, (Zp * p[1]).sum(axis=1))
+    dq = (Z * columns.rolled(v)[0]).sum(axis=1) + (Zp * p[0]).sum(axis=1)
+    velocities, ddq, inertia, forces = columns.bound(dq, (Zp * p[1]).sum(axis=1))
     V, rough = velocities.V, loads.ways is not None
     (stored, by_stored), (rest, by_rest) = (
         applied(here, some, velocities, t, rough) for some in (loads.stored, loads.rest)
@@ -515,18 +557,21 @@ def moved(closed: ClosedChart, v: Array, p: Array, loads: Loads, t: Array) -> Mo
     left = np.abs(unopposed).max(initial=0.0)
     if left and left > RESPONSE.unopposed * columns.largest((stored, rest, inertia), (by_stored, by_rest)):
         raise Stopped(NO_INERTIA)
-    left_over, rubs = wrenches + columns.inertia_of(a), None
+    a, more_forces = columns.rolled(a)
+    forces = forces + more_forces
+    left_over, rubs = wrenches + columns.inertia_of(a) + columns.on_links(forces), None
     if rough and loads.dry:
         problem = ForceProblem(here, left_over, efforts, np.zeros(0, dtype=np.intp), closed.f)
-        rubs = rubbed_in_motion(problem, loads.dry, loads.directions(dq), columns.yields)
-        more, _ = columns.accelerations(0.0 * wrenches, rubs.efforts)
-        a, by_rest, efforts = a + more, by_rest + rubs.efforts, efforts + rubs.efforts
-        left_over = left_over + columns.inertia_of(more)
+        rubs = rubbed_in_motion(problem, loads.dry, loads.directions(here, dq), columns.yields)
+        more, more_forces = columns.rolled(columns.accelerations(0.0 * wrenches, rubs.efforts)[0])
+        a, forces, by_rest, efforts = a + more, forces + more_forces, by_rest + rubs.efforts, efforts + rubs.efforts
+        left_over = left_over + columns.inertia_of(more) + columns.on_links(more_forces)
+        rubs = rubs if columns.rolling is None else columns.rolling.rubbing(rubs, forces)
     power = (V * rest).sum(axis=(0, 1)) + (dq * by_rest).sum(axis=0)
     held = -(Zp * (efforts + here.tree_efforts(left_over))[:, None]).sum(axis=0)
     power += (p[0] * held).sum(axis=0)
     rates = Rates(velocities, ddq + (Z * a).sum(axis=1), np.zeros(here.T))
-    return Moved(rates, columns, columns.force(wrenches, efforts), power, held, rubs)
+    return Moved(rates, columns, columns.force(wrenches, efforts), power, np.concatenate([held, forces]), rubs)
 
 
 def along_one(here: Configuration, f: FactoredClosure, loads: Loads) -> Array:
@@ -597,6 +642,8 @@ def cannot(system: System, loads: Loads, held: bool) -> str | None:
         return "passive freedoms are held at rest"
     if system.m.once(pretensions) and loads.dry:
         return "friction follows the pretension of a belt"
+    if any(one.rolls is not None for one in rough_freedoms(system, loads.dry)):
+        return "friction acts between bodies that may roll on each other, or teeth"
     if system.n_freedoms * len(system.m.links) >= SPARSE_FROM:
         return f"it has {system.n_freedoms} freedoms and {len(system.m.links)} links; expected fewer than {SPARSE_FROM} of the product"
     whys = (why_not_load(load, system.m) for load in (*loads.stored, *loads.rest))
@@ -638,7 +685,7 @@ class KernelRates:
         self.n, self._x0 = len(chart.free), np.ascontiguousarray(chart.x0)
         self._heads = np.full(F, -1, dtype=np.intc)
         for some in loads.rough:
-            self._heads[list(some)] = some[0]
+            self._heads[list(some.columns)] = some.columns[0]
         of_motion = library.mgk_motion
         of_motion.argtypes = [
             *[ctypes.c_void_p] * 3,

@@ -25,6 +25,8 @@ import scipy
 from mechgraph.force.friction import OUTCOMES, places_of
 from mechgraph.kinematics.assembly import closed_start
 from mechgraph.kinematics.prescribed import with_pairs_at
+from mechgraph.kinematics.rates import Rates
+from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import MOTIONS, RESPONSE
@@ -55,7 +57,7 @@ def read_stops(m: Mechanism, stops: Any, faults: list[str]) -> tuple[Stop, ...]:
 def with_contacts(m: Mechanism, stops: Iterable[Stop], tol: float) -> tuple[Mechanism, dict[str, float]]:
     """The mechanism with contacts that open, and with the coordinates of named points that have stops; where its gaps start."""
     gaps = {f"{pair.name}.gap": pair.gap for pair in m.pairs if pair.restitution is not None}
-    said: dict[str, Any] = {"restitution": None, "gap": 0.0, "closed": "", "hertz": None, "radius": None}
+    said: dict[str, Any] = {"restitution": None, "gap": 0.0, "closed": "", "hertz": None}
     pairs = [
         p if p.restitution is None else p.replace(type=p.type.opened(pressing(p.type.spatial or p.type)), **said)
         for p in m.pairs
@@ -74,14 +76,22 @@ def with_contacts(m: Mechanism, stops: Iterable[Stop], tol: float) -> tuple[Mech
 
 @dataclass(frozen=True, eq=False)
 class _Stuck:
-    """What rubs at rest and sticks and slips together: its ``columns``, and as many of these as move independently, ``free``, at their
-    places (in the user's units).
+    """What rubs at rest and sticks and slips together: its ``columns``, and as many of the rates in which it slides as are independent,
+    ``free``, of something by their places in it; those of freedoms at ``places`` (in the user's units).
     """
 
     of: tuple[Rough, ...]
     columns: tuple[int, ...]
-    free: tuple[int, ...]
+    free: tuple[tuple[Rough, int], ...]
     places: tuple[float, ...]
+
+    def slides(self, here: Configuration, rates: Array) -> Array:
+        """Sliding rates ``(free, ..., T)`` at rates ``(F, ..., T)``."""
+        return np.stack([one.slides(here, rates)[i] for one, i in self.free])
+
+    def accelerates(self, at: Rates) -> Array:
+        """Sliding accelerations ``(free, T)``."""
+        return np.stack([one.accelerates(at)[i] for one, i in self.free])
 
 
 class Moving(Protocol):
@@ -116,13 +126,16 @@ class _Held:
 class _Holding:
     """What holds freedoms at a time: limits that they rest on, what sticks; ``ways (F,)`` or ``(F, T)`` in which others slip.
 
-    ``held``: freedoms that stick and move independently, with their places; the others that stick stand still by these.
+    ``held``: freedoms that stick and move independently, with their places, ``rolls`` what rolls; the others that stick stand still by
+    these, and ``shared`` tells that there are such ones.
     """
 
     limits: tuple[Limit, ...] = ()
     stuck: tuple[_Stuck, ...] = ()
     ways: Array | None = None
     held: tuple[tuple[int, float], ...] = ()
+    rolls: tuple[Rough, ...] = ()
+    shared: bool = False
 
     def task(self, task: Task, at_rest: Sequence[str] = ()) -> Task:
         """What moves with these held; friction of the pairs ``at_rest`` is that at rest."""
@@ -131,8 +144,12 @@ class _Holding:
             dry = tuple(
                 replace(load, mu=load.coefficient_at_rest) if load.of in at_rest else load for load in loads.dry
             )
-            stuck = tuple(dict.fromkeys(column for one in self.stuck for column in one.columns))
-            task = replace(task, loads=replace(loads, dry=dry, ways=self.ways, stuck=stuck))
+            stuck = tuple(
+                {c: None for one in self.stuck for some in one.of if some.rolls is None for c in some.columns}
+            )
+            rolls = tuple(one.rolls for one in self.rolls if one.rolls is not None)
+            own = replace(loads, dry=dry, ways=self.ways, stuck=stuck, rolls=rolls, shared=self.shared)
+            task = replace(task, loads=own)
         if not self.columns:
             return task
         columns = np.append(task.columns, self.columns).astype(np.intp)
@@ -190,7 +207,7 @@ class Rests:
                     limit = Limit(stop, name, column, int(s.single_rows[column]), sign, float(value) / unit, contact)
                     limits.append(limit)
         rough = rough_freedoms(s, task.loads.dry)
-        task = replace(task, loads=replace(task.loads, rough=tuple(one.columns for one in rough)))
+        task = replace(task, loads=replace(task.loads, rough=rough))
         return cls(task, tuple(limits), rough)
 
     def faults(self, x: Array) -> list[str]:
@@ -238,7 +255,7 @@ class Rests:
         met = min((one for one in times if one is not None), default=None)
         self._leaving = None
         if self.rough:
-            met = self._turned(motion, looks, rates[0], met)
+            met = self._turned(motion, looks, x, rates[0], met)
             met = self._yielded(motion, looks, x, rates[0], met, apart)
         return met
 
@@ -248,22 +265,23 @@ class Rests:
         sign = np.array([[one.sign] for one in held])
         return np.asarray((sign * motion.efforts_held(times)[first : first + len(held)]).min(axis=0))
 
-    def _turned(self, motion: Moving, looks: Array, rates: Array, met: float | None) -> float | None:
+    def _turned(self, motion: Moving, looks: Array, x: Array, rates: Array, met: float | None) -> float | None:
         """The first time at which what slips comes to rest, or turns back, if that is before another."""
         ways = self.holding.ways
         assert ways is not None
         noise = RESPONSE.lowest * max(np.abs(rates[list(one.columns)]).max() for one in self.rough)
+        here = Configuration(self.task.system, x)
         for one in self.rough:
-            columns = list(one.columns)
+            columns, slides = list(one.columns), one.slides(here, rates)
             if self._is_open(one, self.holding):
                 continue
             if ways[columns].any():
                 # of several freedoms the way as the step begins: it may turn on and on
-                way = rates[columns, 0] if len(columns) > 1 else ways[columns]
+                way = slides[:, 0] if len(columns) > 1 else ways[columns]
                 way = way / (np.linalg.norm(way) or 1.0)
-                found = _first_below(partial(_rate, motion, columns, way), looks, way @ rates[columns], noise)
+                found = _first_below(partial(_rate, motion, self.task, one, way), looks, way @ slides, noise)
             elif not self.holding.sticks(one) and not set(columns) <= set(self.holding.columns):
-                moves = np.flatnonzero(np.abs(rates[columns]).max(axis=0) > noise)
+                moves = np.flatnonzero(np.abs(slides).max(axis=0) > noise)
                 found = float(looks[moves[0]]) if moves.size else None
             else:
                 continue
@@ -304,8 +322,15 @@ class Rests:
         return met
 
     def _motions(self, holding: _Holding, held: Moved) -> Array:
-        """Rates ``(F, k, T)`` of all freedoms for unit rates of those that stick, in the state in which they do."""
-        return held.columns.Zp[:, len(self.task.columns) + len(holding.limits) :]
+        """Rates ``(F, k, T)`` of all freedoms for unit rates of those that stick, and of what rolls, in the state in which they do."""
+        columns = held.columns
+        B, rolling = columns.Zp[:, len(self.task.columns) + len(holding.limits) :], columns.rolling
+        if rolling is None:
+            return B
+        slid = rolling.held(
+            -np.broadcast_to(np.eye(len(rolling.rows))[..., None], (*rolling.rows.shape[:1] * 2, B.shape[-1]))
+        )[1]
+        return np.concatenate([B, np.einsum("fnt,nmt->fmt", columns.Z, slid)], axis=1)
 
     def _modes(self, holding: _Holding, held: Moved) -> list[tuple[_Stuck, ...]]:
         """What goes on to stick in every way in which something of what sticks may slip by itself.
@@ -313,10 +338,12 @@ class Rests:
         Where freedoms that stick depend on each other several have to slip at once: sets that move none of the others, and are not parts of
         larger ones, are those to which all that stands still by them belongs.
         """
-        sets, B = holding.stuck, self._motions(holding, held)[..., 0]
+        sets, B = holding.stuck, self._motions(holding, held)[..., :1]
+        here = held.columns.here.part(np.zeros(1, dtype=np.intp))
+        rows = [np.concatenate([some.slides(here, B)[..., 0] for some in one.of]) for one in sets]
 
         def rank(some: Sequence[int]) -> int:
-            return _rank([B[list(sets[i].columns)] for i in some])
+            return _rank([rows[i] for i in some])
 
         every = range(len(sets))
         # sets of which all parts are looked at
@@ -341,36 +368,44 @@ class Rests:
         friction, over its greatest one at rest. ``held``: the state in which all sticks, if it is known.
         """
         held = evaluated(holding.task(self.task), t, x, dq)[0] if held is None else held
-        first = len(self.task.columns)
+        first, here = len(self.task.columns), held.columns.here
         efforts, B = held.held[first:], self._motions(holding, held)
         freed = [one for some in holding.stuck if some not in kept for one in some.of]
-        columns, weights = [c for one in freed for c in one.columns], [w for one in freed for w in one.weights]
-        fixed = [c for some in kept for c in some.columns]
-        ways = np.zeros((len(dq), len(t)))
+        columns = [c for one in freed for c in one.columns]
+        slides = np.concatenate([one.slides(here, B) for one in freed])
+        fixed = [one.slides(here, B) for some in kept for one in some.of]
+        still = np.concatenate(fixed) if fixed else np.zeros((0, *B.shape[1:]))
+        weights, ways = [w for one in freed for w in one.weights], np.zeros((len(dq), len(t)))
         for i in range(len(t)):
-            N = _null(B[fixed, :, i])
-            moves = B[columns, :, i] @ N
+            N = _null(still[..., i])
+            moves = slides[..., i] @ N
             c = np.linalg.lstsq((moves.T * weights) @ moves, -(N.T @ efforts[len(holding.limits) :, i]), rcond=None)[0]
-            ways[columns, i] = moves @ c
+            ways[columns, i] = B[columns, :, i] @ N @ c
         size = np.abs(ways).max(axis=0)
         ways /= np.where(size > 0.0, size, 1.0)
         presses = [i for i, limit in enumerate(holding.limits) if limit.contact == freed[0].name]
-        places = [len(holding.limits) + i for i, (column, _) in enumerate(holding.held) if column in columns]
-        if presses and len(freed) == 1 and len(places) == len(columns):
+        alone = [len(holding.limits) + i for i, (column, _) in enumerate(holding.held) if column in columns]
+        if freed[0].rolls is not None:
+            before = [one.name for one in holding.rolls].index(freed[0].name) if freed[0] in holding.rolls else 0
+            begin = len(holding.limits) + len(holding.held) + sum(len(one.weights) for one in holding.rolls[:before])
+            alone = list(range(begin, begin + len(freed[0].weights)))
+        if presses and len(freed) == 1 and len(alone) == len(freed[0].weights):
             normal = holding.limits[presses[0]].sign * efforts[presses[0]]
             rubs = [load for load in self.task.loads.dry if load.of == freed[0].name]
             most = sum(load.coefficient_at_rest * (normal + load.preload / self.task.system.par.L) for load in rubs)
-            beyond = np.sqrt((efforts[places] ** 2).sum(axis=0)) - most
+            beyond = np.sqrt((efforts[alone] ** 2).sum(axis=0)) - most
             return np.asarray(beyond / (np.abs(efforts).sum(axis=0) + 1e-300)), ways
-        task = self._independent(replace(holding, stuck=(), held=()), B[..., 0], kept, ())
+        bare, one = replace(holding, stuck=(), held=(), rolls=(), shared=False), np.zeros(1, dtype=np.intp)
+        task = self._independent(bare, here.part(one), B[..., :1], kept, beside=False)
         assert task.ways is not None
-        loads = replace(self.task.loads, ways=task.ways).followed(dq)
+        loads = replace(self.task.loads, ways=task.ways).followed(here, dq)
         found, _ = evaluated(replace(task, ways=loads + ways).task(self.task, [one.name for one in freed]), t, x, dq)
         assert found.rubs is not None
         none = np.zeros((6, len(self.task.system.m.links), len(t)))
         slows = (found.columns.Z * found.columns.accelerations(none, found.rubs.efforts)[0]).sum(axis=1)
         largest = np.abs(slows).max(axis=0) + np.abs(found.rates.ddq).max(axis=0) + 1e-300
-        return np.nan_to_num((ways * found.rates.ddq).sum(axis=0) / largest, nan=-np.inf), ways
+        towards = sum((one.slides(here, ways) * one.accelerates(found.rates)).sum(axis=0) for one in freed)
+        return np.nan_to_num(towards / largest, nan=-np.inf), ways
 
     # --- at an event -----------------------------------------------------------------------------------------------------
 
@@ -414,11 +449,11 @@ class Rests:
             if one in blow or (one in now and one not in was.limits)
         ]
         found += [one.occurrence(t, False) for one in was.limits if one not in now]
-        return after, np.array([spent, 0.0, -lost]), first, [*found, *self._rubbing(t, was)]
+        return after, np.array([spent, 0.0, -lost]), first, [*found, *self._rubbing(t, x, was)]
 
     def _cones(self, closed: Sequence[Limit]) -> list[FrictionCone]:
         """The friction of what is closed."""
-        by_name = {one.name: one.columns for one in self.rough}
+        by_name = {one.name: one for one in self.rough}
         mu = {load.of: load.mu for load in self.task.loads.dry}
         return [
             FrictionCone(i, by_name[one.contact], mu[one.contact])
@@ -435,13 +470,14 @@ class Rests:
             ways[columns] = np.sign(dq[columns]) if len(columns) == 1 else dq[columns]
         return ways
 
-    def _rubbing(self, t: float, was: _Holding) -> Iterator[Occurrence]:
+    def _rubbing(self, t: float, x: Array, was: _Holding) -> Iterator[Occurrence]:
         """What became of what rubs; what is struck back does not count as reversed."""
         if was.ways is None or self.holding.ways is None:
             return
         names = self.task.system.m.freedom_names()
+        here = Configuration(self.task.system, x[:, None])
         for one in self.rough:
-            before, now = was.ways[list(one.columns)], self.holding.ways[list(one.columns)]
+            before, now = (one.slides(here, ways[:, None])[:, 0] for ways in (was.ways, self.holding.ways))
             sticks, stuck = self.holding.sticks(one), was.sticks(one)
             turned = one in self._rested and float(before @ now) < 0.0
             what = (
@@ -455,38 +491,39 @@ class Rests:
         """What holds freedoms from a time on, and the rates then: the first state that agrees with itself, the stillest ones first."""
         ways = self._ways(dq)
         assert ways is not None
-        found, _ = evaluated(_Holding(ways=ways).task(self.task), np.array([t]), x[:, None], dq[:, None])
-        Z, size = found.columns.Z[..., 0], float(np.nan_to_num(np.abs(found.rates.ddq)).max(initial=0.0))
+        found, here = evaluated(_Holding(ways=ways).task(self.task), np.array([t]), x[:, None], dq[:, None])
+        Z, size = found.columns.Z, float(np.nan_to_num(np.abs(found.rates.ddq)).max(initial=0.0))
         slow = []
         for one in self.rough:
             columns = list(one.columns)
             # rates that would end within the square of what counts as rest on a stop, of several freedoms, which pass zero at a distance,
             # within that
             lowest = RESPONSE.lowest ** (2 if len(columns) == 1 else 1)
-            if (dq[columns] ** 2).max() > 2.0 * lowest * size:
+            rates = dq[:, None]
+            if not one.rests(here, rates)[0] and (one.slides(here, rates) ** 2).max() > 2.0 * lowest * size:
                 continue
             ways[columns] = 0.0
-            if np.abs(Z[columns]).max(initial=0.0) > MOTIONS.still:
+            if np.abs(one.slides(here, Z)).max(initial=0.0) > MOTIONS.still:
                 slow.append(one)
-            elif np.abs(found.rates.ddq[columns, 0]).max() > MOTIONS.still * size:
+            elif np.abs(one.accelerates(found.rates)).max() > MOTIONS.still * size:
                 ways[columns] = found.rates.ddq[columns, 0]
         self._rested = tuple(slow)
-        sets = self._together(Z, slow, x)
+        sets = self._together(here, Z, slow, x)
         acts = found.rubs is None or not found.rubs.outcome[0]
         if acts and not sets and not resting:
             return _Holding(ways=ways), found.rates.dq[:, 0]
         # what is at rest is so exactly
-        still = self._independent(_Holding(ways=ways), Z, sets)
+        still = self._independent(_Holding(ways=ways), here, Z, sets)
         dq = evaluated(still.task(self.task), np.array([t]), x[:, None], dq[:, None])[0].rates.dq[:, 0]
-        at, why = _Instant(Z, sets, resting, size, np.array([t]), x[:, None], dq[:, None]), 0
+        at, why = _Instant(here, Z, sets, resting, size, np.array([t]), x[:, None], dq[:, None]), 0
         # states that are tried one after the other: 3^4, with as many stops
         few = len(sets) <= 4 and len(resting) <= 6
-        options = map(self._options, sets)
+        options = [self._options(here, one) for one in sets]
         states = (
             _State(ways, holds) for ways in product(*options) for holds in product((True, False), repeat=len(resting))
         )
         tries = iter(sorted(states, key=lambda one: one.motion)) if few else iter(())
-        state = next(tries) if few else _State(tuple(self._options(one)[0] for one in sets), (True,) * len(resting))
+        state = next(tries) if few else _State(tuple(some[0] for some in options), (True,) * len(resting))
         for count in range(81 * 64 if few else 50 * (len(sets) + len(resting))):
             holding, found = self._tried(ways, state, at)
             if found.rubs is not None and found.rubs.outcome[0]:
@@ -508,7 +545,7 @@ class Rests:
         """A state, with the ways of what moves already, and the accelerations in it."""
         limits = tuple(one for one, holds in zip(at.resting, state.holds, strict=True) if holds)
         sticks = [one for one, way in zip(at.sets, state.ways, strict=True) if not way]
-        holding = self._independent(_Holding(limits, ways=ways.copy()), at.Z, sticks)
+        holding = self._independent(_Holding(limits, ways=ways.copy()), at.here, at.Z, sticks)
         assert holding.ways is not None
         begin: list[_Stuck] = []
         for one, way in zip(at.sets, state.ways, strict=True):
@@ -526,7 +563,6 @@ class Rests:
 
     def _begun(self, holding: _Holding, begin: Sequence[_Stuck], at: _Instant) -> Array:
         """The ways with those in which something slips in several freedoms from rest: along the accelerations that they lead to."""
-        free = [column for one in begin for column in one.free]
         ends = np.cumsum([0, *(len(one.free) for one in begin)])
         assert holding.ways is not None
         ways = holding.ways
@@ -538,14 +574,14 @@ class Rests:
             return out
 
         def along(d: Array) -> Array:
-            found = at.moved(replace(holding, ways=put(d)).task(self.task))
-            a = np.nan_to_num(found.rates.ddq[free, 0])
-            return np.concatenate([part / (np.linalg.norm(part) or 1.0) for part in np.split(a, ends[1:-1])])
+            rates = at.moved(replace(holding, ways=put(d)).task(self.task)).rates
+            parts = [np.nan_to_num(one.accelerates(rates)[:, 0]) for one in begin]
+            return np.concatenate([part / (np.linalg.norm(part) or 1.0) for part in parts])
 
         def off(d: Array) -> Array:
             return d - along(d)
 
-        found = scipy.optimize.root(off, along(np.zeros(len(free))), tol=1e-13)
+        found = scipy.optimize.root(off, along(np.zeros(ends[-1])), tol=1e-13)
         return put(along(np.asarray(found.x)))
 
     def _amiss(self, state: _State, holding: _Holding, found: Moved, at: _Instant) -> _State | None:
@@ -556,9 +592,8 @@ class Rests:
         ways, holds = list(state.ways), list(state.holds)
         assert holding.ways is not None
         for i, (one, way) in enumerate(zip(at.sets, state.ways, strict=True)):
-            columns = list(one.free)
-            least = -slack if self._leaves(one) else slack
-            if way and not holding.ways[columns] @ a[columns] >= least * np.linalg.norm(holding.ways[columns]):
+            least, slips = -slack if self._leaves(one) else slack, one.slides(at.here, holding.ways[:, None])[:, 0]
+            if way and not slips @ one.accelerates(found.rates)[:, 0] >= least * np.linalg.norm(slips):
                 ways[i] = 0.0
         first = len(self.task.columns)
         efforts = found.held[first:, 0]
@@ -569,11 +604,11 @@ class Rests:
         )
         for i, limit in enumerate(at.resting):
             holds[i] = next(pushes) if state.holds[i] else not limit.sign * a[limit.column] >= -slack
-        for kept in self._modes(holding, found) if holding.held else ():
+        for kept in self._modes(holding, found) if holding.held or holding.rolls else ():
             beyond, slips = self._verge(holding, kept, at.t, at.x, at.dq, found)
             if beyond[0] > MOTIONS.still:
                 for i, some in enumerate(at.sets):
-                    way = slips[some.free[0], 0]
+                    way = some.slides(at.here, slips)[0, 0]
                     if not state.ways[i] and slips[list(some.columns)].any():
                         ways[i] = 1.0 if len(some.free) > 1 else float(np.sign(way))
         better = _State(tuple(ways), tuple(holds))
@@ -607,7 +642,7 @@ class Rests:
         efforts[column] = limit.sign
         rubs = [load for load in task.loads.dry if load.of == limit.contact]
         mine = s.pair_of_freedom == s.m.place_of_pair(limit.contact)
-        for place in places_of(here, task.loads.directions(dq[:, None]), press, rubs):
+        for place in places_of(here, task.loads.directions(here, dq[:, None]), press, rubs):
             efforts[mine] += np.einsum("cft,ct->ft", here.S[:, mine], place.D)
         a, _ = found.columns.accelerations(np.zeros((6, len(s.m.links), 1)), efforts)
         return float(limit.sign * found.rates.ddq[column, 0]), float(limit.sign * (found.columns.Z[column] * a).sum())
@@ -616,18 +651,18 @@ class Rests:
         """Whether it has just begun to slip."""
         return self._leaving is not None and bool(self._leaving[list(one.columns)].any())
 
-    def _options(self, one: _Stuck) -> tuple[float, ...]:
+    def _options(self, here: Configuration, one: _Stuck) -> tuple[float, ...]:
         """To stick, or to slip, of one freedom one way or the other; what has just begun to slip goes on."""
         if self._leaves(one):
             assert self._leaving is not None
-            return (float(np.sign(self._leaving[one.free[0]])) if len(one.free) == 1 else 1.0,)
+            return (float(np.sign(one.slides(here, self._leaving[:, None])[0, 0])) if len(one.free) == 1 else 1.0,)
         return (0.0, 1.0, -1.0) if len(one.free) == 1 else (0.0, 1.0)
 
-    def _together(self, Z: Array, slow: Sequence[Rough], x: Array) -> list[_Stuck]:
+    def _together(self, here: Configuration, Z: Array, slow: Sequence[Rough], x: Array) -> list[_Stuck]:
         """What is at rest, that of one freedom which moves in proportion as one that sticks."""
         s, out, left = self.task.system, [], list(slow)
         while left:
-            rows = [Z[list(one.columns)] for one in left]
+            rows = [one.slides(here, Z)[..., 0] for one in left]
             single = _rank(rows[:1]) == 1
             mine = [
                 one
@@ -635,35 +670,51 @@ class Rests:
                 if one is left[0] or (single and _rank([rows[0], own]) == 1)
             ]
             free: list[int] = []
-            for column in left[0].columns:
-                if _rank([Z[[*free, column]]]) > len(free):
-                    free.append(column)
-            places = [
-                float(x[s.single_rows[c]]) * (s.par.L if s.is_length[c] else 1.0) if s.single_rows[c] >= 0 else 0.0
-                for c in free
-            ]
+            for i in range(len(rows[0])):
+                if _rank([rows[0][[*free, i]]]) > len(free):
+                    free.append(i)
+            first, places = left[0], [0.0] * len(free)
+            for n, i in enumerate(free if first.rolls is None else ()):
+                c = first.columns[i]
+                row = s.single_rows[c]
+                places[n] = float(x[row]) * (s.par.L if s.is_length[c] else 1.0) if row >= 0 else 0.0
             columns = dict.fromkeys(column for one in mine for column in one.columns)
-            out.append(_Stuck(tuple(mine), tuple(columns), tuple(free), tuple(places)))
+            out.append(_Stuck(tuple(mine), tuple(columns), tuple((first, i) for i in free), tuple(places)))
             left = [one for one in left if one not in mine]
         return out
 
     def _independent(
-        self, holding: _Holding, Z: Array, sets: Sequence[_Stuck], beside: Sequence[int] | None = None
+        self, holding: _Holding, here: Configuration, Z: Array, sets: Sequence[_Stuck], *, beside: bool = True
     ) -> _Holding:
-        """The state in which sets stick, of which no contact is open: as many of their freedoms are held as move beside those of limits."""
-        used = [limit.column for limit in holding.limits] if beside is None else list(beside)
-        stuck, held = [], []
+        """The state in which sets stick, of which no contact is open: as many of their freedoms are held as move, ``beside`` those of
+        limits.
+        """
+        used = [Z[limit.column, :, 0] for limit in holding.limits] if beside else []
+        stuck, held, rolls, shared = [], [], [], False
         for one in sets:
             closed = tuple(some for some in one.of if not self._is_open(some, holding))
             if not closed:
                 continue
             columns = dict.fromkeys(column for some in closed for column in some.columns)
-            stuck.append(replace(one, of=closed, columns=tuple(columns)))
-            for column, place in zip(one.free, one.places, strict=True):
-                if rank_of(singular_values(Z[[*used, column]]), MOTIONS.still) > len(used):
-                    used.append(column)
-                    held.append((column, place))
-        return replace(holding, stuck=tuple(stuck), held=tuple(held))
+            free = one.free if one.free[0][0] in closed else ((closed[0], 0),)
+            stuck.append(replace(one, of=closed, columns=tuple(columns), free=free))
+            for (some, i), place in zip(free, one.places, strict=True):
+                row = some.slides(here, Z)[i, :, 0]
+                if rank_of(singular_values(np.stack([*used, row])), MOTIONS.still) == len(used):
+                    shared = True
+                    continue
+                used.append(row)
+                if some.rolls is None:
+                    held.append((some.columns[i], place))
+                elif some not in rolls:
+                    rolls.append(some)
+            taken = {column for column, _ in held}
+            shared |= any(
+                not taken >= set(some.columns) if some.rolls is None else some not in rolls for some in closed
+            )
+        return replace(
+            holding, stuck=tuple(stuck), held=tuple(held), rolls=tuple(rolls), shared=holding.shared or shared
+        )
 
 
 @dataclass(frozen=True)
@@ -689,10 +740,11 @@ class _State:
 
 @dataclass(frozen=True)
 class _Instant:
-    """Where a state is looked for: the motions ``Z (F, n)`` with nothing held, what is at rest, limits that are rested on, the size of
-    accelerations, time ``(1,)``, state ``(nx, 1)`` and rates ``(F, 1)``.
+    """Where a state is looked for: the place, the motions ``Z (F, n, 1)`` with nothing held, what is at rest, limits that are rested on,
+    the size of accelerations, time ``(1,)``, state ``(nx, 1)`` and rates ``(F, 1)``.
     """
 
+    here: Configuration
     Z: Array
     sets: Sequence[_Stuck]
     resting: Sequence[Limit]
@@ -703,7 +755,7 @@ class _Instant:
 
     def motion(self, one: _Stuck) -> Array:
         """Rates ``(columns, k)`` of a set for unit rates of those of its freedoms that move independently."""
-        return np.asarray(self.Z[list(one.columns)] @ np.linalg.pinv(self.Z[list(one.free)]))
+        return np.asarray(self.Z[list(one.columns), :, 0] @ np.linalg.pinv(one.slides(self.here, self.Z)[..., 0]))
 
     def moved(self, task: Task) -> Moved:
         """Accelerations of a task there."""
@@ -729,5 +781,6 @@ def _gap(motion: Moving, limit: Limit, t: Array) -> Array:
     return np.asarray(limit.sign * (motion.motion(t)[0][limit.row] - limit.value))
 
 
-def _rate(motion: Moving, columns: list[int], way: Array, t: Array) -> Array:
-    return np.asarray(way @ motion.motion(t)[1][0, columns])
+def _rate(motion: Moving, task: Task, one: Rough, way: Array, t: Array) -> Array:
+    x, rates = motion.motion(t)
+    return np.asarray(way @ one.slides(Configuration(task.system, x), rates[0]))

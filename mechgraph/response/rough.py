@@ -2,14 +2,20 @@
 
 A pair rubs along sliding velocities that are linear in the rates of its freedoms: a journal in its turn, a shaft that turns and slides in
 both at once, a ball in its three turns, a contact in the slides of its point. Friction acts against their direction. Where all of them are
-zero it holds, up to its greatest size.
+zero it holds, up to its greatest size. Bodies that touch at a place that moves on both of them slide as their points there do: where that
+is zero they roll.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from mechgraph.force.friction import Grip
+from mechgraph.kinematics.rates import Rates
+from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
+from mechgraph.maths.se3 import Array, Mask
+from mechgraph.maths.tolerances import MOTIONS
 from mechgraph.memo import dataclass
 from mechgraph.model.friction import (
     Friction,
@@ -29,25 +35,45 @@ from mechgraph.pairs.contact_types import OnSurface, takes_curves
 class Rough:
     """Freedoms that slip and stick together, by their places; the ``name`` of their pair or coupling.
 
-    ``weights``: squares of the arms at which they slide, lengths over L: the sum of weight times rate squared is that of the sliding speed.
+    What slides are the freedoms themselves, ``weights``: squares of the arms at which they do, lengths over L, so that the sum of weight
+    times rate squared is that of the sliding speed. Or, of bodies that ``roll`` on each other, and of teeth, it is what the place says at
+    which they touch (see ``force.friction.Grip``): there freedoms move on while nothing slides.
     """
 
     name: str
     columns: tuple[int, ...]
     weights: tuple[float, ...]
+    rolls: Friction | None = None
+
+    def slides(self, here: Configuration, rates: Array) -> Array:
+        """Sliding rates ``(d, ..., T)`` at rates ``(F, ..., T)`` of all freedoms."""
+        if self.rolls is None:
+            return np.asarray(rates[list(self.columns)])
+        return np.asarray(np.einsum("dft,f...t->d...t", Grip.of(here, self.rolls).rows(here), rates))
+
+    def rests(self, here: Configuration, rates: Array) -> Mask:
+        """Where ``(T,)`` nothing slides at rates ``(F, T)``: of what rolls, within their rounding."""
+        least = 0.0 if self.rolls is None else 100.0 * MOTIONS.rounding * np.abs(rates[list(self.columns)]).max(axis=0)
+        return np.asarray(np.abs(self.slides(here, rates)).max(axis=0) <= np.maximum(least, 1e-100))
+
+    def accelerates(self, at: Rates) -> Array:
+        """Sliding accelerations ``(d, T)`` where nothing slides."""
+        if self.rolls is None:
+            return np.asarray(at.ddq[list(self.columns)])
+        grip = Grip.of(at.here, self.rolls)
+        return np.asarray((grip.rows(at.here) * at.ddq).sum(axis=1) + grip.bias(at))
 
 
 def _rubbing_as_one(pair: Pair, load: Friction) -> list[list[int]] | str:
     """The freedoms of a pair, by their places in it, that slip together; or why that is not followed."""
     row = pair.type
     if rubs_as_contact(row):
-        if pair.radius_b is not None and any(f.turns for f in row.freedoms):
-            return (
-                "rolls on a radius, which is not followed in time; leave the radius of the pair, or the friction, out"
-            )
-        tilts = row.touching is not None and row.touching.tilting
-        if tilts or len(takes_curves(row)) > 1 or any(isinstance(step, OnSurface) for step in row.steps):
-            return f"touches at a place that moves on both links (type {row.symbol}), which is not followed in time; leave it out"
+        if _rolls(pair):
+            if row.touching is not None and len(row.touching.forces) > 1:
+                return "touches its groove on the side to which the force points, and does not roll there in time; leave the radius out"
+            if pair.radius_b is not None and pair.closed != "force" and not row.opens:
+                return "touches on either side, so that it is not known on which it rolls; give the pair closed='force'"
+            return [[j for j in range(row.f) if j != row.gap]]
         return [[j for j, f in enumerate(row.freedoms) if not f.turns and j != row.gap]]
     if rubs_as_plane(row):
         return [[0, 1, 2]] if load.radius else "turns as it slides; give the radius= at which it rubs as it turns"
@@ -57,6 +83,14 @@ def _rubbing_as_one(pair: Pair, load: Friction) -> list[list[int]] | str:
     for j, f in enumerate(row.freedoms):
         axes.setdefault(int(np.argmax(np.abs(f.twist[:3] if f.turns else f.twist[3:]))), []).append(j)
     return list(axes.values())
+
+
+def _rolls(pair: Pair) -> bool:
+    """Whether a pair touches at a place that moves on both links, or whose sliding is not that of single freedoms."""
+    row = pair.type
+    turns = pair.radius_b is not None and any(f.turns for f in row.freedoms)
+    tilts = row.touching is not None and row.touching.tilting is not None
+    return turns or tilts or len(takes_curves(row)) > 1 or any(isinstance(step, OnSurface) for step in row.steps)
 
 
 def friction_faults(m: Mechanism, passive: str) -> list[str]:
@@ -79,11 +113,14 @@ def rough_freedoms(s: System, dry: tuple[Friction, ...]) -> tuple[Rough, ...]:
         if coupling_of(s.m, load):
             ends = (int(s.first_column[k + 1]) for k in pairs_of(s.m, load))
             columns = tuple(c for first, end in zip(firsts, ends, strict=True) for c in range(first, end))
-            out.append(Rough(load.of, columns, (1.0,) * len(columns)))
+            out.append(Rough(load.of, columns, (1.0, 1.0, 1.0), load))
             continue
-        parts = _rubbing_as_one(s.m.pair(load.of), load)
+        pair = s.m.pair(load.of)
+        parts = _rubbing_as_one(pair, load)
         assert not isinstance(parts, str)
+        rolls = rubs_as_contact(pair.type) and _rolls(pair)
         for columns in (tuple(firsts[0] + j for j in part) for part in parts):
             arm = 1.0 if load.radius is None else load.radius / s.par.L
-            out.append(Rough(load.of, columns, tuple(1.0 if s.is_length[c] else arm**2 for c in columns)))
+            weights = tuple(1.0 if s.is_length[c] else arm**2 for c in columns)
+            out.append(Rough(load.of, columns, (1.0, 1.0) if rolls else weights, load if rolls else None))
     return tuple(out)
