@@ -51,7 +51,7 @@ from mechgraph.errors import (
     ReachError,
 )
 from mechgraph.files import plain
-from mechgraph.force.block import hold_names
+from mechgraph.force.loads import hold_names
 from mechgraph.force.reactions import MethodName
 from mechgraph.kinematics.assembly import assembled_at, closed_start, last_closed, named_columns
 from mechgraph.kinematics.motion_path import FARTHEST, DriverPath, Positions, Status, far_faults, requests

@@ -12,7 +12,8 @@ import numpy as np
 from mechgraph.determinacy.finite_motion import branches
 from mechgraph.determinacy.mobility import stand_still
 from mechgraph.errors import DeclarationError
-from mechgraph.force.block import FORCE_OUTCOMES, BlockForces, ForceTask, forces_of_block
+from mechgraph.force.block import FORCE_OUTCOMES, BlockForces, forces_of_block
+from mechgraph.force.redundant import ForceTask
 from mechgraph.kinematics.motion_path import BLOCK, DriverPath, Positions, Status, continued, in_blocks
 from mechgraph.kinematics.prescribed import DriverMotion
 from mechgraph.kinematics.rates import PassiveMotion, Rates, Velocities, accuracy, at_dead_points, disagreement, rates

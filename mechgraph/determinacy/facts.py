@@ -31,7 +31,7 @@ from mechgraph.determinacy.uniqueness import MisfitSum, SelfStress, Uniqueness, 
 from mechgraph.equations.build import BOOKKEEPINGS, BookkeepingName, formulate
 from mechgraph.equations.terms import Ledger, LedgerRow
 from mechgraph.errors import Budget, DeclarationError
-from mechgraph.force.block import hold_names
+from mechgraph.force.loads import hold_names
 from mechgraph.graph.linkgraph import GraphParts, LinkGraph, link_graph, parts_of
 from mechgraph.kinematics.assembly import at_position
 from mechgraph.kinematics.solver import EngineName

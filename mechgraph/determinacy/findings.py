@@ -32,7 +32,7 @@ from mechgraph.determinacy.snapping import EXACT, SnappedMechanism, candidates, 
 from mechgraph.document import NAMED
 from mechgraph.errors import Budget, MechgraphError, SearchEnded
 from mechgraph.files import patch
-from mechgraph.force.block import hold_at_rest, hold_names, is_idle
+from mechgraph.force.loads import hold_at_rest, hold_names, is_idle
 from mechgraph.kinematics.assembly import closed_start
 from mechgraph.kinematics.rates import PassiveMotion
 from mechgraph.kinematics.solver import EngineName

@@ -22,10 +22,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from mechgraph.force.block import unique_reactions
 from mechgraph.force.friction import OUTCOMES
 from mechgraph.force.loads import kinetic_energy
 from mechgraph.force.reactions import ForceProblem, user_wrench
+from mechgraph.force.redundant import unique_reactions
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Array, Index, cross
 from mechgraph.maths.tolerances import RESPONSE

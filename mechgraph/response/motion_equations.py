@@ -46,8 +46,8 @@ import numpy as np
 import scipy
 
 from mechgraph import by_kernel
-from mechgraph.force.block import rubbed_in_motion
 from mechgraph.force.friction import Rubbed
+from mechgraph.force.friction_problem import rubbed_in_motion
 from mechgraph.force.loads import Site, inertia_wrenches
 from mechgraph.force.reactions import ForceProblem
 from mechgraph.kernel import build

@@ -1,4 +1,4 @@
-"""Redundant reactions split by the stiffness of the pairs, and the forces that misfits lock in.
+"""Redundant reactions: of least norm, or split by the stiffness of the pairs, and the forces that misfits lock in.
 
 Of all reactions ``l = l0 + N x`` in balance with the loads (N: self-stresses) those come about that make ``sum l^2 / (2 k) - sum l misfit``
 least (Castigliano): with the compliances ``C = diag 1/k``, zero where rigid,
@@ -17,25 +17,45 @@ Source: S. Timoshenko, Strength of Materials II, 1956; C. L. Lawson and R. J. Ha
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
+import scipy
 
 from mechgraph.errors import DeclarationError
+from mechgraph.force.loads import hold
 from mechgraph.force.reactions import (
+    METHODS,
+    STRAIN,
     ForceProblem,
     PairFrames,
     Stress,
+    Wrenches,
+    at_pair_points,
+    effort_map,
     least_above,
+    least_multiples,
+    least_under_signs,
     loop_wrench,
+    on_their_flanks,
+    orthonormal_stress,
+    pair_power,
+    pretensioned,
+    reaction_map,
+    reaction_part,
+    row_efforts,
     split_stress,
 )
 from mechgraph.kinematics.motion_path import Status
+from mechgraph.kinematics.rates import PassiveMotion
 from mechgraph.kinematics.state import Configuration, FactoredClosure
 from mechgraph.kinematics.system import System
 from mechgraph.kinematics.touching import ContactLines
 from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.tolerances import STRESSES
 from mechgraph.memo import dataclass
+from mechgraph.model.belts import pretensions
+from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 
 LIFTS_OFF = Status.LIFTS_OFF.value
@@ -247,3 +267,230 @@ def displacement(
         loose = np.abs(u[open_]).max(axis=0, initial=0.0) > STRESSES.unique * np.abs(u).max(initial=0.0)
         out[:, t] = np.where(loose | contradicts, np.nan, 0.0 - known @ u)
     return out
+
+
+@dataclass(frozen=True)
+class ForceTask:
+    """The task for every block: force ``method``, ``loads``, ``driven`` freedoms, ``passive`` motions; ``batch`` and times ``t``."""
+
+    method: str
+    loads: tuple[Load, ...]
+    driven: Index
+    passive: tuple[PassiveMotion, ...]
+    batch: tuple[int, ...]
+    t: object
+    redundant: str
+    idle: Index | None = None
+    """Fixed freedoms, by their places, whose unit rates are the passive motions; None where these are the motions left free."""
+
+
+def held_still(
+    here: Configuration, task: ForceTask, f: FactoredClosure, loads: Array, efforts: Array, largest: float
+) -> tuple[Array | None, Array, Array]:
+    """What keeps the passive bodies of a task at rest (see ``hold``); None where it has none."""
+    if not task.passive:
+        return None, np.zeros((0, here.T)), np.zeros((0, here.T))
+    passive = f.motions() if task.idle is None else f.sensitivity()[:, task.idle]
+    return hold(here, task.passive, passive, loads, efforts, largest)
+
+
+@dataclass(frozen=True)
+class FreeForces:
+    """Reactions and efforts, of least norm where redundant, with the self-stresses; see ``BlockForces``."""
+
+    reactions: Array
+    efforts: Array
+    stress: Stress
+    multipliers: Array
+    coupled: Array
+    locked: Array | None = None
+    of_misfit: Array | None = None
+    unborne: Mask | None = None
+    all_stress: Array | None = None
+    """All self-stresses ``(6, P, s, T)`` of which stiffness decides."""
+
+
+def least_on_flanks(
+    here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: ForceTask, lines: ContactLines
+) -> tuple[FreeForces, Array]:
+    """See ``_least``; with the signs of the multipliers ``(n, T)`` that tell on which flanks gears touch each other.
+
+    Where multipliers are not unique those of least norm may touch on other flanks than the first ones found: then once more on these, and
+    where that does not settle under the condition that they keep the signs of their flanks (see ``force.reactions.least_under_signs``).
+    """
+    flank = wrenches.multipliers
+    if not lines:
+        return least_forces(here, wrenches, f, task, lines, flank), flank
+    # how often flanks are changed in search of multipliers of least norm
+    for _ in range(3):
+        found = least_forces(here, relieved(wrenches, lines, flank), f, task, lines, flank)
+        moved = ((found.multipliers < 0.0) != (flank < 0.0)).any(axis=0)
+        if not moved.any():
+            return found, flank
+        flank = np.where(moved, found.multipliers, flank)
+    whole, flank = _kept_on_flanks(here, wrenches, f, task, flank, np.flatnonzero(moved))
+    bare = relieved(whole, lines, flank)
+    kept = _found(here, bare.totals, bare.multipliers, _stress(here, bare, f, task))
+    for name in ("reactions", "efforts", "multipliers", "coupled"):
+        getattr(found, name)[..., moved] = getattr(kept, name)[..., moved]
+    return replace(found, stress=kept.stress), flank
+
+
+def _kept_on_flanks(
+    here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: ForceTask, flank: Array, at: Index
+) -> tuple[Wrenches, Array]:
+    """Total wrenches and multipliers of least norm at the positions ``at``, on their flanks; the other positions as they are."""
+    totals, multipliers, flank = wrenches.totals.copy(), wrenches.multipliers.copy(), flank.copy()
+    for t in at:
+        one = np.array([t])
+        alone = here.part(one)
+        x = f.part(one, alone).self_stresses(every=True)
+        change = -x[here.system.graph.loop_rows :]
+        own = Wrenches(totals[..., one], alone.pair_wrenches(x), multipliers[:, one], change)
+        own = pretensioned(alone, own, f.part(one, alone))
+        y, flank[:, t] = least_under_signs(alone, own, ContactLines(alone), _acting(here, task))
+        totals[..., t] += own.stress[..., 0] @ y
+        multipliers[:, t] += own.multiplier_stress[..., 0] @ y
+    return replace(wrenches, totals=totals, multipliers=multipliers), flank
+
+
+def relieved(wrenches: Wrenches, lines: ContactLines, flank: Array) -> Wrenches:
+    """Total wrenches and self-stresses without what contacts on their flanks take off."""
+    relief = [lines.relief(part, flank) for part in (wrenches.multipliers, wrenches.multiplier_stress)]
+    return replace(wrenches, totals=wrenches.totals - relief[0], stress=wrenches.stress - relief[1])
+
+
+def least_forces(
+    here: Configuration,
+    wrenches: Wrenches,
+    f: FactoredClosure,
+    task: ForceTask,
+    lines: ContactLines,
+    flank: Array,
+    known: Stress | None = None,
+    lifted: Mask | None = None,
+) -> FreeForces:
+    """Reactions and efforts of least norm; where self-stresses are random ones only if that is asked for. They may be ``known``.
+
+    ``lifted``: see ``elastic_split``; beside friction nothing is as long as it is left out.
+    """
+    totals, multipliers = wrenches.totals, wrenches.multipliers
+    if task.redundant == "elastic" and not f.complete:
+        every = f.self_stresses(every=True)
+        others = -every[here.system.graph.loop_rows :]
+        wrenches = replace(wrenches, stress=here.pair_wrenches(every), multiplier_stress=others)
+    stress = known or _stress(here, wrenches, f, task)
+    s = stress.wrenches.shape[2]
+    if s and not f.complete and task.redundant == "minimum_norm":
+        x = _least_multipliers(here, totals, multipliers, f, _acting(here, task), lines, flank)
+        others = x[here.system.graph.loop_rows :]
+        totals = totals + here.pair_wrenches(x[:, None])[:, :, 0]
+        totals = totals + lines.relief(others, flank) if lines else totals
+        multipliers = multipliers - others
+    found = _found(here, totals, multipliers, stress)
+    if s and task.redundant == "elastic":
+        if lifted is None and any(load.follows_reactions for load in task.loads):
+            lifted = np.zeros((len(seats_of(here.system).labels), here.T), dtype=bool)
+        return _elastic(here, found, lifted)
+    if not (s and f.complete):
+        return found
+    y = least_multiples(here, found.reactions, found.efforts, multipliers, stress)
+    multipliers = multipliers + np.einsum("nit,it->nt", stress.multipliers, y)
+    return FreeForces(
+        found.reactions + np.einsum("cpit,it->cpt", stress.wrenches, y),
+        found.efforts + np.einsum("fit,it->ft", stress.efforts, y),
+        stress,
+        multipliers,
+        row_efforts(here, multipliers[:, None])[:, 0],
+    )
+
+
+def unique_reactions(problem: ForceProblem) -> Array:
+    """Reactions ``(6, P, T)`` at the pair points, or impulses where loads and efforts are such; NaN where self-stresses may change them."""
+    here, f = problem.here, problem.solver
+    task = ForceTask("loop_wrench", (), problem.driven, (), (here.T,), None, "nan")
+    lines = ContactLines(here)
+    wrenches = on_their_flanks(here, METHODS[task.method](problem), lines)
+    found, _ = least_on_flanks(here, wrenches, f, task, lines)
+    stress = np.abs(at_pair_points(here, found.stress.wrenches)).max(axis=2, initial=0.0)
+    return np.where(stress > STRESSES.unique, np.nan, at_pair_points(here, found.reactions))
+
+
+def _elastic(here: Configuration, found: FreeForces, lifted: Mask | None) -> FreeForces:
+    """Reactions and efforts as stiffness splits them; the self-stresses that stay unknown. ``lifted``: see ``elastic_split``."""
+    split, stress = elastic_split(here, found.reactions, found.efforts, found.stress, lifted), found.stress
+
+    def of(multiples: Array) -> Array:
+        return np.asarray(np.einsum("cpit,it->cpt", stress.wrenches, multiples))
+
+    multipliers = found.multipliers + np.einsum("nit,it->nt", stress.multipliers, split.y)
+    mixed = (np.einsum("nit,ijt->njt", part, split.left) for part in (stress.efforts, stress.multipliers))
+    return FreeForces(
+        found.reactions + of(split.y),
+        found.efforts + np.einsum("fit,it->ft", stress.efforts, split.y),
+        Stress(np.einsum("cpit,ijt->cpjt", stress.wrenches, split.left), *mixed),
+        multipliers,
+        row_efforts(here, multipliers[:, None])[:, 0],
+        of(split.locked),
+        np.einsum("cpit,ikt->cpkt", stress.wrenches, split.unit[:, split.soft]),
+        split.unborne,
+        stress.wrenches,
+    )
+
+
+def _found(here: Configuration, totals: Array, multipliers: Array, stress: Stress) -> FreeForces:
+    """What total wrenches are made of."""
+    efforts = pair_power(here, totals)
+    # in the freedom in which a contact opens a presses on b: that is a reaction
+    efforts[here.system.gaps] = 0.0
+    coupled = row_efforts(here, multipliers[:, None])[:, 0]
+    return FreeForces(reaction_part(here, totals, efforts), efforts, stress, multipliers, coupled)
+
+
+def _acting(here: Configuration, task: ForceTask) -> Index:
+    """The freedoms with efforts: driven, coupled."""
+    return np.setdiff1d(np.union1d(task.driven, here.system.coupled_freedoms), here.system.gaps)
+
+
+def _stress(here: Configuration, wrenches: Wrenches, f: FactoredClosure, task: ForceTask) -> Stress:
+    """The self-stresses of total wrenches, orthonormal where they are all there are."""
+    split = orthonormal_stress if f.complete or task.redundant == "elastic" else split_stress
+    return split(here, wrenches.stress, wrenches.multiplier_stress, _acting(here, task))
+
+
+def _least_multipliers(
+    here: Configuration,
+    totals: Array,
+    multipliers: Array,
+    f: FactoredClosure,
+    acting: Index,
+    lines: ContactLines,
+    flank: Array,
+) -> Array:
+    """Multipliers ``(rows, T)`` of the closure rows that make the reactions least, and then the efforts that leave them as they are.
+
+    Minimizes ``|r + R x|^2 + w^2 |e + M x|^2``, then the same with ``M (x - x_1)`` in place of ``e + M x``: what the weight took from the
+    reactions in the first is given back, up to w^4 (method of multipliers, Bertsekas 1982).
+    """
+    if here.system.m.once(pretensions):
+        fault = (
+            "redundant='minimum_norm' beside belts with a pretension, of so many self-stresses, takes engine='dense'"
+        )
+        raise DeclarationError(f"mechanism {here.system.m.name!r}", [fault])
+    efforts = pair_power(here, totals)
+    points = at_pair_points(here, reaction_part(here, totals, efforts)).swapaxes(0, 1).reshape(-1, here.T)
+    R = [reaction_map(here, t) for t in range(here.T)]
+    if lines:
+        n = len(multipliers)
+        of_unit = lines.relief(np.repeat(np.eye(n)[:, :, None], here.T, axis=2), flank)
+        of_unit = at_pair_points(here, of_unit).swapaxes(0, 1).reshape(-1, n, here.T)
+        behind = np.zeros((len(of_unit), here.system.n_rows, here.T))
+        behind[:, -n:] = of_unit
+        R = [R[t] + scipy.sparse.csr_array(behind[..., t]) for t in range(here.T)]
+    if len(acting) < 2:
+        return f.least(R, points)
+    M = [STRAIN * effort_map(here, t, acting) for t in range(here.T)]
+    both = [scipy.sparse.csr_array(scipy.sparse.vstack(maps)) for maps in zip(R, M, strict=True)]
+    first = f.least(both, np.concatenate([points, STRAIN * efforts[acting], STRAIN * multipliers]))
+    back = np.stack([-(part @ x) for part, x in zip(M, first.T, strict=True)], axis=1)
+    return f.least(both, np.concatenate([points, back]))

@@ -1,0 +1,301 @@
+"""Reactions with friction beside those without it, for any directions of motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+from mechgraph.force.friction import OUTCOMES, Rubbed, moving_rates, places_of, rests, rubbed
+from mechgraph.force.reactions import (
+    METHODS,
+    ForceProblem,
+    PairFrames,
+    Stress,
+    Wrenches,
+    least_multiples,
+    on_settled_flanks,
+    on_their_flanks,
+    pretensioned,
+    row_efforts,
+    together,
+)
+from mechgraph.force.redundant import (
+    ForceTask,
+    FreeForces,
+    component_values,
+    held_still,
+    least_forces,
+    least_on_flanks,
+    openings,
+    relieved,
+    seats_of,
+)
+from mechgraph.kinematics.state import Configuration, FactoredClosure
+from mechgraph.kinematics.touching import ContactLines
+from mechgraph.maths.se3 import Array, Mask
+from mechgraph.maths.tolerances import MOTIONS, STRESSES
+from mechgraph.model.friction import Friction, pairs_of
+
+
+def rubbed_in_motion(
+    problem: ForceProblem, dry: Sequence[Friction], dq: Array, yields: Callable[[Array], Array]
+) -> Rubbed:
+    """Friction in a motion in the directions ``dq (F, T)`` whose accelerations it changes.
+
+    ``problem`` is that without friction; ``yields`` gives the inertia wrenches ``(6, N, k, T)`` with which the links yield to efforts
+    ``(F, k, T)``.
+    """
+    here, f = problem.here, problem.solver
+    task = ForceTask("loop_wrench", (), problem.driven, (), (here.T,), None, "nan")
+    first = pretensioned(here, METHODS[task.method](problem), f)
+    lines = ContactLines(here)
+    smooth = least_on_flanks(here, on_their_flanks(here, first, lines), f, task, lines)
+    return FrictionProblem(here, task, f, first, lines, smooth, dry, yields).forces(dq)[1]
+
+
+class FrictionProblem:
+    """Reactions with friction beside those without it, ``smooth``, for any directions of motion, from total ``wrenches`` on the first
+    flanks of teeth. ``yields``: the inertia wrenches with which links yield to efforts; where it is left out the motion is given.
+    """
+
+    def __init__(
+        self,
+        here: Configuration,
+        task: ForceTask,
+        f: FactoredClosure,
+        wrenches: Wrenches,
+        lines: ContactLines,
+        smooth: tuple[FreeForces, Array],
+        dry: Sequence[Friction],
+        yields: Callable[[Array], Array] | None = None,
+    ) -> None:
+        self.yields = yields
+        self.here, self.task, self.f, self.wrenches, self.lines, self.dry = here, task, f, wrenches, lines, dry
+        self.found, self.flank = self.smooth = smooth
+        # which components have lifted off, of those that only push under a split by stiffness
+        push = seats_of(here.system).push
+        self.push = push if push.any() and self.found.locked is not None else None
+        self.lifted: Mask | None = None if self.push is None else np.zeros((len(push), here.T), dtype=bool)
+        self._answer_units()
+
+    def _answer_units(self) -> None:
+        """Forces under a unit effort in every freedom of pairs through which friction would pass."""
+        s, still = self.here.system, None
+        pairs = dict.fromkeys(k for load in self.dry for k in pairs_of(s.m, load))
+        columns = [c for k in pairs for c in range(int(s.first_column[k]), int(s.first_column[k + 1]))]
+        efforts = np.zeros((s.n_freedoms, len(columns), self.here.T))
+        efforts[columns, np.arange(len(columns))] = 1.0
+        if self.yields is not None and self.f.complete and not self.lines:
+            self.unit = dict(zip(columns, self._answers(efforts, self.yields), strict=True))
+            return
+        if self.found.locked is not None:
+            still = self._answer(np.zeros_like(self.found.efforts))
+        self.unit = {}
+        for i, column in enumerate(columns):
+            one = self._answer(efforts[:, i])
+            self.unit[column] = one if still is None else {name: one[name] - still[name] for name in one}
+
+    def _answers(self, efforts: Array, yields: Callable[[Array], Array]) -> list[dict[str, Array]]:
+        """Forces in a motion under each of several given efforts ``(F, k, T)``, by the factors of the positions."""
+        reactions, through, multipliers = together(self.here, self.f, yields(efforts), efforts)
+        stress, out = self.found.stress, []
+        for i in range(efforts.shape[1]):
+            found = reactions[:, :, i], through[:, i], multipliers[:, i]
+            if stress.wrenches.shape[2]:
+                y = least_multiples(self.here, *found, stress)
+                states = stress.wrenches, stress.efforts, stress.multipliers
+                found = tuple(
+                    part + np.einsum("...st,st->...t", state, y) for part, state in zip(found, states, strict=True)
+                )
+            coupled = row_efforts(self.here, found[2][:, None])[:, 0]
+            out.append(dict(zip(("reactions", "efforts", "multipliers", "coupled"), (*found, coupled), strict=True)))
+        return out
+
+    def _answer(self, efforts: Array) -> dict[str, Array]:
+        """Forces under given efforts ``(F, T)`` alone."""
+        here, none = self.here, np.zeros((6, len(self.here.system.m.links), self.here.T))
+        held, _, _ = held_still(here, self.task, self.f, none, efforts, 0.0)
+        loads = none if held is None else held
+        loads = loads if self.yields is None else loads + self.yields(efforts[:, None])[:, :, 0]
+        problem = ForceProblem(here, loads, efforts, self.task.driven, self.f)
+        wrenches = pretensioned(here, METHODS[self.task.method](problem), self.f, part=0.0)
+        one = self._least(wrenches, None if self.task.redundant == "elastic" else self.found.stress)
+        return {name: getattr(one, name) for name in ("reactions", "efforts", "multipliers", "coupled")}
+
+    def _least(self, wrenches: Wrenches, known: Stress | None = None) -> FreeForces:
+        """The forces of total wrenches on the first flanks, on those that act; their self-stresses may be known."""
+        here, lines, flank = self.here, self.lines, self.flank
+        wrenches = relieved(on_settled_flanks(here, wrenches, lines), lines, flank) if lines else wrenches
+        return least_forces(here, wrenches, self.f, self.task, lines, flank, known, self.lifted)
+
+    def forces(self, dq: Array, at_rest: bool = False) -> tuple[FreeForces, Rubbed, Array]:
+        """Forces with the friction of a motion, that friction, and the flanks ``(n, T)`` on which teeth then touch: friction may turn the
+        force between them round, or lift what only pushes.
+        """
+        self._put_on(*self.smooth, None if self.lifted is None else np.zeros_like(self.lifted))
+        # how often flanks and what has lifted off are changed
+        for _ in range(5 if self.lifted is None else 5 + 2 * len(self.lifted)):
+            found, rubs = self._on_flanks(dq, at_rest)
+            turned, (lifted, moved) = self._turned(found, rubs), self._lifts(found)
+            if not (turned | moved).any():
+                break
+            self._put_on(None, np.where(turned, found.multipliers, self.flank), lifted)
+        if self.push is not None:
+            self._try_sets(dq, at_rest)
+            found, rubs = self._on_flanks(dq, at_rest)
+            turned, moved = self._turned(found, rubs), self._lifts(found)[1]
+        found = _undetermined(found, rubs, turned | moved)
+        # forces that grow without bound between feet held in place may let them lift before: then it tips, and does not jam
+        grows = (rubs.outcome > 0) & (self.push is not None)
+        rubs.outcome[grows], rubs.factor[grows] = OUTCOMES.index("friction not determined"), np.nan
+        return found, rubs, self.flank
+
+    def _turned(self, found: FreeForces, rubs: Rubbed) -> Mask:
+        """Where ``(T,)`` teeth press on other flanks than those that forces were found on."""
+        other = (found.multipliers < 0.0) != (self.flank < 0.0)
+        return np.asarray(other.any(axis=0) & (rubs.outcome == 0) & bool(self.lines))
+
+    def _lifts(self, found: FreeForces) -> tuple[Mask | None, Mask]:
+        """What has lifted off beside forces, and where ``(T,)`` that is not what it was: what would pull lifts, what would sink in bears
+        again.
+        """
+        if self.push is None or self.lifted is None:
+            return None, np.zeros(self.here.T, dtype=bool)
+        values, assumed = component_values(PairFrames(self.here), found.reactions), self.lifted
+        assert found.all_stress is not None
+        gaps = openings(self.here, found.reactions, found.all_stress, assumed)
+        # one at a time, as in an active set method: of several that would pull most bear again as soon as one has lifted
+        pulls = _worst(np.where(self.push[:, None] & ~assumed, values, 0.0), np.abs(values))
+        sinks = _worst(np.where(assumed, gaps, 0.0), np.abs(gaps)) & ~pulls.any(axis=0)
+        return (assumed | pulls) & ~sinks, np.asarray((pulls | sinks).any(axis=0))
+
+    def _try_sets(self, dq: Array, at_rest: bool) -> None:
+        """Put on another set of what has lifted off where forces were not found and some set, of few, stands: each lifted foot changes the
+        friction of the others, so that one at a time does not always lead there.
+        """
+        if self.push is None or self.lifted is None or self.push.sum() > 6:
+            return
+
+        def fails() -> Mask:
+            found, rubs = self._on_flanks(dq, at_rest)
+            unborne = False if found.unborne is None else found.unborne
+            return (rubs.outcome > 0) | self._lifts(found)[1] | self._turned(found, rubs) | unborne
+
+        left, settled, feet = fails(), self.lifted, np.flatnonzero(self.push)
+        for each in sorted(product((False, True), repeat=len(feet)), key=sum):
+            if not left.any():
+                break
+            trial = settled.copy()
+            trial[np.ix_(feet, left)] = np.array(each)[:, None]
+            self._put_on(None, self.flank, trial)
+            stands = left & ~fails()
+            settled, left = np.where(stands, trial, settled), left & ~stands
+        self._put_on(None, self.flank, settled)
+
+    def _put_on(self, found: FreeForces | None, flank: Array, lifted: Mask | None) -> None:
+        """Take forces without friction, and those of unit efforts, on flanks of signs ``(n, T)``, without what has lifted off."""
+        same = ((flank < 0.0) == (self.flank < 0.0)).all() and (lifted is None or (lifted == self.lifted).all())
+        self.flank, self.lifted = flank, lifted
+        if not same:
+            self.lines.settle(flank)
+            self.found = self._least(self.wrenches) if found is None else found
+            self._answer_units()
+
+    def _on_flanks(self, dq: Array, at_rest: bool) -> tuple[FreeForces, Rubbed]:
+        """Forces with the friction of a motion with rates ``dq (F, T)``, and what that is; NaN where it has no solution, or none alone."""
+        found, of = self.found, {column: self._read(one) for column, one in self.unit.items()}
+        base, stress = self._read(vars(found)), self._read({"reactions": found.stress.wrenches, **vars(found.stress)})
+        unknown = stress[:, :, :0] if self.task.redundant == "minimum_norm" else stress
+        reactions = found.reactions
+        # sides of balls and centers of pressure settle in a few rounds; what does not is not determined
+        for _ in range(50):
+            places = places_of(self.here, dq, reactions, self.dry, at_rest, (self.lines, self.flank))
+            rubs = rubbed(self.here, places, base, of, unknown)
+            sums = {
+                name: getattr(found, name) + sum(one[name] * rubs.efforts[c] for c, one in self.unit.items())
+                for name in ("reactions", "efforts", "multipliers", "coupled")
+            }
+            sums["reactions"] = sums["reactions"] - rubs.taken
+            before, reactions = reactions, np.where(np.isnan(sums["reactions"]), reactions, sums["reactions"])
+            moved = np.abs(reactions - before).max(axis=(0, 1))
+            size = np.abs(reactions).max(axis=(0, 1))
+            if not (any(place.follows for place in places) and (moved > STRESSES.rounding * size).any()):
+                break
+        doubtful = (moved > MOTIONS.still * size) & any(place.follows for place in places)
+        found = replace(found, **sums)
+        return _undetermined(found, rubs, doubtful), rubs
+
+    def _read(self, forces: Mapping[str, Array]) -> Array:
+        """The wrenches that normal forces are read from: reactions, and behind them forces between teeth."""
+        return np.concatenate([forces["reactions"], self.lines.on_gears(forces["multipliers"], self.flank)], axis=1)
+
+    def at_rest(self, dq: Array, given: Array) -> Array:
+        """Efforts of drives ``(F, 2, T)`` on the verge of motion to - and to +, the others held; infinite where it jams, NaN in motion, and
+        where what only pushes would have to pull on the verge, or be pressed without bound: it tips or lifts before that.
+        """
+        out = np.full((len(dq), 2, self.here.T), np.nan)
+        rest = ~dq.any(axis=0)
+        if not rest.any():
+            return out
+        m, moved, push = self.here.system.m, self.f.sensitivity(), seats_of(self.here.system).push
+        tips = any(m.pairs[k].closed == "force" for load in self.dry for k in pairs_of(m, load))
+        for j, column in enumerate(self.task.driven):
+            for side, sense in enumerate((-1.0, 1.0)):
+                found, rubs, _ = self.forces(sense * moving_rates(moved[:, j]), at_rest=True)
+                effort = (found.efforts - given - rubs.efforts - found.coupled)[column]
+                jams = (rubs.outcome == 1) | (rubs.outcome == 2)
+                effort = np.where(jams, np.nan if tips else sense * np.inf, effort)
+                if push.any():
+                    values = component_values(PairFrames(self.here), found.reactions)
+                    pulls = (values[push] < -STRESSES.rounding * np.abs(values).max(axis=0)).any(axis=0)
+                    effort = np.where(pulls, np.nan, effort)
+                out[column, side, rest] = effort[rest]
+        return out
+
+    def holds(self, dq: Array, given: Array) -> Array:
+        """Whether friction holds it at rest with all drives off, where there are several ``(T,)``: see ``friction.rests``."""
+        driven, m, s = self.task.driven, self.here.system.m, self.here.system
+        out = np.full(self.here.T, np.nan)
+        if len(driven) < 2 or dq.any(axis=0).all():
+            return out
+        self._put_on(*self.smooth, self.lifted)
+        found, ways, count = self.found, [], 0
+        for load in self.dry:
+            columns = [c for k in pairs_of(m, load) for c in range(int(s.first_column[k]), int(s.first_column[k + 1]))]
+            for sense, column in product((-1.0, 1.0), columns):
+                one = np.zeros_like(dq)
+                one[column] = sense
+                places = places_of(self.here, one, found.reactions, [load], True, (self.lines, self.flank))
+                ways += [(count + i, place) for i, place in enumerate(places) if place.D.any() or place.K.any()]
+            count += len(places)
+        if not ways:
+            return np.where(dq.any(axis=0), np.nan, 0.0)
+        efforts = {
+            c: (one["efforts"] - one["coupled"])[driven] - (driven == c)[:, None] for c, one in self.unit.items()
+        }
+        own = (found.efforts - given - found.coupled)[driven]
+        reads = {column: self._read(one) for column, one in self.unit.items()}
+        out = rests(self.here, ways, self._read(vars(found)), reads, efforts, own)
+        return np.where(dq.any(axis=0), np.nan, out)
+
+
+def _worst(values: Array, sizes: Array) -> Mask:
+    """The least of values ``(K, T)`` at every position, where it is negative beside the largest of their sizes."""
+    least = np.arange(len(values))[:, None] == values.argmin(axis=0)
+    return np.asarray(least & (values < -STRESSES.rounding * sizes.max(axis=0)))
+
+
+def _undetermined(found: FreeForces, rubs: Rubbed, places: Mask) -> FreeForces:
+    """The same with no value where friction has no solution, or is not determined, as at some more ``places``."""
+    rubs.outcome[places & (rubs.outcome == 0)] = OUTCOMES.index("friction not determined")
+    for values in (rubs.efforts, rubs.taken, rubs.normals, rubs.teeth, rubs.beside, rubs.rubbing):
+        values[..., places] = np.nan
+    places = rubs.outcome > 0
+    parts = (
+        np.where(places, np.nan, part) for part in (found.reactions, found.efforts, found.multipliers, found.coupled)
+    )
+    reactions, efforts, multipliers, coupled = parts
+    return replace(found, reactions=reactions, efforts=efforts, multipliers=multipliers, coupled=coupled)
