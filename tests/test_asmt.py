@@ -425,7 +425,7 @@ def test_every_joint_of_the_table_is_tested():
     "text",
     ["2*pi*time", "4.0d*pi*time", "-time^3+2.5", "1/(2+time)", "(1+time)^0.5", "2^3*time", "3", "-(time)", "+time",
      *(f"{f}(0.3+0.4*time)*time" for f in FUNCTIONS), "sin(cos(2*time)^2)", "1.5e-1d*time", "(0-2)^3*time", "sqrt(0)+time",
-     '"2*pi<n>*time"'],
+     '"2*pi<n>*time"', "1.5d-1*time-2d0", "integral(time, sin(3*time)^2)", "integral(time, rampstep(2*time, 0, 1, 5, 3)/2)"],
 )  # fmt: skip
 def test_rates_of_formulas_are_their_derivatives(text):
     t = np.linspace(0.1, 0.9, 9)
@@ -434,24 +434,39 @@ def test_rates_of_formulas_are_their_derivatives(text):
     before, after = evaluated(text, t - h)[0], evaluated(text, t + h)[0]
     assert v == pytest.approx((after - before) / (2 * h), abs=1e-6)
     assert a == pytest.approx((after - 2 * s + before) / h**2, abs=1e-5)
-    assert s == pytest.approx(
-        eval(
-            re.sub(r"(?<=\d)d\b|<n>", "", text).strip('"').replace("^", "**"),
-            {"pi": np.pi, "time": t, "ln": np.log, **vars(np)},
-        )
-        + 0 * t
-    )
+    if "integral" not in text:
+        python = re.sub(r"(?<=\d)d\b|<n>", "", re.sub(r"d(?=-?\d)", "e", text)).strip('"').replace("^", "**")
+        assert s == pytest.approx(eval(python, {"pi": np.pi, "time": t, "ln": np.log, **vars(np)}) + 0 * t)
+
+
+def test_a_speed_that_grows_in_a_ramp_is_integrated():
+    """At rest until .25, then evenly faster until 2, then 8.75 / 2: areas under straight lines by hand."""
+    t, top = np.linspace(0, 4, 17), 8.75 / 2
+    s, v, a = evaluated("integral(time,  rampstep(time, T1, 0.0, 2.0, 0.0 + 5.0*(2.0 - T1))/2)", t, {"t1": "0.25d"})
+    ramp = np.clip(t - 0.25, 0, 1.75)
+    assert s == pytest.approx(top * ramp**2 / 3.5 + top * np.maximum(t - 2, 0), abs=1e-14)
+    assert v == pytest.approx(top * ramp / 1.75, abs=1e-14)
+    assert a == pytest.approx(top / 1.75 * ((t >= 0.25) & (t < 2)), abs=1e-14)
+    for coarse in (t[:1], t[::8]):
+        assert evaluated("integral(time, sin(time))", coarse)[0] == pytest.approx(1 - np.cos(coarse), abs=1e-13)
 
 
 @pytest.mark.parametrize(
     "text",
     ["", "time time", "x", "__import__('os')", "time.real", "[1]", "2**time", "1/0", "ln(-1)", "sin(1, 2)", "9" * 5000,
      "(" * 500 + "1" + ")" * 500, "10^(10^10)", "lambda: 1", "'a'", "True", "1j", "(0-2)^(1/3)", "((0-2)^(1/3))^3",
-     "0*ln(0-1)", "sqrt(time)", "0x10", "0b1", "1_0", "2 # 3", "3d0", "1.2.3", "2time", "1" * 1900 + "?"],
+     "0*ln(0-1)", "sqrt(time)", "0x10", "0b1", "1_0", "2 # 3", "1.2.3", "2time", "1" * 1900 + "?",
+     "rampstep(time, 2, 0, 1, 0)", "rampstep(time)", "rampstep()", "rampstep(time, time, 0, 1, 0)", "integral(time)",
+     "integral(2*time, 1)", "integral(time, x)"],
 )  # fmt: skip
 def test_what_is_no_formula_is_refused(text):
     with pytest.raises(FormulaFault):
         evaluated(text, np.zeros(2))
+
+
+def test_what_changes_too_quickly_to_be_integrated_is_named():
+    with pytest.raises(FormulaFault, match="changes too quickly"):
+        evaluated("integral(time, sin(1000*time))", np.array([0.0, 1.0]))
 
 
 # --- stored results ------------------------------------------------------------------------------------------------------

@@ -8,8 +8,9 @@ A document type declaration, by which entities multiply and other files are read
 Formulas of time, as FreeCAD's motions hold them: value, rate and acceleration, differentiated exactly.
 
 A formula is a sum of products of numbers, ``time``, ``pi``, variables that the file defines by formulas, the four operations, powers
-(``^``) and the functions of ``FUNCTIONS``. It is read into a syntax tree of which only these parts are known; nothing of it is ever
-executed.
+(``^``), the functions of ``FUNCTIONS``, ``rampstep(u, u0, y0, u1, y1)``, a straight line from one constant to another, and
+``integral(time, f)`` from the time 0 (OndselSolver, SymbolicParser and RampStepFunction). It is read into a syntax tree of which only
+these parts are known; nothing of it is ever executed.
 """
 
 from __future__ import annotations
@@ -190,11 +191,11 @@ def pose_about(z: Array, point: Array) -> Array:
 
 
 DECIMAL = r"(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
-DOUBLE = re.compile(rf"({DECIMAL})d(?!\w)", re.ASCII)
-"""A number with the letter that Smalltalk writes after one of double precision: ``4.0d*pi*time``."""
+DOUBLE = re.compile(rf"(?<![\w.])({DECIMAL})d(?:([-+]?\d+)|(?!\w))", re.ASCII)
+"""A number with the letter that Smalltalk writes in one of double precision, before an exponent or without: ``4.0d*pi*time``, ``1d-3``."""
 QUOTED = re.compile(r'^"(.*)"$', re.DOTALL)
 """A whole formula in quotes; a line break within it is written ``<n>``."""
-TOKENS = re.compile(rf"(?:{DECIMAL}d?(?![\w.])|[a-z]\w*|[-+*/^()]|\s)*+", re.ASCII)
+TOKENS = re.compile(rf"(?:{DECIMAL}(?:d[-+]?\d+|d)?(?![\w.])|[a-z]\w*|[-+*/^(),]|\s)*+", re.ASCII)
 """What a formula consists of: not all that is an expression to Python (``0x10``, ``1_0``, what stands behind ``#``) is one."""
 
 
@@ -252,11 +253,14 @@ FUNCTIONS: dict[str, Derivatives] = {
     "arcsin": (np.arcsin, lambda u: (1 - u**2) ** -0.5, lambda u: u * (1 - u**2) ** -1.5),
     "arccos": (np.arccos, lambda u: -((1 - u**2) ** -0.5), lambda u: -u * (1 - u**2) ** -1.5),
     "arctan": (np.arctan, lambda u: 1 / (1 + u**2), lambda u: -2 * u / (1 + u**2) ** 2),
+    "abs": (np.abs, np.sign, np.zeros_like),
     "exp": (np.exp, np.exp, np.exp),
     "ln": (np.log, lambda u: 1 / u, lambda u: -1 / u**2),
     "sqrt": (np.sqrt, lambda u: 0.5 * u**-0.5, lambda u: -0.25 * u**-1.5),
 }
 """Functions of a formula with their first and second derivatives."""
+PIECES = ("rampstep", "integral")
+"""Functions of several arguments."""
 FUNCTIONS |= {short: FUNCTIONS[long] for short, long in (("asin", "arcsin"), ("acos", "arccos"), ("atan", "arctan"))}
 OPERATIONS: dict[type[ast.operator], Callable[[Jet, Jet], Jet]] = {
     ast.Add: Jet.__add__, ast.Sub: Jet.__sub__, ast.Mult: Jet.__mul__, ast.Div: Jet.__truediv__,
@@ -264,16 +268,46 @@ OPERATIONS: dict[type[ast.operator], Callable[[Jet, Jet], Jet]] = {
 }  # fmt: skip
 
 
+KNOWN = ("time", "pi", *FUNCTIONS, *PIECES)
 NONE: Mapping[str, str] = {}
 
 
 class KnownJets(dict[str, Jet]):
-    """Jets by name; a variable's is found from its formula when it is first asked for."""
+    """Jets by name; a variable's is found from its formula when it is first asked for. ``kinks``: where ramps begin and end."""
 
     def __init__(self, jets: Mapping[str, Jet], variables: Mapping[str, str]) -> None:
         super().__init__({"pi": Jet(np.pi), **jets})
         self.names = dict.fromkeys([*self, *variables])
-        self.waiting = dict(variables)
+        self.variables, self.waiting = variables, dict(variables)
+        self.kinks = {0.0}
+
+    def ramp(self, u: Jet, *ends: Jet) -> Jet:
+        """``rampstep``: y0 before u0, y1 behind u1, a straight line between."""
+        if len(ends) != 4 or any(np.ndim(end.s) for end in ends) or not ends[0].s < ends[2].s:
+            raise FormulaFault("rampstep: expected an argument and four numbers u0, y0, u1, y1 with u0 below u1")
+        u0, y0, u1, y1 = (float(end.s) for end in ends)
+        self.kinks |= {u0, u1}
+        slope = np.where((u.s >= u0) & (u.s < u1), (y1 - y0) / (u1 - u0), 0.0)
+        return Jet(np.interp(u.s, [u0, u1], [y0, y1]), slope * u.v, slope * u.a)
+
+    def integral(self, f: ast.expr) -> Jet:
+        """``integral(time, f)`` from the time 0, by Gauss-Legendre between all times and kinks; halves of these must give the same."""
+        found, t = _jet(f, self), np.asarray(self["time"].s, float)
+        u, w = np.polynomial.legendre.leggauss(16)
+
+        def over(knots: Array) -> Array:
+            half = np.diff(knots)[:, None] / 2
+            inner = KnownJets({"time": Jet(knots[:-1, None] + half * (1 + u))}, self.variables)
+            parts = (np.broadcast_to(_jet(f, inner).s, (len(half), len(u))) * w * half).sum(1)
+            whole = np.concatenate([[0.0], np.cumsum(parts)])
+            return np.asarray(np.interp(t, knots, whole) - np.interp(0.0, knots, whole))
+
+        knots = np.unique([*t.ravel(), *(k for k in self.kinks if abs(k) < LARGEST)])
+        first, value = over(knots), over(np.unique([*knots, *(knots[1:] + knots[:-1]) / 2]))
+        # rounding of some hundred sums
+        if np.abs(value - first).max() > 1e-12 * max(np.abs(value).max(), np.abs(t).max() * np.abs(found.s).max()):
+            raise FormulaFault(f"{shown(ast.unparse(f))} changes too quickly between the times to be integrated")
+        return Jet(value, found.s, found.v)
 
     def __missing__(self, name: str) -> Jet:
         formula = self.waiting.pop(name, None)
@@ -286,7 +320,7 @@ class KnownJets(dict[str, Jet]):
 def is_name(name: str) -> bool:
     """Whether a variable may have that name."""
     key = name.lower()
-    return re.fullmatch(r"[a-z]\w*", key, re.ASCII) is not None and key not in ("time", "pi", "self", *FUNCTIONS)
+    return re.fullmatch(r"[a-z]\w*", key, re.ASCII) is not None and key not in (*KNOWN, "self")
 
 
 def evaluated(formula: str, t: Array, variables: Mapping[str, str] = NONE) -> tuple[Array, Array, Array]:
@@ -331,7 +365,8 @@ def _tree(formula: str) -> ast.expr:
         raise FormulaFault(f"longer than {longest_formula} characters")
     with suppress(SyntaxError, ValueError, MemoryError, RecursionError):
         if TOKENS.fullmatch(text):
-            return ast.parse(DOUBLE.sub(r"\1", text).replace("^", "**"), mode="eval").body
+            text = DOUBLE.sub(lambda m: m[1] + (f"e{m[2]}" if m[2] else ""), text)
+            return ast.parse(text.replace("^", "**"), mode="eval").body
     raise FormulaFault(_none(formula))
 
 
@@ -367,5 +402,9 @@ def _jet(node: ast.expr, known: KnownJets) -> Jet:
             return OPERATIONS[type(op)](_jet(left, known), _jet(right, known))
         case ast.Call(func=ast.Name(id=name), args=[inner], keywords=[]) if name in FUNCTIONS:
             return _jet(inner, known).through(*FUNCTIONS[name])
-    names = ", ".join(["time", "pi", *(name for name in known.names if name not in ("time", "pi")), *FUNCTIONS])
+        case ast.Call(func=ast.Name(id="rampstep"), args=inner, keywords=[]) if inner:
+            return known.ramp(*(_jet(part, known) for part in inner))
+        case ast.Call(func=ast.Name(id="integral"), args=[ast.Name(id="time"), inner], keywords=[]):
+            return known.integral(inner)
+    names = ", ".join(dict.fromkeys([*KNOWN[:2], *known.names, *KNOWN]))
     raise FormulaFault(f"{shown(ast.unparse(node))} is not known in a formula (known: {names}, + - * / ^)")
