@@ -1,8 +1,10 @@
 """Hypothesis profiles: ``dev`` at the desk, ``ci`` (always the same examples) where CI is set. Golden files."""
 
+import datetime
 import importlib
 import itertools
 import os
+import zlib
 from collections.abc import Callable, Generator
 from pathlib import Path
 
@@ -23,6 +25,9 @@ FURTHER = 10_000
 """First seed of ``--attack``."""
 DAILY = 2
 """Seeds of a test that are run every day; its others are slow."""
+TURNS = 3
+HEAVY = frozenset(Path(__file__).with_name("turns.txt").read_text(encoding="utf-8").split())
+"""Tests of more than .4 s of processor a case. Their cases take turns: every day a third of them, the others are slow."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -34,6 +39,17 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--attack", type=int, default=0, metavar="N", help="so many seeds more for every test of random mechanisms"
     )
+    parser.addoption(
+        "--turn",
+        type=int,
+        default=datetime.date.today().toordinal() % TURNS,
+        help=f"which of {TURNS} parts of the heavy tests is run",
+    )
+
+
+def pytest_report_header(config: pytest.Config) -> str:
+    """By what the tests of this day are repeated on another."""
+    return f"heavy tests: --turn {config.getoption('--turn')} of {TURNS}"
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -68,7 +84,10 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Cases that stand for many others: of a test marked ``daily(n)`` all but n are slow; before they are chosen by markers."""
+    """Cases that stand for many others: of a test marked ``daily(n)`` all but n are slow; before they are chosen by markers.
+
+    So are heavy tests whose turn it is not.
+    """
     cases: dict[str, list[pytest.Item]] = {}
     for item in items:
         if item.get_closest_marker("daily") and not item.get_closest_marker("slow"):
@@ -78,6 +97,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         kept = {i * len(found) // n for i in range(n)}
         for i in set(range(len(found))) - kept:
             found[i].add_marker(pytest.mark.slow)
+    for item in items:
+        if (
+            item.nodeid.partition("[")[0] in HEAVY
+            and zlib.crc32(item.nodeid.encode()) % TURNS != item.config.getoption("--turn") % TURNS
+        ):
+            item.add_marker(pytest.mark.slow)
 
 
 @pytest.hookimpl(wrapper=True)

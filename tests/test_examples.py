@@ -15,10 +15,6 @@ import mechgraph as mg
 ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES = sorted((ROOT / "examples").glob("[0-9]*.py"))
 LARGEST_PICTURE = 150_000
-ELSEWHERE = {"05_lee_verdicts", "12_excavator"}
-"""Run by ``reference/test_lee_verdicts.py``, and for its page below."""
-LONG = {"04_readme_figures", "07_lee_rchch", "09_tolerances"}
-"""Seconds each; what they show has its tests among the pictures, the published tables and the studies."""
 
 
 def run(script: Path, *arguments: str) -> str:
@@ -34,14 +30,7 @@ def draws(script: Path) -> bool:
     return "sys.argv" in text and "draw" in text and "write_report" not in text
 
 
-@pytest.mark.daily(9)
-@pytest.mark.parametrize(
-    "script",
-    [
-        pytest.param(script, marks=[pytest.mark.slow] if script.stem in {*ELSEWHERE, *LONG} else [], id=script.stem)
-        for script in EXAMPLES
-    ],
-)
+@pytest.mark.parametrize("script", EXAMPLES, ids=[script.stem for script in EXAMPLES])
 def test_example(script: Path, tmp_path: Path) -> None:
     text = script.read_text(encoding="utf-8")
     assert text.startswith('"""')
@@ -55,14 +44,12 @@ def test_examples_are_numbered_without_gaps() -> None:
     assert [script.stem.partition("_")[0] for script in EXAMPLES] == [f"{i + 1:02d}" for i in range(len(EXAMPLES))]
 
 
-@pytest.mark.slow
 def test_a_worked_example_draws_only_on_request() -> None:
     script = next(script for script in EXAMPLES if script.stem == "03_lee_rcsr")
     assert draws(script)
     assert ".png:" not in run(script)
 
 
-@pytest.mark.slow
 def test_the_worked_machine_has_its_page(tmp_path: Path) -> None:
     """Written on request from what is declared, so that it is always current."""
     script = next(script for script in EXAMPLES if script.stem == "12_excavator")

@@ -211,3 +211,12 @@ def parts_of(target: ast.expr, value: ast.expr) -> list[tuple[ast.expr, ast.expr
 
 def is_text(node: ast.AST) -> bool:
     return isinstance(node, ast.Constant) and isinstance(node.value, str)
+
+
+def test_tests_that_take_turns_are_there() -> None:
+    names = (ROOT / "tests" / "turns.txt").read_text(encoding="utf-8").split()
+    assert names == sorted(set(names))
+    for file, _, name in (line.partition("::") for line in names):
+        assert any(
+            getattr(node, "name", "") == name for node in parsed((ROOT / file).read_text(encoding="utf-8")).body
+        ), (file, name)

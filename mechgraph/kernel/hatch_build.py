@@ -33,7 +33,10 @@ class KernelBuildHook(BuildHookInterface[Any]):
         for command in compiler["compilers"]():
             try:
                 library = place / f"kernel-{compiler['key']()}{compiler['suffix'](target)}"
-                compiler["compile_library"](command, library, target)
+                if (
+                    not library.is_file()
+                ):  # beside the source it may lie from another environment; its name holds the key of all that made it
+                    compiler["compile_library"](command, library, target)
             except (OSError, subprocess.SubprocessError) as error:
                 self.app.display_warning(f"the kernel is not compiled: {compiler['refusal'](command, error)}")
                 continue
