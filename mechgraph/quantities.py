@@ -20,7 +20,7 @@ import sys
 import types
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import chain
-from math import isclose, prod
+from math import isclose, pi, prod
 from typing import Annotated, Any, Literal, NamedTuple, ParamSpec, TypeVar, Union, get_args, get_origin
 
 import numpy as np
@@ -109,6 +109,12 @@ def gravity_hint(units: Mapping[str, str], size: float) -> str:
         if meant
         else ""
     )
+
+
+def angle_hint(value: float) -> str:
+    """What to say of an angle that is more likely meant in degrees; empty where there is nothing."""
+    turns = value / (2 * pi)
+    return f"read as radians, {turns:.4g} turns" if abs(turns) > 2 else ""
 
 
 def _shortest(dimension: Sequence[float], force: bool = True) -> dict[str, float]:

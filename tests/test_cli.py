@@ -756,6 +756,22 @@ def test_an_angle_of_many_turns_without_a_unit_is_doubted() -> None:
         assert "read as" not in run("solve", "four-bar", "--drive", quiet).stderr
 
 
+def test_a_motion_in_whole_numbers_beyond_two_turns_is_doubted_in_python_too() -> None:
+    m = mg.load("four-bar")
+
+    def told(motion: object) -> list[str]:
+        return [str(one) for one in mg.solve(m, {"A": motion}).warnings]
+
+    assert told(np.arange(0, 361, 30)) == ["A.Rz: read as radians, 57.3 turns; for degrees write np.deg2rad(...)"]
+    for quiet in (
+        np.arange(12),
+        np.linspace(0, 20, 12),
+        np.deg2rad([0, 720]),
+        mg.Motion([0.0, 20.0, 40.0], 20.0, t=[0, 1, 2]),
+    ):
+        assert told(quiet) == []
+
+
 def test_a_drive_without_a_motion_is_answered_in_options(tmp_path: Path) -> None:
     m = mg.load("four-bar")
     mg.save(m.replace(drives=["A"]), tmp_path / "still.toml")

@@ -40,7 +40,7 @@ from mechgraph.kinematics.prescribed import coordinate
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.model.toml import swept
-from mechgraph.quantities import KNOWN
+from mechgraph.quantities import KNOWN, angle_hint
 from mechgraph.result.solution import FORMATS, MORE
 from mechgraph.result.values import OK, driver_value
 
@@ -86,15 +86,11 @@ def _values(texts: Sequence[str], turns: bool, where: str) -> list[float]:
 
 def _doubt(texts: Sequence[str], values: Sequence[float], where: str) -> None:
     """Warn of angles typed without a unit that are many turns."""
-    most = max(values, key=abs) / (2 * np.pi)
-    # turns from which on an angle typed without a unit is more likely meant in degrees
-    if abs(most) > 2.0 and not any(_number(text, where)[1] for text in texts):
-        as_degrees = f"{texts[-1].strip()}deg"
-        warnings.warn(
-            f"{where}: read as radians, {most:.4g} turns; for degrees write {as_degrees}, for radians {texts[-1].strip()}rad",
-            MechgraphWarning,
-            stacklevel=3,
-        )
+    told = angle_hint(max(values, key=abs))
+    if told and not any(_number(text, where)[1] for text in texts):
+        typed = texts[-1].strip()
+        text = f"{where}: {told}; for degrees write {typed}deg, for radians {typed}rad"
+        warnings.warn(text, MechgraphWarning, stacklevel=3)
 
 
 def named_value(text: str, what: str) -> tuple[str, str]:

@@ -415,7 +415,13 @@ def _data(item: Described, path: str, where: str) -> dict[str, Any]:
 
 
 def _as_sweep(out: dict[str, Any], motion: Motion) -> dict[str, Any]:
-    """The table of a motion with a sweep, of degrees where that is shorter, in place of positions that it makes exactly."""
+    """The table of a motion with rates as they were given, and a sweep, of degrees where that is shorter, for positions that it makes
+    exactly.
+    """
+    rates = {name: given for name, given in zip(motion.formats, motion.given, strict=False) if name != "position"}
+    out = {
+        key: _plain(rates.get(key, value), key, "") for key, value in out.items() if rates.get(key, value) is not None
+    }
     found = {}
     if motion.position.ndim == 1 and (plain := sweep_of(motion.position)):
         found["sweep"] = plain

@@ -55,9 +55,10 @@ from mechgraph.result.values import (
 from mechgraph.result.views import (
     BeltResult,
     CouplingResult,
-    FrictionNote,
     LinkResult,
     PairResult,
+    Remark,
+    angle_remarks,
     couplings_of,
     forces_of_couplings,
     friction_notes,
@@ -773,13 +774,13 @@ class Solution(Shown):
         )
 
     @property
-    def warnings(self) -> tuple[Doubt | PassedCrossing | Inaccurate | FrictionNote, ...]:
+    def warnings(self) -> tuple[Doubt | PassedCrossing | Inaccurate | Remark, ...]:
         """What makes reactions doubtful (``doubts``); crossings of branches that were passed, with place, miss and the other branches;
         rates and forces that rounding spoils (see ``checks.accuracy``); friction at rest, moments that rub nothing, friction circles
-        that differ from the whole force by more than 5 %, belts that slip.
+        that differ from the whole force by more than 5 %, belts that slip; angles that look like degrees.
         """
         worst = [Inaccurate(*one) for one in _worst(self.checks.accuracy, PATH.inaccurate)]
-        return (*self.doubts, *self._values.passed, *worst, *friction_notes(self._values))
+        return (*self.doubts, *self._values.passed, *worst, *friction_notes(self._values), *angle_remarks(self._values))
 
     def document(self, asked: bool = False) -> Document:
         """Return what ``print`` shows as a document.

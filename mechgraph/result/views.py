@@ -21,7 +21,7 @@ from mechgraph.model.meshes import Mesh
 from mechgraph.model.pair import Pair
 from mechgraph.model.short_forms import Belt
 from mechgraph.pairs.pair_type import PairType
-from mechgraph.quantities import FORCE, LENGTH, MOMENT, POWER, ByName, is_numeric, unit_of
+from mechgraph.quantities import FORCE, LENGTH, MOMENT, POWER, ByName, angle_hint, is_numeric, unit_of
 from mechgraph.result.trajectory import Trajectory
 from mechgraph.result.values import Fact, MaterialPoint, MisfitsLeftOut, PositionLabels, bracket, coupling_unit, ranges
 
@@ -457,8 +457,8 @@ def losses(values: Trajectory) -> dict[str, Array]:
 
 
 @dataclass(frozen=True)
-class FrictionNote:
-    """What friction leaves out or bears badly at a pair or belt ``name``, in a sentence."""
+class Remark:
+    """What is to be known of a pair, belt or freedom ``name``, in a sentence."""
 
     name: str
     text: str
@@ -467,7 +467,17 @@ class FrictionNote:
         return self.text
 
 
-def friction_notes(values: Trajectory) -> Iterator[FrictionNote]:
+def angle_remarks(values: Trajectory) -> Iterator[Remark]:
+    """Turns that are driven, without times, through whole numbers beyond two turns: radians hardly are, degrees are."""
+    names, m = values.whole.freedom_names(), values.whole
+    for name in values.prescribed if values.t is None else ():
+        at = values.coordinates_at(np.arange(values.status().size))[names.index(name)]
+        told = angle_hint(float(max(at, key=abs, default=0.0))) if m.turns(name) and (at == np.round(at)).all() else ""
+        if told:
+            yield Remark(name, f"{name}: {told}; for degrees write np.deg2rad(...)")
+
+
+def friction_notes(values: Trajectory) -> Iterator[Remark]:
     """Positions at rest, moments that rub nothing, coefficients at which the circle and the whole force differ, belts that slip."""
     m = values.whole
     if values.rubbing and values.has_forces:
@@ -478,7 +488,7 @@ def friction_notes(values: Trajectory) -> Iterator[FrictionNote]:
         if rests := int(held.sum()):
             text = f"friction has no direction at {rests} of {held.size} positions, where nothing moves: efforts there are those "
             text += "without it. Give velocity= for a motion; s[...].effort_range has the ends between which it holds"
-            yield FrictionNote(values.rubbing[0], text)
+            yield Remark(values.rubbing[0], text)
     for load in (load for load in values.loads if isinstance(load, Friction) and values.has_forces):
         if load.of in m.pair_index:
             yield from _notes_of_pair(values, load.with_numbers(values.number))
@@ -492,15 +502,15 @@ def friction_notes(values: Trajectory) -> Iterator[FrictionNote]:
                 why = f"belt {load.of} slips (slip_margin down to {least:.3g}): its strands differ by more than e^(mu wrap)"
                 if not whole and not np.any(load.preload):
                     why += "; an mg.Belt has no tension in its slack strand, give it by preload="
-                yield FrictionNote(load.of, why)
+                yield Remark(load.of, why)
 
 
-def _notes_of_pair(values: Trajectory, load: Friction) -> Iterator[FrictionNote]:
+def _notes_of_pair(values: Trajectory, load: Friction) -> Iterator[Remark]:
     where, result = f"friction of {load.of}: ", PairResult(values, values.whole.pair_index[load.of])
     row = values.whole.pair(load.of).type
     more = 100 * float(np.max(np.hypot(1.0, load.coefficient_at_rest)) - 1)
     if load.model == "circle" and load.radius is not None and not row.takes_pitch and more > 5:
-        yield FrictionNote(
+        yield Remark(
             load.of, f"{where}model='total' gives couples {more:.2g} % larger than the circle; say which is meant"
         )
     takes = {name for way in WAYS if way.of(row) for name in way.takes}
@@ -517,7 +527,7 @@ def _notes_of_pair(values: Trajectory, load: Friction) -> Iterator[FrictionNote]
         radial = np.hypot(*(np.nan_to_num(result.components.get(name, 0.0)) for name in ("Fx", "Fy")))
         if (radial > MOTIONS.idle * np.nan_to_num(result.magnitude)).any():
             most = f"{radial.max():.4g} {unit_of(values.mechanism.units, FORCE)}".rstrip()
-            yield FrictionNote(
+            yield Remark(
                 load.of, f"{where}a radial force of up to {most} rubs nothing; give radius=, that of the journal"
             )
     # a bearing as long as its diameter bears it by more than its force; of a guide any moment that is no rounding
@@ -528,7 +538,7 @@ def _notes_of_pair(values: Trajectory, load: Friction) -> Iterator[FrictionNote]
         if (np.abs(moment) > arm * np.nan_to_num(result.magnitude)).any():
             most = f"{np.abs(moment).max():.4g} {unit_of(values.mechanism.units, MOMENT)}".rstrip()
             why = f"{where}a moment of up to {most} {how} the axis rubs nothing; give {name}=, the distance at which it is borne"
-            yield FrictionNote(load.of, why)
+            yield Remark(load.of, why)
 
 
 def friction_of(values: Trajectory, name: str) -> Friction:
