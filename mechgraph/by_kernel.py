@@ -24,7 +24,7 @@ from mechgraph.maths.newton import Work
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.memo import dataclass
 from mechgraph.model.belts import pretensions
-from mechgraph.model.friction import Friction, places_in
+from mechgraph.model.friction import places_in, rubbing_loads
 from mechgraph.model.loads import Load
 from mechgraph.outcome import Call, Outcome, Starts, system_at
 from mechgraph.result.trajectory import BlockMotion
@@ -86,9 +86,10 @@ class KernelOutcome(Outcome):
             line.options.progress(count, count)
 
     def _rubbing(self) -> tuple[str, ...]:
-        """The pair of every place that rubs."""
-        m, dry = self.line.m, (load for load in self.loads if isinstance(load, Friction))
-        return tuple(load.of for load in dry for _ in places_in(load, m.pair(load.of).type))
+        """The pair or coupling of every place that rubs."""
+        m, dry = self.line.m, rubbing_loads(self.line.m, self.loads)
+        pairs = [m.pair(load.of).type if load.of in m.pair_index else None for load in dry]
+        return tuple(load.of for load, row in zip(dry, pairs, strict=True) for _ in (places_in(load, row) if row else "t"))
 
     def _left_open(self) -> Index:
         """Positions at which the kernel does not say what friction does, or where there is none in motion."""
@@ -227,6 +228,7 @@ def _layout(line: Started) -> Layout | str:
     """The layout of a mechanism, or what of it cannot be carried; kept with all mechanisms of its graph, whose couplings may be others."""
     sized = line.system.sized_once
     key = COMPILED, line.columns.tobytes(), _passive(line), tuple((c.freedoms, c.steps) for c in line.m.couplings)
+    key = *key, tuple((belt.belt, *rows) for belt, rows in line.m.once(pretensions))
     if key not in sized:
         why = why_not(line.system)
         sized[key] = layout(line.system, line.columns, line.passive) if why is None else why
@@ -255,5 +257,4 @@ def gives_forces(line: Started) -> bool:
         line.options.method == "loop_wrench"
         and line.options.redundant != "elastic"
         and line.acting is line.columns
-        and not line.m.once(pretensions)
     )

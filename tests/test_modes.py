@@ -13,9 +13,8 @@ from mechanisms import Z, bennett, linked_four_bar, ring
 
 import mechgraph as mg
 from mechgraph.files import cache_folder
-from mechgraph.force.loads import user_poses
 from mechgraph.kinematics.assembly import closed_start
-from mechgraph.kinematics.state import Configuration, close_all
+from mechgraph.kinematics.state import Configuration, close_all, user_poses
 from mechgraph.model.mechanism import chain_symbols
 from mechgraph.modes import start_sets
 from mechgraph.modes.assemblies import Finder, Question

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.by_kernel import cannot, gives_forces
+from mechgraph.by_kernel import cannot
 from mechgraph.determinacy.snapping import meant
 from mechgraph.errors import DeclarationError, FileError, listed, visible
 from mechgraph.files import writable, write_whole
@@ -64,7 +64,7 @@ STATUSES = (
     (
         "FRICTION",
         "friction not solved",
-        "friction jams here, has no finite force, none that is surely the only one, or turns the force between teeth round",
+        "friction jams here, has no finite force, none that is surely the only one, or none that settles",
     ),
     ("FLANKS", "flanks not settled", "flanks on which gears that are redundant press are not found"),
 )
@@ -230,9 +230,7 @@ def tabled(m: Mechanism) -> Tabled:
     home = coordinates[[own.freedom_names().index(name) for name in drives]]
     line = Pipeline(DriverMotion(own, dict(zip(drives, home.tolist(), strict=True))), Options())
     system, x = line.system, line.x
-    if fault := cannot(line) or (
-        None if gives_forces(line) else "it does not find the tensions of belts with a pretension"
-    ):
+    if fault := cannot(line):
         raise DeclarationError(subject, [f"the compiled kernel does not carry it: {fault}"])
     places = layout(system, line.columns, line.passive)
     found = tables(places, system, x[:, None], own.loads)
@@ -245,7 +243,7 @@ def tabled(m: Mechanism) -> Tabled:
 
 def _one_by_one(variants: Variants) -> bool:
     """Whether each variant has to be declared by itself."""
-    return any(field.one_by_one for field, _ in variants.own)
+    return bool(variants.missing) or any(field.one_by_one for field, _ in variants.own)
 
 
 IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
@@ -440,7 +438,7 @@ def _whole_numbers(tables: Tabled) -> Iterator[str]:
     """The table of what the mechanism is made of, part by part as the comment of the kernel says."""
     known = tables.I.tolist()
     pairs, factors, columns, _, loops, steps, couplings, terms, drives, unknowns, loads = known[2:13]
-    passives, moved, *_, lines, line_steps = known[16 : len(COUNTS)]
+    passives, moved, *_, lines, line_steps, belts, spans = known[16 : len(COUNTS)]
     parts = [
         ("counts", len(COUNTS)), ("first factor of every pair", pairs + 1), ("kinds of factors", factors),
         ("their first columns", factors + 1),
@@ -454,7 +452,8 @@ def _whole_numbers(tables: Tabled) -> Iterator[str]:
         ("couplings: first terms", couplings + 1),        ("freedoms of the terms", terms),
         ("passive motions: first links", passives + 1), ("links that they move as one", moved), ("turns", passives),
         ("couplings along lines, links on which these stand still", 2 * lines), ("their first steps", lines + 1),
-        ("pairs on the way, senses", 2 * line_steps), ("loads", 4 * loads),
+        ("pairs on the way, senses", 2 * line_steps), ("belts with a pretension: first spans", belts + 1),
+        ("couplings of these", spans), ("loads", 4 * loads),
     ]  # fmt: skip
     assert sum(count for _, count in parts) == len(known)
     at = 0
@@ -479,6 +478,7 @@ def _numbers(tables: Tabled) -> Iterator[str]:
         ("rates of the passive motions at the start", (), known["passive motions"] * len(freedoms)),
         ("coefficients of couplings", (), known["terms"]), ("their constants", (), known["couplings"]),
         ("unit wrenches of couplings along lines, on either flank", (), 12 * known["couplings along lines"]),
+        ("belts with a pretension: parts of their spans", (), known["spans of these"]), ("pretensions", (), known["belts with a pretension"]),
         ("loads", (), known["load numbers"]),
     ]  # fmt: skip
     assert sum(max(1, len(names)) * count for _, names, count in parts) == len(P)
@@ -492,7 +492,7 @@ def _numbers(tables: Tabled) -> Iterator[str]:
 COUNTS = (
     "format", "links", "pairs", "factors", "columns", "states", "loops", "steps", "couplings", "terms", "drives", "unknowns", "loads",
     "frame", "factor numbers", "load numbers", "passive motions", "links in them", "first component of loops", "rows of a loop",
-    "places that rub", "couplings along lines", "pairs on their ways",
+    "places that rub", "couplings along lines", "pairs on their ways", "belts with a pretension", "spans of these",
 )  # fmt: skip
 """What stands at the head of the table."""
 

@@ -24,10 +24,9 @@ from mechgraph.determinacy.decomposition import LinkRows, joints_at
 from mechgraph.determinacy.families import kind_of
 from mechgraph.determinacy.mobility import Position
 from mechgraph.errors import DeclarationError
-from mechgraph.force.loads import user_poses
 from mechgraph.graph.atlas import MultipleJoint
 from mechgraph.kinematics.assembly import assembled, assembled_at, at_position
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.state import Configuration, user_poses
 from mechgraph.kinematics.touching import ContactLines
 from mechgraph.maths.se3 import Array
 from mechgraph.memo import dataclass

@@ -17,9 +17,8 @@ from mechgraph.determinacy.finite_motion import finite_motion
 from mechgraph.determinacy.mobility import free_motion
 from mechgraph.errors import DeclarationError, listed
 from mechgraph.fields import Described, axes_of
-from mechgraph.force.loads import user_poses
 from mechgraph.kinematics.assembly import assembled
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.state import Configuration, user_poses
 from mechgraph.maths.se3 import Array
 from mechgraph.memo import dataclass
 from mechgraph.model.loads import Load

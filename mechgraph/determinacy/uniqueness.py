@@ -24,11 +24,11 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from mechgraph.force.reactions import PairFrames, at_pair_points, pretension_conditions
+from mechgraph.force.reactions import PairFrames, at_pair_points
 from mechgraph.graph.linkgraph import labels_of_bipartite
 from mechgraph.kinematics.solver import PROBES, SEED, ClosureRank, EngineName, closure_rank
 from mechgraph.kinematics.state import Configuration
-from mechgraph.kinematics.touching import ContactLines
+from mechgraph.kinematics.touching import ContactLines, pretension_conditions
 from mechgraph.maths.se3 import Array, Index, null_space
 from mechgraph.maths.tolerances import STRESSES
 from mechgraph.memo import dataclass

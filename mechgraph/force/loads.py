@@ -12,7 +12,7 @@ import numpy as np
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import PerCase
 from mechgraph.kinematics.rates import PassiveMotion, PassiveMotions, Rates, Velocities
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.state import Configuration, user_poses
 from mechgraph.maths.se3 import Array, cross, rotate, rotate_back, to_matrix
 from mechgraph.maths.tolerances import MOTIONS
 from mechgraph.model.loads import Load, Value
@@ -241,15 +241,6 @@ class Site:
         """Given efforts ``(F, T)`` as internal ones."""
         lengths = self.here.system.is_length[:, None]
         return np.where(lengths, self.efforts / self.L, self.efforts / self.L**2)
-
-
-def user_poses(here: Configuration, links: slice = slice(None)) -> Array:
-    """Poses of the declared link frames (of some links) in the global frame, ``(N, T, 4, 4)``."""
-    par = here.system.par
-    X = here.poses[:, :, links].copy()
-    shift = rotate(X[:, :3], par.offset[:, links, None])
-    X[:, 3] = par.L * X[:, 3] + par.origin[:, None, None] - shift
-    return to_matrix(X)
 
 
 def user_twists(here: Configuration, V: Array) -> Array:

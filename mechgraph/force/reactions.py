@@ -25,10 +25,10 @@ from mechgraph.equations.build import BookkeepingName, formulate
 from mechgraph.equations.formulation import Formulation
 from mechgraph.equations.terms import MovingState, State
 from mechgraph.errors import DeclarationError
-from mechgraph.force.loads import inertia_wrenches, user_poses, user_twists
+from mechgraph.force.loads import inertia_wrenches, user_twists
 from mechgraph.kinematics.rates import Rates
-from mechgraph.kinematics.state import Configuration, FactoredClosure
-from mechgraph.kinematics.touching import ContactLines
+from mechgraph.kinematics.state import Configuration, FactoredClosure, user_poses
+from mechgraph.kinematics.touching import ContactLines, pretension_conditions
 from mechgraph.maths.linear import Choice, ChosenSystem, add_at, choose, least_solution
 from mechgraph.maths.se3 import Array, Index, batch_last, cross, shift_wrench
 from mechgraph.maths.tolerances import STRESSES
@@ -214,24 +214,6 @@ def together(here: Configuration, f: FactoredClosure, loads: Array, efforts: Arr
     through[here.system.gaps] = 0.0
     own = here.pair_sums((here.E[:, :, None] * through).reshape(6, -1, k * T)).reshape(totals.shape)
     return totals - own, through, -x[here.system.graph.loop_rows :]
-
-
-def pretension_conditions(here: Configuration) -> tuple[list[BeltDrive], Array, Array]:
-    """Belts with a pretension T0, and what it says of the multipliers ``m (n, T)`` of the rows behind those of the loops, ``C m = c``:
-    ``sum l T = T0 sum l`` over the spans of each, ``T = -m``. ``C (b, n, T)``, ``c (b, 1)``.
-    """
-    m, loops = here.system.m, here.system.graph.loop_rows
-    asked = m.once(pretensions)
-    scale = here.system.par.L**2 * np.broadcast_to(here.system.row_scale, (here.system.n_rows, here.T))[loops:]
-    C = np.zeros((len(asked), len(scale), here.T))
-    for i, (belt, rows) in enumerate(asked):
-        poses = user_poses(here)
-        lengths = belt.course_of(
-            m, [np.moveaxis(poses[m.place_of_link(p.link)], 0, 2) for p in belt.pulleys(m)]
-        ).spans.length
-        C[i, rows] = -scale[rows] * lengths / lengths.sum(axis=0)
-    belts = [belt for belt, _ in asked]
-    return belts, C, np.array([[belt.pretension] for belt in belts], dtype=float)
 
 
 def pretensioned(here: Configuration, wrenches: Wrenches, f: FactoredClosure, part: float = 1.0) -> Wrenches:

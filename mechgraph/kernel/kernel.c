@@ -50,11 +50,11 @@ enum { ITERATIONS = 8, MOST_STEPS = 20000, MOST_TURNS = 8, POINTS = 8, TOLD = 8,
 /* --- tables and memory ------------------------------------------------------------------------------------------------------------- */
 
 typedef struct {
-  int links, pairs, factors, columns, states, loops, steps, couplings, terms, drives, unknowns, loads, frame_link, rows, stresses, passives, held, part, height, rubs, lines;
+  int links, pairs, factors, columns, states, loops, steps, couplings, terms, drives, unknowns, loads, frame_link, rows, stresses, passives, held, part, height, rubs, lines, line_steps, belts;
   const int *first, *kind, *column, *state, *number, *ends, *walk, *chord, *loop_first, *loop_pair, *loop_sign, *owner, *column_state,
-      *is_length, *place, *effort_factor, *effort_at_b, *dual, *drive, *unknown, *term_first, *term_column, *passive_first, *passive_link, *turns, *line, *line_first, *line_step, *load;
+      *is_length, *place, *effort_factor, *effort_at_b, *dual, *drive, *unknown, *term_first, *term_column, *passive_first, *passive_link, *turns, *line, *line_first, *line_step, *belt_first, *belt_coupling, *load;
   const double *unit, *origin, *start, *start_coordinates, *frame, *marker_a, *marker_b, *factor_number, *effort, *mass, *center,
-      *inertia, *base, *border, *coefficient, *constant, *line_wrench, *load_number;
+      *inertia, *base, *border, *coefficient, *constant, *line_wrench, *belt_part, *pretension, *load_number;
 } Model;
 
 /* A place on the path: state, rates and accelerations along the way, the closure matrix, its rate along the way, the inverse C^-1 of its
@@ -85,10 +85,13 @@ typedef struct {
   double *stress, *size, *row_value, *column_value, *trial, *increment, *there, *change, *bound, *record, *direction, *line_begin, *asked, *kept;
   /* passive motions: unit rates, twists with their rates, velocity parts, links at rest in them; along a step, what is missing to rest */
   double *passive, *twist, *twist_rate, *own_bias, *moving_bias, *moving, *raw, *apart, *trial_rate, *trial_acceleration, *still, *series;
-  /* friction: rates that tell its directions, reactions without it and as they press, those of unit efforts; of every place what it reads,
-   * the wrenches that it exerts for a unit of its normal force and vector, these as efforts in its pair, first row; efforts and what pairs take up */
-  double *slip, *smooth, *pressing, *unit, *nothing, *reads, *exerts, *own, *linear, *slope, *sized, *normal, *vector, *sliding, *rubbed, *taken, *bare;
-  int *row_of, *flank; /* flank: whether the second line of a coupling acts, that of a negative multiplier */
+  /* friction: rates that tell its directions; answers (reactions, efforts, multipliers) without it, as they press, and of unit efforts; of
+   * every place what it reads of an answer, the wrenches that it exerts for a unit of its normal force and vector, these as efforts in the
+   * pairs that they would pass and what these take up; efforts and what pairs take up of all, of them those of teeth, and their wrenches */
+  double *slip, *smooth, *pressing, *unit, *nothing, *reads, *exerts, *own, *takes, *linear, *slope, *sized, *normal, *vector, *sliding, *rubbed, *taken, *bare, *teeth, *beside, *rubbing;
+  /* first row and first part of every place, its load; pairs and senses of the parts; pairs whose unit efforts are answered; whether the
+   * second line of a coupling acts, that of a negative multiplier */
+  int *row_of, *part_of, *answered, *flank;
   magnitude single, told, allowed, corrected, *speed;
   size_t n_kept;
   Node a, b, before;
@@ -104,9 +107,9 @@ static void read_tables(const int *I, const double *P, Model *m) {
   m->links = I[MGK_LINKS], m->pairs = I[MGK_PAIRS], m->factors = I[MGK_FACTORS], m->columns = I[MGK_COLUMNS];
   m->states = I[MGK_STATES], m->loops = I[MGK_LOOPS], m->steps = I[MGK_STEPS], m->couplings = I[MGK_COUPLINGS];
   m->terms = I[MGK_TERMS], m->drives = I[MGK_DRIVES], m->unknowns = I[MGK_UNKNOWNS], m->loads = I[MGK_LOADS];
-  m->frame_link = I[MGK_FRAME], m->passives = I[MGK_PASSIVES], m->part = I[MGK_FIRST_PART], m->height = I[MGK_LOOP_ROWS], m->rubs = I[MGK_RUBS], m->lines = I[MGK_LINES];
+  m->frame_link = I[MGK_FRAME], m->passives = I[MGK_PASSIVES], m->part = I[MGK_FIRST_PART], m->height = I[MGK_LOOP_ROWS], m->rubs = I[MGK_RUBS], m->lines = I[MGK_LINES], m->line_steps = I[MGK_LINE_STEPS], m->belts = I[MGK_BELTS];
   m->held = m->height * m->loops + m->couplings;
-  m->rows = m->held + m->passives, m->stresses = m->rows - m->unknowns;
+  m->rows = m->held + m->passives, m->stresses = m->rows - m->unknowns - m->belts;
   const int p = m->pairs, f = m->factors, c = m->columns, n = m->links, *i = I + MGK_HEAD;
   m->first = i, i += p + 1, m->kind = i, i += f, m->column = i, i += f + 1, m->state = i, i += f, m->number = i, i += f;
   m->ends = i, i += 2 * p, m->walk = i, i += 4 * (p - m->loops), m->chord = i, i += m->loops;
@@ -116,14 +119,16 @@ static void read_tables(const int *I, const double *P, Model *m) {
   m->drive = i, i += m->drives, m->unknown = i, i += m->unknowns;
   m->term_first = i, i += m->couplings + 1, m->term_column = i, i += m->terms;
   m->passive_first = i, i += m->passives + 1, m->passive_link = i, i += I[MGK_PASSIVE_LINKS], m->turns = i, i += m->passives;
-  m->line = i, i += 2 * m->lines, m->line_first = i, i += m->lines + 1, m->line_step = i, i += 2 * I[MGK_LINE_STEPS], m->load = i;
+  m->line = i, i += 2 * m->lines, m->line_first = i, i += m->lines + 1, m->line_step = i, i += 2 * m->line_steps;
+  m->belt_first = i, i += m->belts + 1, m->belt_coupling = i, i += I[MGK_BELT_SPANS], m->load = i;
   if (!P) return;
   const double *d = P;
   m->unit = d, d += 1, m->origin = d, d += 3, m->start = d, d += m->states, m->start_coordinates = d, d += c, m->frame = d, d += 12;
   m->marker_a = d, d += 12 * p, m->marker_b = d, d += 12 * p, m->factor_number = d, d += I[MGK_FACTOR_NUMBERS];
   m->effort = d, d += 6 * c, m->mass = d, d += n, m->center = d, d += 3 * n, m->inertia = d, d += 6 * n, m->base = d, d += 12 * n;
   m->border = d, d += c * m->passives;
-  m->coefficient = d, d += m->terms, m->constant = d, d += m->couplings, m->line_wrench = d, d += 12 * m->lines, m->load_number = d;
+  m->coefficient = d, d += m->terms, m->constant = d, d += m->couplings, m->line_wrench = d, d += 12 * m->lines;
+  m->belt_part = d, d += I[MGK_BELT_SPANS], m->pretension = d, d += m->belts, m->load_number = d;
 }
 
 /* The first freedom of a pair. */
@@ -138,7 +143,7 @@ static double *taken(double **memory, size_t *size, size_t count) {
 
 /* The memory of a state laid out; its size in bytes. */
 static size_t lay_out(const Model *m, double *memory, Work *w) {
-  size_t size = 0, c = m->columns, n = m->links, p = m->pairs, r = m->rows, u = m->unknowns, s = m->stresses > 0 ? m->stresses : 0, q = m->passives;
+  size_t size = 0, c = m->columns, n = m->links, p = m->pairs, r = m->rows, u = m->unknowns, s = m->rows > m->unknowns ? m->rows - m->unknowns : 0, q = m->passives;
   int places[MGK_PARTS + 1];
 #define TAKE(name, count) w->name = taken(&memory, &size, (count))
   TAKE(x, m->states), TAKE(drive, m->drives), TAKE(axis, 3 * m->factors), TAKE(angle, m->factors), TAKE(begun, m->factors), TAKE(border, q * c);
@@ -168,21 +173,23 @@ static size_t lay_out(const Model *m, double *memory, Work *w) {
   int head[MGK_HEAD] = {0};
   head[MGK_LINKS] = m->links, head[MGK_PAIRS] = m->pairs, head[MGK_COLUMNS] = m->columns, head[MGK_STATES] = m->states;
   head[MGK_LOOPS] = m->loops, head[MGK_COUPLINGS] = m->couplings, head[MGK_UNKNOWNS] = m->unknowns, head[MGK_PASSIVES] = m->passives;
-  head[MGK_LOOP_ROWS] = m->height, head[MGK_RUBS] = m->rubs;
+  head[MGK_LOOP_ROWS] = m->height, head[MGK_RUBS] = m->rubs, head[MGK_BELTS] = m->belts;
   mgk_record(head, places);
   TAKE(record, places[MGK_PARTS]);
-  const size_t R = m->rubs, moved = R ? c : 0, pairs = R ? 6 * p : 0;
-  TAKE(slip, moved), TAKE(smooth, pairs), TAKE(pressing, pairs), TAKE(unit, pairs * c), TAKE(nothing, R ? 6 * n : 0), TAKE(reads, 18 * R), TAKE(exerts, 24 * R), TAKE(own, 24 * R);
+  const size_t R = m->rubs, moved = R ? c : 0, pairs = R ? 6 * p : 0, all = R ? 6 * p + c + m->couplings : 0, parts = R ? R + m->line_steps : 0;
+  TAKE(slip, moved), TAKE(smooth, all), TAKE(pressing, all), TAKE(unit, all * c), TAKE(nothing, R ? 6 * n : 0), TAKE(reads, 18 * R), TAKE(exerts, 24 * R), TAKE(own, 24 * parts), TAKE(takes, 24 * parts);
   TAKE(linear, 3 * R * (4 * R + 1)), TAKE(slope, R * (R + 1)), TAKE(sized, R * R), TAKE(normal, R), TAKE(vector, 3 * R + 2 * R), TAKE(sliding, R), TAKE(rubbed, moved), TAKE(taken, pairs), TAKE(bare, 6 * n);
-  w->row_of = (int *)taken(&memory, &size, 2 * R + 1), w->flank = (int *)taken(&memory, &size, m->lines);
+  TAKE(teeth, moved), TAKE(beside, pairs), TAKE(rubbing, R ? 6 * m->couplings : 0);
+  w->row_of = (int *)taken(&memory, &size, 3 * R + 2), w->part_of = (int *)taken(&memory, &size, 2 * parts), w->answered = (int *)taken(&memory, &size, R ? p : 0);
+  w->flank = (int *)taken(&memory, &size, m->lines);
 #undef TAKE
   return size * sizeof(double);
 }
 
 int mgk_record(const int *I, int *places) {
   const int c = I[MGK_COLUMNS], n = I[MGK_LINKS], p = I[MGK_PAIRS], k = I[MGK_COUPLINGS], q = I[MGK_PASSIVES], R = I[MGK_RUBS];
-  const int s = I[MGK_LOOP_ROWS] * I[MGK_LOOPS] + k + q - I[MGK_UNKNOWNS];
-  const int lengths[MGK_PARTS] = {I[MGK_STATES], c, c, c, 1, 2, 3 * p, 6 * p, c, c, 6 * n, 6 * p * s, c * s, c, k, k * s, c * s, 6, 1, 1, q ? 6 * n : 0, q, q, R ? c : 0, R ? 6 * p : 0, R, R, R > 0};
+  const int s = I[MGK_LOOP_ROWS] * I[MGK_LOOPS] + k + q - I[MGK_UNKNOWNS] - I[MGK_BELTS];
+  const int lengths[MGK_PARTS] = {I[MGK_STATES], c, c, c, 1, 2, 3 * p, 6 * p, c, c, 6 * n, 6 * p * s, c * s, c, k, k * s, c * s, 6, 1, 1, q ? 6 * n : 0, q, q, R ? c : 0, R ? 6 * p : 0, R, R, R ? c : 0, R ? 6 * k : 0, R > 0};
   places[0] = 0;
   FOR(i, MGK_PARTS) places[i + 1] = places[i] + lengths[i];
   return MGK_OK;
@@ -1086,16 +1093,21 @@ static void couple(const Model *m, const double *multiplier, double *out) {
     out[m->term_column[i]] += m->coefficient[i] * multiplier[k];
 }
 
+/* The wrench on gear b for a unit multiplier of a coupling along a line, on the flank that acts. */
+static void along_line_of(const Model *m, const Work *w, int l, double *out) {
+  const double *X = w->pose + 12 * m->line[2 * l + 1], *G = m->line_wrench + 12 * l + 6 * w->flank[l], at[3] = {X[3], X[7], X[11]};
+  turned(X, G, out);
+  turned(X, G + 3, out + 3);
+  wrench_moved(out, at, 1.0);
+}
+
 /* What couplings along lines take off the wrenches of pairs on their ways for multipliers, times a sign: links touch each other, and pairs do
  * not bear what `couple` would bring them (kinematics/touching.py). */
 static void relieve(const Model *m, const Work *w, const double *multiplier, double sign, double *pairs) {
   FOR(l, m->lines) {
     const int k = m->line[2 * l];
-    const double *X = w->pose + 12 * m->line[2 * l + 1], *G = m->line_wrench + 12 * l + 6 * w->flank[l], at[3] = {X[3], X[7], X[11]};
     double f[6];
-    turned(X, G, f);
-    turned(X, G + 3, f + 3);
-    wrench_moved(f, at, 1.0);
+    along_line_of(m, w, l, f);
     for (int s = m->line_first[l]; s < m->line_first[l + 1]; s++) {
       const int pair = m->line_step[2 * s];
       add_part(6, -sign * m->line_step[2 * s + 1] * multiplier[k], f, pairs + 6 * pair);
@@ -1108,10 +1120,10 @@ static void relieve(const Model *m, const Work *w, const double *multiplier, dou
 }
 
 /* Flanks of the signs of multipliers; how many are other ones now. */
-static int turned_over(const Model *m, Work *w) {
+static int turned_over(const Model *m, Work *w, const double *multiplier) {
   int changed = 0;
   FOR(l, m->lines) {
-    const int other = REAL_PART(w->multiplier[m->line[2 * l]]) < 0.0;
+    const int other = REAL_PART(multiplier[m->line[2 * l]]) < 0.0;
     changed += other != w->flank[l], w->flank[l] = other;
   }
   return changed;
@@ -1124,13 +1136,45 @@ static void at_points(const Model *m, const Work *w, double *pairs, double sign)
   }
 }
 
+/* The sum over the spans of a belt that its pretension tells, of multipliers. */
+static double tension(const Model *m, int belt, const double *multiplier) {
+  double sum = 0.0;
+  for (int i = m->belt_first[belt]; i < m->belt_first[belt + 1]; i++) sum += m->belt_part[i] * multiplier[m->belt_coupling[i]];
+  return sum;
+}
+
+/* States of which the last ones, one a belt with a pretension, bring a unit of its own `tension` alone, and the others none: elimination in
+ * place. Whether every belt has one. */
+static int by_belts(const Model *m, int all, double *stress) {
+  FOR(b, m->belts) {
+    const int count = m->stresses + m->belts - b;
+    double *own = stress + (size_t)all * (count - 1);
+    magnitude size = 0.0;
+    int best = 0;
+#define MULTIPLIERS(s) (stress + (size_t)all * (s) + all - m->couplings)
+    FOR(s, count) if (fabs(tension(m, b, MULTIPLIERS(s))) > fabs(tension(m, b, MULTIPLIERS(best)))) best = s;
+    for (int i = m->belt_first[b]; i < m->belt_first[b + 1]; i++) size = raised(size, fabs(m->belt_part[i]));
+    if (!(fabs(tension(m, b, MULTIPLIERS(best))) > UNIQUE * size)) return 0;
+    const double unit = 1.0 / tension(m, b, MULTIPLIERS(best));
+    FOR(i, all) {
+      const double t = unit * stress[(size_t)all * best + i];
+      stress[(size_t)all * best + i] = own[i], own[i] = t;
+    }
+    FOR(s, m->stresses + m->belts) if (s != count - 1) add_part(all, -tension(m, b, MULTIPLIERS(s)), own, stress + (size_t)all * s);
+#undef MULTIPLIERS
+  }
+  return 1;
+}
+
 /* Self-stresses: one a dropped row, orthonormal in the reactions at the pair points, moments over L; they stay about these points. Each is
- * reactions, efforts in freedoms and multipliers of couplings, one behind the other as in w->reaction, w->tau, w->multiplier. */
+ * reactions, efforts in freedoms and multipliers of couplings, one behind the other as in w->reaction, w->tau, w->multiplier. Behind them
+ * those that pretensions decide, see `by_belts`. */
 static int self_stresses(const Model *m, Work *w) {
   const int n = m->unknowns, p = 6 * m->pairs, c = m->columns, k = m->couplings, all = p + c + k;
   magnitude largest = 0.0;
-  memset(w->stress, 0, (size_t)m->stresses * all * sizeof(double));
-  FOR(s, m->stresses) {
+  const int count = m->stresses + m->belts;
+  memset(w->stress, 0, (size_t)count * all * sizeof(double));
+  FOR(s, count) {
     double *null = w->row_value, *stress = w->stress + s * all, *effort = stress + p, *y = w->column_value;
     FOR(i, n) y[i] = -w->lu[(n + s) * n + i];
     back_through(m, w, y);
@@ -1145,7 +1189,10 @@ static int self_stresses(const Model *m, Work *w) {
     FOR(i, k) effort[c + i] = -null[m->height * m->loops + i];
     relieve(m, w, effort + c, 1.0, stress);
     at_points(m, w, stress, -1.0);
-    w->size[s] = sqrt(dot(stress, stress, p));
+  }
+  if (!by_belts(m, all, w->stress)) return MGK_STRAIN;
+  FOR(s, m->stresses) {
+    w->size[s] = sqrt(dot(w->stress + s * all, w->stress + s * all, p));
     largest = raised(largest, fabs(w->size[s]));
   }
   FOR(s, m->stresses) {
@@ -1162,9 +1209,9 @@ static int self_stresses(const Model *m, Work *w) {
   return MGK_OK;
 }
 
-/* Total wrenches of all pairs, reactions of least norm and efforts, under wrenches `on` links and `given` efforts, and what holds passive
- * links. */
-static void borne(const Model *m, Work *w, const double *on, const double *given, double *record, const int *places) {
+/* Total wrenches of all pairs, reactions of least norm and efforts, under wrenches `on` links, `given` efforts and a part of the pretension of
+ * belts, and what holds passive links. */
+static void borne(const Model *m, Work *w, const double *on, const double *given, double pretension, double *record, const int *places) {
   const int p = 6 * m->pairs, c = m->columns, k = m->couplings;
   memcpy(w->carried, on, (size_t)6 * m->links * sizeof(double));
   if (m->passives) {
@@ -1194,8 +1241,10 @@ static void borne(const Model *m, Work *w, const double *on, const double *given
     add_part(6, -w->tau[i], w->E + 6 * i, w->reaction + 6 * m->owner[i]);
   }
   relieve(m, w, w->multiplier, 1.0, w->reaction);
-  if (!m->stresses) return;
+  if (m->stresses + m->belts < 1) return;
   at_points(m, w, w->reaction, -1.0);
+  FOR(b, m->belts)
+    add_part(p + c + k, pretension * m->pretension[b] - tension(m, b, w->multiplier), w->stress + (size_t)(m->stresses + b) * (p + c + k), w->reaction);
   FOR(s, m->stresses) {
     const double *stress = w->stress + s * (p + c + k);
     add_part(p + c + k, -dot(stress, w->reaction, p), stress, w->reaction);
@@ -1203,15 +1252,21 @@ static void borne(const Model *m, Work *w, const double *on, const double *given
   at_points(m, w, w->reaction, 1.0);
 }
 
-/* The same with the self-stresses, the given efforts being w->given, on the flanks that press. */
+/* The same with the self-stresses, the given efforts being w->given, all on the flanks that w->flank says. */
+static int borne_here(const Model *m, Work *w, const double *on, double *record, const int *places) {
+  if (m->stresses + m->belts > 0 && self_stresses(m, w)) return MGK_STRAIN;
+  borne(m, w, on, w->given, 1.0, record, places);
+  return MGK_OK;
+}
+
+/* The same on the flanks that press. */
 static int borne_on_flanks(const Model *m, Work *w, const double *on, double *record, const int *places) {
   int turns = 0;
   memset(w->flank, 0, m->lines * sizeof(int));
   do {
     if (turns++ > MOST_TURNED) return MGK_FLANKS;
-    if (m->stresses && self_stresses(m, w)) return MGK_STRAIN;
-    borne(m, w, on, w->given, record, places);
-  } while (turned_over(m, w));
+    if (borne_here(m, w, on, record, places)) return MGK_STRAIN;
+  } while (turned_over(m, w, w->multiplier));
   return MGK_OK;
 }
 
@@ -1295,10 +1350,60 @@ static void force_at(const double *p, const double *f, double size, double *out)
   cross(p, out + 3, out);
 }
 
+/* Size of a friction wrench -f N U on gear b that leaves an efficiency of the power, see force/friction.py; not a number where none does.
+ * `push`: the wrench of a unit normal force, `screws` of gears a and b in the frame X of their carrier, `twist` of b against a. */
+static double part_lost(const double *push, const double *X, const double *screws, const double *twist, const double *U, double efficiency) {
+  const double at[3] = {X[3], X[7], X[11]};
+  double of[2], along = 0.0;
+  FOR(g, 2) {
+    double Z[6], turn[3];
+    turned(X, screws + 6 * g, Z);
+    turned(X, screws + 6 * g + 3, Z + 3);
+    cross(at, Z, turn);
+    FOR(i, 3) Z[3 + i] += turn[i];
+    const double power = 1.0 / dot(push, Z, 6);
+    of[g] = power * dot(U, Z, 6), along += (g ? power : -power) * dot(twist, Z, 6);
+  }
+  const double way = sense(along), ca = -way * of[0], cb = way * of[1], room = REAL_PART(way) > 0.0 ? cb + efficiency * ca : ca + efficiency * cb;
+  if (REAL_PART(room) > 0.0) return (1.0 - efficiency) / room;
+  return REAL_PART(room) < 0.0 ? NAN : 0.0;
+}
+
+/* Teeth on the flank that acts, in the motion `slip`: what the place reads of the multiplier, and the wrench on gear b for its normal force. */
+static void rubs_between(const Model *m, const Work *w, const int *load, double *reads, double *speed, double *D) {
+  const double *n = m->load_number + load[3], arm = n[MGK_RADIUS], efficiency = n[MGK_EFFICIENCY];
+  const int l = load[1], other = w->flank[l], slides = REAL_PART(n[MGK_SLIDE_OF]) > 0.5;
+  const double *X = w->pose + 12 * m->line[2 * l + 1], sign = other ? -1.0 : 1.0, per = n[MGK_PER + other];
+  double push[6], at[3], twist[6] = {0}, u[3], U[6] = {0};
+  for (int s = m->line_first[l]; s < m->line_first[l + 1]; s++) {
+    const int k = m->line_step[2 * s];
+    for (int c = first_column(m, k); c < first_column(m, k + 1); c++) add_part(6, m->line_step[2 * s + 1] * w->slip[c], w->S + 6 * c, twist);
+  }
+  along_line_of(m, w, l, push);
+  FOR(i, 6) push[i] *= sign / per;
+  point_of(X, n + MGK_MESHES_AT + 3 * other, at);
+  memcpy(u, twist, sizeof u);
+  if (slides) {
+    cross(twist, at, u);
+    FOR(i, 3) u[i] += twist[3 + i];
+  }
+  *speed = made_unit(u, TURNING * size_of(twist, 6));
+  if (slides) force_at(at, u, 1.0, U);
+  else memcpy(U, u, sizeof u), *speed *= arm;
+  const double part = fabs(efficiency) > 0.0 ? part_lost(push, X, n + MGK_SCREWS, twist, U, efficiency) : (slides ? 1.0 : arm) * coefficient(n, *speed);
+  FOR(i, 6) D[i] = -part * U[i];
+  *reads = sign * per;
+}
+
 /* A place in the motion `slip`, pressed as `pressing`: rows of what it reads, wrenches on link b for its normal force and for its normal
  * vector; how many rows it has. */
 static int rubs_at(const Model *m, Work *w, int t, const int *load) {
   const double *n = m->load_number + load[3];
+  if (load[0] == MGK_TEETH) {
+    memset(w->exerts + 24 * t, 0, 24 * sizeof(double));
+    rubs_between(m, w, load, w->reads + 18 * t, w->sliding + t, w->exerts + 24 * t);
+    return 1;
+  }
   const int k = load[1], kind = load[0], turn = (int)REAL_PART(n[MGK_TURN_OF]), slide = (int)REAL_PART(n[MGK_SLIDE_OF]);
   const double *press = w->pressing + 6 * k, *A = w->frame + 12 * m->first[k], *X = REAL_PART(n[MGK_AT_B]) > 0.5 ? w->end + 12 * k : A, r = n[MGK_RADIUS];
   double *reads = w->reads + 18 * t, *D = w->exerts + 24 * t, *K = D + 6, *speed = w->sliding + t, twist[6] = {0}, u[3], v[3], p[3] = {X[3], X[7], X[11]};
@@ -1390,43 +1495,70 @@ static int rubs_at(const Model *m, Work *w, int t, const int *load) {
   return 3;
 }
 
-/* Answers of all reactions to a unit effort in every freedom that rubs, beside wrenches on the links: of freedom i from on + i apart. */
+/* Where in an answer a place reads, and how many numbers there a row of w->reads takes: the reaction of its pair, of teeth a multiplier. */
+static int read_at(const Model *m, const int *load, int *width) {
+  const int teeth = load[0] == MGK_TEETH;
+  *width = teeth ? 1 : 6;
+  return teeth ? 6 * m->pairs + m->columns + m->line[2 * load[1]] : 6 * load[1];
+}
+
+/* Pairs that the friction of every place would pass, with their senses: its own, of teeth those on the way. */
+static void parts_of(const Model *m, Work *w, const int *rubs) {
+  const int R = m->rubs;
+  int *first = w->row_of + R + 1, *part = w->part_of, count = 0;
+  FOR(t, R) {
+    const int *load = m->load + 4 * rubs[t], teeth = load[0] == MGK_TEETH, begin = teeth ? m->line_first[load[1]] : 0;
+    first[t] = count;
+    for (int s = begin; s < (teeth ? m->line_first[load[1] + 1] : 1); s++, count++) {
+      part[2 * count] = teeth ? m->line_step[2 * s] : load[1], part[2 * count + 1] = teeth ? m->line_step[2 * s + 1] : 1;
+    }
+  }
+  first[R] = count;
+}
+
+/* Answers to a unit effort in every freedom that friction would pass, beside wrenches on the links: of freedom i from on + i apart. */
 static void unit_answers(const Model *m, Work *w, const double *on, size_t apart, double *record, const int *places) {
-  const int c = m->columns, p = 6 * m->pairs;
-  int last = -1;
-  FOR(l, m->loads) if (m->load[4 * l] >= MGK_CONTACT && m->load[4 * l + 1] != last) {
-    last = m->load[4 * l + 1];
-    for (int i = first_column(m, last); i < first_column(m, last + 1); i++) {
+  const int c = m->columns, all = 6 * m->pairs + c + m->couplings, *first = w->row_of + m->rubs + 1;
+  memset(w->answered, 0, m->pairs * sizeof(int));
+  FOR(p, first[m->rubs]) {
+    const int k = w->part_of[2 * p];
+    for (int i = first_column(m, k); i < first_column(m, k + 1) && !w->answered[k]; i++) {
       memset(w->rubbed, 0, c * sizeof(double));
       w->rubbed[i] = 1.0;
-      borne(m, w, on + apart * i, w->rubbed, record, places);
-      memcpy(w->unit + (size_t)p * i, w->reaction, p * sizeof(double));
+      borne(m, w, on + apart * i, w->rubbed, 0.0, record, places);
+      memcpy(w->unit + (size_t)all * i, w->reaction, all * sizeof(double));
     }
+    w->answered[k] = 1;
   }
 }
 
 /* The equations of the normal vectors of all places, V = a + B n and what of them C V, solved for V = base + per n: rows of w->linear. */
 static int normal_vectors(const Model *m, Work *w, const int *rubs) {
-  const int R = m->rubs, rows = w->row_of[R], wide = rows + 1 + R, p = 6 * m->pairs;
-  FOR(t, R) { /* efforts in the pair, and what the pair takes up */
-    const int k = m->load[4 * rubs[t] + 1], first = first_column(m, k), n = first_column(m, k + 1) - first;
+  const int R = m->rubs, rows = w->row_of[R], wide = rows + 1 + R, all = 6 * m->pairs + m->columns + m->couplings, *first = w->row_of + R + 1;
+  FOR(t, R) for (int p = first[t]; p < first[t + 1]; p++) { /* efforts in a pair, and what it takes up */
+    const int k = w->part_of[2 * p], c = first_column(m, k), n = first_column(m, k + 1) - c;
     FOR(j, 4) {
-      double *own = w->own + 24 * t + 6 * j, *wrench = w->exerts + 24 * t + 6 * j;
-      FOR(f, n) own[f] = dot(w->S + 6 * (first + f), wrench, 6);
-      FOR(f, n) add_part(6, -own[f], w->E + 6 * (first + f), wrench);
+      double *own = w->own + 24 * p + 6 * j, *takes = w->takes + 24 * p + 6 * j;
+      FOR(i, 6) takes[i] = w->part_of[2 * p + 1] * w->exerts[24 * t + 6 * j + i];
+      FOR(f, n) own[f] = dot(w->S + 6 * (c + f), takes, 6);
+      FOR(f, n) add_part(6, -own[f], w->E + 6 * (c + f), takes);
     }
   }
   FOR(t, R) for (int r = w->row_of[t]; r < w->row_of[t + 1]; r++) {
-    const int k = m->load[4 * rubs[t] + 1];
+    int width;
+    const int at = read_at(m, m->load + 4 * rubs[t], &width);
     const double *reads = w->reads + 18 * t + 6 * (r - w->row_of[t]);
     double *row = w->linear + (size_t)wide * r, *base = row + rows;
-    *base = dot(reads, w->smooth + 6 * k, 6);
+    *base = dot(reads, w->smooth + at, width);
     FOR(i, rows) row[i] = i == r;
     FOR(o, R) FOR(j, 1 + w->row_of[o + 1] - w->row_of[o]) {
-      const int other = m->load[4 * rubs[o] + 1], first = first_column(m, other), n = first_column(m, other + 1) - first;
-      const double *own = w->own + 24 * o + 6 * j;
-      double sum = other == k ? -dot(reads, w->exerts + 24 * o + 6 * j, 6) : 0.0;
-      FOR(f, n) if (own[f] != 0.0) sum += own[f] * dot(reads, w->unit + (size_t)p * (first + f) + 6 * k, 6);
+      double sum = 0.0;
+      for (int p = first[o]; p < first[o + 1]; p++) {
+        const int k = w->part_of[2 * p], c = first_column(m, k), n = first_column(m, k + 1) - c;
+        const double *own = w->own + 24 * p + 6 * j;
+        if (6 * k == at && width == 6) sum -= dot(reads, w->takes + 24 * p + 6 * j, 6);
+        FOR(f, n) if (own[f] != 0.0) sum += own[f] * dot(reads, w->unit + (size_t)all * (c + f) + at, width);
+      }
       if (j) row[w->row_of[o] + j - 1] -= sum;
       else base[1 + o] = sum, *base += sum * m->load_number[m->load[4 * rubs[o] + 3] + MGK_PRELOAD];
     }
@@ -1477,13 +1609,16 @@ static int normal_forces(const Model *m, Work *w) {
 static int loosened(const Model *m, const Work *w, const int *rubs) {
   const magnitude largest = size_of(w->smooth, 6 * m->pairs);
   FOR(t, m->rubs) FOR(s, m->stresses) {
-    const int k = m->load[4 * rubs[t] + 1];
-    const double *X = w->end + 12 * k, point[3] = {X[3], X[7], X[11]};
+    int width;
+    const int at = read_at(m, m->load + 4 * rubs[t], &width);
     double stress[6], along = 0.0, square = 0.0;
-    memcpy(stress, w->stress + s * (6 * m->pairs + m->columns + m->couplings) + 6 * k, sizeof stress);
-    wrench_moved(stress, point, 1.0);
+    memcpy(stress, w->stress + s * (6 * m->pairs + m->columns + m->couplings) + at, width * sizeof(double));
+    if (width == 6) {
+      const double *X = w->end + 2 * at, point[3] = {X[3], X[7], X[11]};
+      wrench_moved(stress, point, 1.0);
+    }
     for (int r = w->row_of[t]; r < w->row_of[t + 1]; r++) {
-      const double part = dot(w->reads + 18 * t + 6 * (r - w->row_of[t]), stress, 6);
+      const double part = dot(w->reads + 18 * t + 6 * (r - w->row_of[t]), stress, width);
       along += part * w->vector[r], square += part * part;
     }
     const magnitude size = fabs(sqrt(square));
@@ -1504,13 +1639,10 @@ static int directed(const Model *m, Work *w) {
   return moves;
 }
 
-/* Friction beside the reactions without it, which stand in w->reaction, in the directions of w->slip: efforts w->rubbed and what pairs take
- * up w->taken; 0 where that is sure, 1 where it is not. Links yield to unit efforts by wrenches `on` them, see unit_answers. */
-static int friction(const Model *m, Work *w, const double *on, size_t apart, double *record, const int *places) {
-  const int R = m->rubs, c = m->columns, p = 6 * m->pairs;
-  int follows = 0, found = 0, *rubs = w->row_of + R + 1;
-  FOR(l, m->loads) if (m->load[4 * l] >= MGK_CONTACT) rubs[found++] = l, follows |= m->load[4 * l] <= MGK_PLANE;
-  memcpy(w->smooth, w->reaction, p * sizeof(double)), memcpy(w->pressing, w->reaction, p * sizeof(double));
+/* Friction on the flanks that w->flank says, see `friction`; 0 where it has settled. */
+static int settled(const Model *m, Work *w, const double *on, size_t apart, const int *rubs, int follows, double *record, const int *places) {
+  const int R = m->rubs, c = m->columns, p = 6 * m->pairs, all = p + c + m->couplings, *first = w->row_of + R + 1;
+  memcpy(w->smooth, w->reaction, all * sizeof(double)), memcpy(w->pressing, w->reaction, all * sizeof(double));
   unit_answers(m, w, on, apart, record, places);
   FOR(round, follows ? MOST_ROUNDS : 1) {
     magnitude moved = 0.0;
@@ -1518,21 +1650,43 @@ static int friction(const Model *m, Work *w, const double *on, size_t apart, dou
     FOR(t, R) w->row_of[t + 1] = w->row_of[t] + rubs_at(m, w, t, m->load + 4 * rubs[t]);
     if (!normal_vectors(m, w, rubs) || !normal_forces(m, w)) break;
     memset(w->rubbed, 0, c * sizeof(double)), memset(w->taken, 0, p * sizeof(double));
+    memset(w->teeth, 0, c * sizeof(double)), memset(w->beside, 0, p * sizeof(double)), memset(w->rubbing, 0, 6 * m->couplings * sizeof(double));
     FOR(t, R) {
-      const int k = m->load[4 * rubs[t] + 1], first = first_column(m, k), n = first_column(m, k + 1) - first;
-      w->normal[t] += m->load_number[m->load[4 * rubs[t] + 3] + MGK_PRELOAD];
-      FOR(j, 1 + w->row_of[t + 1] - w->row_of[t]) {
+      const int *load = m->load + 4 * rubs[t];
+      w->normal[t] += m->load_number[load[3] + MGK_PRELOAD];
+      for (int q = first[t]; q < first[t + 1]; q++) FOR(j, 1 + w->row_of[t + 1] - w->row_of[t]) {
+        const int k = w->part_of[2 * q], at = first_column(m, k), n = first_column(m, k + 1) - at;
         const double size = j ? w->vector[w->row_of[t] + j - 1] : w->normal[t];
-        add_part(n, size, w->own + 24 * t + 6 * j, w->rubbed + first);
-        add_part(6, size, w->exerts + 24 * t + 6 * j, w->taken + 6 * k);
+        add_part(n, size, w->own + 24 * q + 6 * j, w->rubbed + at);
+        add_part(6, size, w->takes + 24 * q + 6 * j, w->taken + 6 * k);
+        if (load[0] != MGK_TEETH) continue;
+        add_part(n, size, w->own + 24 * q + 6 * j, w->teeth + at);
+        add_part(6, size, w->takes + 24 * q + 6 * j, w->beside + 6 * k);
       }
+      if (load[0] == MGK_TEETH) add_part(6, w->normal[t], w->exerts + 24 * t, w->rubbing + 6 * m->line[2 * load[1]]);
     }
-    FOR(i, p) {
-      double now = w->smooth[i] - w->taken[i];
-      FOR(a, c) if (w->rubbed[a] != 0.0) now += w->rubbed[a] * w->unit[(size_t)p * a + i];
-      moved = raised(moved, fabs(now - w->pressing[i])), w->pressing[i] = now;
+    FOR(i, all) {
+      double now = w->smooth[i] - (i < p ? w->taken[i] : 0.0);
+      FOR(a, c) if (w->rubbed[a] != 0.0) now += w->rubbed[a] * w->unit[(size_t)all * a + i];
+      if (i < p) moved = raised(moved, fabs(now - w->pressing[i]));
+      w->pressing[i] = now;
     }
-    if (!follows || moved <= SETTLED * size_of(w->pressing, p)) return loosened(m, w, rubs);
+    if (!follows || moved <= SETTLED * size_of(w->pressing, p)) return 0;
+  }
+  return 1;
+}
+
+/* Friction beside the reactions without it, which stand in w->reaction, in the directions of w->slip: efforts w->rubbed and what pairs take
+ * up w->taken; 0 where that is sure, 1 where it is not. Where it turns the force between teeth round, once more on their other flanks, under
+ * the loads `bare`. Links yield to unit efforts by wrenches `on` them, see unit_answers. */
+static int friction(const Model *m, Work *w, const double *bare, const double *on, size_t apart, double *record, const int *places) {
+  int follows = 0, found = 0, *rubs = w->row_of + 2 * (m->rubs + 1);
+  FOR(l, m->loads) if (m->load[4 * l] >= MGK_CONTACT) rubs[found++] = l, follows |= m->load[4 * l] <= MGK_PLANE;
+  parts_of(m, w, rubs);
+  FOR(turns, MOST_TURNED + 1) {
+    if (turns && borne_here(m, w, bare, record, places)) return 1;
+    if (settled(m, w, on, apart, rubs, follows, record, places)) return 1;
+    if (!turned_over(m, w, w->pressing + 6 * m->pairs + m->columns)) return loosened(m, w, rubs);
   }
   return 1;
 }
@@ -1549,15 +1703,21 @@ static int forces(const Model *m, Work *w, const double *x, double *record, cons
   if (status) return status;
   if (m->rubs) {
     memset(w->nothing, 0, (size_t)6 * m->links * sizeof(double));
-    int unsure = directed(m, w) ? friction(m, w, w->nothing, 0, record, places) : 2;
-    if (unsure) memset(w->rubbed, 0, m->columns * sizeof(double)), memset(w->taken, 0, (size_t)6 * m->pairs * sizeof(double));
+    const int unsure = directed(m, w) ? friction(m, w, w->bare, w->nothing, 0, record, places) : 2;
+    if (unsure) {
+      memset(w->rubbed, 0, m->columns * sizeof(double)), memset(w->taken, 0, (size_t)6 * m->pairs * sizeof(double));
+      memset(w->teeth, 0, m->columns * sizeof(double)), memset(w->beside, 0, (size_t)6 * m->pairs * sizeof(double));
+      memset(w->rubbing, 0, (size_t)6 * m->couplings * sizeof(double));
+    }
     add_part(m->columns, 1.0, w->rubbed, w->given);
-    borne(m, w, w->bare, w->given, record, places);
+    borne(m, w, w->bare, w->given, 1.0, record, places);
     add_part(6 * m->pairs, -1.0, w->taken, w->reaction);
-    if (turned_over(m, w)) unsure = 1; /* friction turns forces between teeth round */
     record[places[MGK_UNSURE]] = unsure;
   }
   couple(m, w->multiplier, w->coupled);
+  if (m->rubs) { /* what acts between teeth is no effort given in a freedom */
+    add_part(m->columns, -1.0, w->teeth, w->given), add_part(m->columns, 1.0, w->teeth, w->coupled);
+  }
   double *own = w->column_value;
   memset(own, 0, m->columns * sizeof(double));
   FOR(i, m->drives) {
@@ -1577,7 +1737,9 @@ static int forces(const Model *m, Work *w, const double *x, double *record, cons
   PUT(MGK_REACTIONS, w->reaction), PUT(MGK_EFFORTS, w->tau), PUT(MGK_GIVEN, w->given), PUT(MGK_COUPLED, w->coupled);
   PUT(MGK_MULTIPLIERS, w->multiplier);
   if (m->rubs) {
-    PUT(MGK_RUBBED, w->rubbed), PUT(MGK_TAKEN, w->taken), PUT(MGK_SPEEDS, w->sliding), PUT(MGK_NORMALS, w->normal);
+    FOR(c, m->columns) record[places[MGK_RUBBED] + c] = w->rubbed[c] - w->teeth[c];
+    FOR(i, 6 * m->pairs) record[places[MGK_TAKEN] + i] = w->taken[i] - w->beside[i];
+    PUT(MGK_SPEEDS, w->sliding), PUT(MGK_NORMALS, w->normal), PUT(MGK_TEETH_EFFORTS, w->teeth), PUT(MGK_RUBBING, w->rubbing);
   }
   FOR(s, m->stresses) {
     const int p = 6 * m->pairs, c = m->columns, k = m->couplings;

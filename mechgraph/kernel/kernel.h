@@ -19,23 +19,25 @@
  *       passive_first[passives + 1], passive_link[links of all], turns[passives]   links that a passive motion moves as one; a turn?
  *       line[2 lines], line_first[lines + 1], line_step[2 steps of all]   couplings along lines: its number and the link on which the line stands
  *                                               still; pairs on the way from gear a to gear b, the sense in which each is passed
+ *       belt_first[belts + 1], belt_coupling[spans of all]   belts with a pretension, of their spans the numbers among the couplings
  *       load[4 loads]                           kind (MGK_WEIGHT ...), two numbers, place among the load numbers
  * P   L, origin[3], start[states], start_coordinates[columns], frame[12], marker_a, marker_b[12 pairs], factor numbers, effort[6 columns],
  *     mass[links], center[3 links], inertia[6 links] (xx yy zz xy xz yz), base[12 links], border[passives columns], coefficients[terms], constants[couplings],
- *     line_wrench[12 lines] (on gear b for a positive and for a negative unit multiplier, in the frame of that link), load numbers. Poses are three rows of four. Every link has the frame of its pair in the tree; its own is that times its base.
+ *     line_wrench[12 lines] (on gear b for a positive and for a negative unit multiplier, in the frame of that link), belt_part[spans of all], pretension[belts] (the sum of multipliers of
+ *     its spans times these), load numbers. Poses are three rows of four. Every link has the frame of its pair in the tree; its own is that times its base.
  *     The border holds rates of the passive motions at the start.
  */
 #ifndef MECHGRAPH_KERNEL_H
 #define MECHGRAPH_KERNEL_H
 #include <stddef.h>
 
-#define MGK_FORMAT 6
+#define MGK_FORMAT 7
 
 /* The counts at the head of I. */
 enum {
   MGK_IS_FORMAT, MGK_LINKS, MGK_PAIRS, MGK_FACTORS, MGK_COLUMNS, MGK_STATES, MGK_LOOPS, MGK_STEPS, MGK_COUPLINGS, MGK_TERMS,
   MGK_DRIVES, MGK_UNKNOWNS, MGK_LOADS, MGK_FRAME, MGK_FACTOR_NUMBERS, MGK_LOAD_NUMBERS,
-  MGK_PASSIVES, MGK_PASSIVE_LINKS, MGK_FIRST_PART, MGK_LOOP_ROWS, MGK_RUBS, MGK_LINES, MGK_LINE_STEPS, MGK_HEAD
+  MGK_PASSIVES, MGK_PASSIVE_LINKS, MGK_FIRST_PART, MGK_LOOP_ROWS, MGK_RUBS, MGK_LINES, MGK_LINE_STEPS, MGK_BELTS, MGK_BELT_SPANS, MGK_HEAD
 };
 
 /* Every loop closes MGK_LOOP_ROWS components of a twist, from MGK_FIRST_PART on: all six from 0 on, in the plane Rz Tx Ty from 2 on. */
@@ -48,14 +50,16 @@ enum { MGK_TURN = 0, MGK_SLIDE = 3, MGK_ROTATION = 6, MGK_POSE = 7 };
  * law in column i, or between points of links i and j: [p[3], q[3],] stiffness, rest, damping.
  * table likewise: [p[3], q[3],] coordinate at its 0, over the rate (1) or the coordinate (0), whether the force at its ends holds beyond them,
  * pieces n, breaks[n + 1], of every piece four coefficients behind its first break, the highest first. */
-enum { MGK_WEIGHT, MGK_WRENCH, MGK_EFFORT, MGK_LAW, MGK_BETWEEN, MGK_TABLE, MGK_TABLE_BETWEEN, MGK_CONTACT, MGK_PLANE, MGK_BALL, MGK_THREAD, MGK_AXIS, MGK_COUPLE, MGK_COLLAR };
+enum { MGK_WEIGHT, MGK_WRENCH, MGK_EFFORT, MGK_LAW, MGK_BETWEEN, MGK_TABLE, MGK_TABLE_BETWEEN, MGK_CONTACT, MGK_PLANE, MGK_BALL, MGK_THREAD, MGK_AXIS, MGK_COUPLE, MGK_COLLAR, MGK_TEETH };
 
 /* From MGK_CONTACT on a place of pair i that rubs, MGK_RUBS of them, numbers below: coefficients in motion and at rest, between which it
  * falls at sliding speeds (0: it does not), preload, whether marker B is its middle (else A), columns of its turn and slide (-1: none; of
  * a contact: the factor before which the frame of its normal force stands), radius, part of the force that a friction circle leaves (1) or
  * not (0), pitch, one over the distance of two places on an axis with the side on which it lies (0: in the middle), width of a guide,
- * tangent of the flank of a thread. */
-enum { MGK_MU, MGK_STATIC, MGK_SPEED, MGK_PRELOAD, MGK_AT_B, MGK_TURN_OF, MGK_SLIDE_OF, MGK_RADIUS, MGK_CIRCLE, MGK_PITCH, MGK_SIDE, MGK_WIDTH, MGK_FLANK };
+ * tangent of the flank of a thread. Of teeth in place of a pair the number among the lines; the radius is the arm at which they slide against
+ * each other's turn, or where a slide is named (1) they slide at their point. Behind the others their efficiency (0: they have a
+ * coefficient); for both flanks the normal force of a unit multiplier and the point, screws of gears a and b in the frame of the carrier. */
+enum { MGK_MU, MGK_STATIC, MGK_SPEED, MGK_PRELOAD, MGK_AT_B, MGK_TURN_OF, MGK_SLIDE_OF, MGK_RADIUS, MGK_CIRCLE, MGK_PITCH, MGK_SIDE, MGK_WIDTH, MGK_FLANK, MGK_EFFICIENCY, MGK_PER, MGK_MESHES_AT = MGK_PER + 2, MGK_SCREWS = MGK_MESHES_AT + 6 };
 
 /* What comes back: 0, or why a position is not given. */
 enum {
@@ -73,11 +77,11 @@ enum {
   MGK_FLANKS = 11       /* flanks on which gears that are redundant press are not found */
 };
 
-/* Parts of a record, in order, for one position (condition: that number, and how far links reach, by which rounding counts; unsure: 1 where friction has no sure solution, 2 where nothing moves); s = rows of loops + couplings + passives - unknowns self-stresses. */
+/* Parts of a record, in order, for one position (condition: that number, and how far links reach, by which rounding counts; unsure: 1 where friction has no sure solution, 2 where nothing moves); s = rows of loops + couplings + passives - unknowns - belts with a pretension self-stresses. */
 enum {
   MGK_X, MGK_COORDINATES, MGK_DQ, MGK_DDQ, MGK_CLOSURE, MGK_CONDITION, MGK_POINTS, MGK_REACTIONS, MGK_EFFORTS, MGK_GIVEN, MGK_BODY_LOADS, MGK_STRESS,
   MGK_STRESS_EFFORTS, MGK_COUPLED, MGK_MULTIPLIERS, MGK_MULTIPLIER_STRESS, MGK_COUPLED_STRESS, MGK_SHAKING, MGK_BALANCE, MGK_POWER,
-  MGK_HOLD, MGK_HOLDS, MGK_HOLD_TERMS, MGK_RUBBED, MGK_TAKEN, MGK_NORMALS, MGK_SPEEDS, MGK_UNSURE, MGK_PARTS
+  MGK_HOLD, MGK_HOLDS, MGK_HOLD_TERMS, MGK_RUBBED, MGK_TAKEN, MGK_NORMALS, MGK_SPEEDS, MGK_TEETH_EFFORTS, MGK_RUBBING, MGK_UNSURE, MGK_PARTS
 };
 
 /* Where the parts of a record begin, and behind the last one its length: places[MGK_PARTS + 1]. */

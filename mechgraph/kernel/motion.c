@@ -204,14 +204,13 @@ static int rubbing(const Model *m, Work *w, Motion *at, int n, const int *head, 
     accelerated(n, d, at->mass, at->unit, at->force, more);
     FOR(k, n) add_part(links, -more[k], at->momentum + k * links, at->yields + (size_t)i * links);
   }
-  if (friction(m, w, at->yields, links, w->record, places)) return MGK_FRICTION;
+  if (friction(m, w, w->inertial, at->yields, links, w->record, places)) return MGK_FRICTION;
   FOR(k, n) at->force[k] = dot(at->Z + k * c, w->rubbed, c);
   accelerated(n, d, at->mass, at->unit, at->force, more);
   add_accelerations(m, w, at, n, more);
   add_part(n, 1.0, more, at->a);
   add_part(c, 1.0, w->rubbed, w->given);
-  if (m->lines) borne(m, w, w->inertial, w->given, w->record, places);
-  return turned_over(m, w) ? MGK_FRICTION : MGK_OK; /* friction turns forces between teeth round */
+  return MGK_OK;
 }
 
 /* Accelerations of the first n drives (at->a) at a closed state just factored, with rates v of all drives and accelerations p of the others.

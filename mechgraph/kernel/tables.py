@@ -18,12 +18,15 @@ from numpy.typing import NDArray
 
 from mechgraph.fields import PerCase
 from mechgraph.kinematics.rates import PassiveMotion
+from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import CouplingRows, System
-from mechgraph.kinematics.touching import on_carrier
+from mechgraph.kinematics.touching import on_carrier, pretension_conditions
 from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Array, Index, compose, cross, identity, inverse, rotate
 from mechgraph.memo import carried, dataclass
-from mechgraph.model.friction import Friction, places_in
+from mechgraph.model.belts import pretensions
+from mechgraph.model.friction import Friction, places_in, rubbing_loads
+from mechgraph.model.gear_facts import mean_sliding
 from mechgraph.model.gears import moving_lines
 from mechgraph.model.loads import (
     Damper,
@@ -42,15 +45,15 @@ from mechgraph.pairs.factors import ConstantScrew, Factor, Freedom, Rotation
 
 Integers = NDArray[np.int32]
 
-FORMAT = 6
+FORMAT = 7
 PARTS = (
     "x", "coordinates", "dq", "ddq", "closure", "condition", "points", "reactions", "efforts", "given", "loads", "stress", "stress_efforts",
     "coupled", "multipliers", "multiplier_stress", "coupled_stress", "shaking", "balance", "power",
     "hold", "holds", "hold_terms",
-    "friction", "taken", "normals", "speeds", "unsure",
+    "friction", "taken", "normals", "speeds", "teeth", "rubbing", "unsure",
 )  # fmt: skip
 """Parts of a record, in order."""
-OF_FRICTION = PARTS[-5:-1]
+OF_FRICTION = PARTS[-7:-1]
 """What is said of friction where it is sure."""
 START = 4
 """Place of the start in the table of numbers."""
@@ -83,7 +86,7 @@ class Layout:
 
     ``places`` and ``shapes`` of the parts of a record; ``side (N,)``: the pose among identity, markers A and markers B in which every link
     stands; ``constant``, ``per_pitch``, ``pair``: of every factor number; ``ends``: links a and b of all pairs;
-    ``border (p, F)``: rates of the passive motions at the start.
+    ``border (p, F)``: rates of the passive motions at the start; ``belts``: whose pretension decides of self-stresses.
     """
 
     I: Integers
@@ -95,6 +98,7 @@ class Layout:
     pair: Index
     ends: tuple[Index, Index]
     border: Array
+    belts: tuple[str, ...]
 
     def record(self, forces: bool) -> int:
         """Numbers of a record, with forces or of the motion alone."""
@@ -106,6 +110,7 @@ class Layout:
             return self
         shapes = self.shapes | dict.fromkeys(("normals", "speeds"), (count,))
         shapes |= {"friction": shapes["efforts"], "taken": shapes["reactions"], "unsure": ()}
+        shapes |= {"teeth": shapes["efforts"], "rubbing": (*shapes["multipliers"], 6)}
         return replace(self, places=_places_of(shapes), shapes=shapes)
 
 
@@ -182,11 +187,15 @@ def layout(system: System, drives: Index, passive: Sequence[PassiveMotion]) -> L
     rows = _coupling_rows(s)
     term_rows, term_columns = (rows[0].term_rows, rows[0].term_columns) if rows else np.zeros((2, 0), dtype=np.intp)
     K = len(s.m.couplings)
+    stresses = g.loop_rows + K + len(passive) - len(unknown)
+    # more belts than self-stresses: their tensions are known without, which is refused with the forces
+    belts = tight if len(tight := s.m.once(pretensions)) <= stresses else []
+    spans = [k for _, rows in belts for k in rows]
     ends = np.stack([s.a, s.b], axis=1)
     moved = [link for motion in passive for link in motion.links]
     head = [
         FORMAT, len(s.m.links), len(s.m.pairs), len(steps), s.n_freedoms, s.n_state, g.n_loops, len(pair), K, len(term_columns),
-        len(drives), len(unknown), 0, g.frame, int(numbers[-1]), 0, len(passive), len(moved), g.span.start, g.width, *[0] * 3,
+        len(drives), len(unknown), 0, g.frame, int(numbers[-1]), 0, len(passive), len(moved), g.span.start, g.width, *[0] * 3, len(belts), len(spans),
     ]  # fmt: skip
     parts = [
         head, first, [step.kind for _, step in steps], columns, states[:-1], numbers[:-1], ends.ravel(), tree.ravel(), g.chords,
@@ -195,18 +204,20 @@ def layout(system: System, drives: Index, passive: Sequence[PassiveMotion]) -> L
         np.searchsorted(term_rows, np.arange(K + 1)), term_columns,
         np.cumsum([0, *(len(motion.links) for motion in passive)]), moved, [motion.turns for motion in passive],
     ]  # fmt: skip
+    named = tuple(belt.belt for belt, _ in belts)
     P = len(s.m.pairs)
     side = np.zeros(len(s.m.links), dtype=np.intp)
     side[g.steps[:, 3]] = 1 + g.steps[:, 0] + np.where(g.steps[:, 1] > 0, P, 0)
     return Layout(
         np.concatenate([np.asarray(part, dtype=np.int32) for part in parts]),
-        *_record(s, len(unknown), len(passive)),
+        *_record(s, len(passive), stresses - len(belts)),
         side,
         np.array([value for _, step in steps for value in step.constant]),
         np.array([step.per_pitch for _, step in steps for _ in step.constant]),
         np.array([k for k, step in steps for _ in step.constant], dtype=np.intp),
         (s.a, s.b),
         np.array([motion.rates for motion in passive]).reshape(len(passive), s.n_freedoms),
+        named,
     )
 
 
@@ -250,10 +261,9 @@ def _coupling_rows(s: System) -> list[CouplingRows]:
     return [row for row in s.rows if isinstance(row, CouplingRows)]
 
 
-def _record(s: System, unknowns: int, passives: int) -> tuple[dict[str, slice], dict[str, tuple[int, ...]]]:
+def _record(s: System, passives: int, stresses: int) -> tuple[dict[str, slice], dict[str, tuple[int, ...]]]:
     """The places and shapes of the parts of a record."""
     c, n, p, k = s.n_freedoms, len(s.m.links), len(s.m.pairs), len(s.m.couplings)
-    stresses = s.graph.loop_rows + k + passives - unknowns
     shapes: dict[str, tuple[int, ...]] = dict.fromkeys(PARTS, (c,))
     shapes |= {
         "x": (s.n_state,),
@@ -266,7 +276,7 @@ def _record(s: System, unknowns: int, passives: int) -> tuple[dict[str, slice], 
     shapes |= {"stress": (stresses, p, 6), "stress_efforts": (stresses, c), "coupled_stress": (stresses, c)}
     shapes |= {"multiplier_stress": (stresses, k), "closure": (), "condition": (2,), "balance": (), "power": ()}
     shapes |= {"hold": (n if passives else 0, 6), "holds": (passives,), "hold_terms": (passives,)}
-    shapes |= dict.fromkeys(("friction", "taken", "normals", "speeds", "unsure"), (0,))
+    shapes |= dict.fromkeys((*OF_FRICTION, "unsure"), (0,))
     return _places_of(shapes), shapes
 
 
@@ -300,16 +310,18 @@ def tables(known: Layout, system: System, x: Array, loads: Sequence[Load] | None
     inertia = turned[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     acts: Acting | None = Acting([], []) if loads is None else acting(s, own, known.I[HEAD:], loads)
     lines = _Lines([], [], []) if loads is None else _lines(s, own)
-    if acts is None or lines is None:
+    tight = s.m.once(pretensions)
+    if acts is None or lines is None or (loads is not None and len(known.belts) < len(tight)):
         return None
+    belts = _belts(s, x) if known.belts else ([0], [], [])
     rows = _coupling_rows(s)
     parts = [
         np.full((1, 1), par.L), par.origin[:, None], x, s.start_coordinates(s.m.start)[:, None], par.frame.reshape(12, 1),
         _flat(A), _flat(B), known.constant[:, None] + known.per_pitch[:, None] * par.pitch[known.pair],
         _by_item(np.concatenate([moment, force])), par.mass, _by_item(center), _by_item(inertia), _flat(own), known.border.reshape(-1, 1),
-        *(row.coefficients for row in rows), *(row.constant for row in rows), *lines.wrenches, *acts.numbers,
+        *(row.coefficients for row in rows), *(row.constant for row in rows), *lines.wrenches, *belts[2], *acts.numbers,
     ]  # fmt: skip
-    entries = lines.entries, np.cumsum([0, *map(len, lines.steps)]), *lines.steps, acts.entries
+    entries = lines.entries, np.cumsum([0, *map(len, lines.steps)]), *lines.steps, *belts[:2], acts.entries
     I = np.concatenate([known.I, *(np.asarray(part, dtype=np.int32).ravel() for part in entries)])
     I[HEAD_LOADS], I[HEAD_LOAD_NUMBERS] = len(acts.entries), len(acts.numbers)
     I[HEAD_LINES], I[HEAD_LINE_STEPS] = len(lines.entries), sum(map(len, lines.steps))
@@ -323,7 +335,7 @@ def tables(known: Layout, system: System, x: Array, loads: Sequence[Load] | None
     return I, out
 
 
-HEAD_LOADS, HEAD_LOAD_NUMBERS, HEAD_RUBS, HEAD_LINES, HEAD_LINE_STEPS, HEAD = 12, 15, 20, 21, 22, 23
+HEAD_LOADS, HEAD_LOAD_NUMBERS, HEAD_RUBS, HEAD_LINES, HEAD_LINE_STEPS, HEAD = 12, 15, 20, 21, 22, 25
 """Places of the numbers of loads, of places that rub, and of couplings along lines in the head, and its length."""
 
 
@@ -345,13 +357,24 @@ def _lines(system: System, own: Array) -> _Lines | None:
         found = on_carrier(system, g)
         if found is None:
             return None
-        link, G = found
-        R, p = own[:, :3, [link]], own[:, 3, [link]]
-        moment, force = rotate(R, G[:3]), rotate(R, G[3:])
-        out.entries.append((g, link))
+        R, p = own[:, :3, [found.link]], own[:, 3, [found.link]]
+        moment, force = rotate(R, found.wrenches[:3]), rotate(R, found.wrenches[3:])
+        out.entries.append((g, found.link))
         out.steps.append([(step.pair, int(step.sense)) for step in coupling.steps])
         out.wrenches.append(_by_item(np.concatenate([moment + cross(p, force), force])))
     return out
+
+
+def _belts(system: System, x: Array) -> tuple[list[int], list[int], list[Array]]:
+    """Belts with a pretension in the tables: first spans, their numbers among the couplings, and what the pretension tells of multipliers.
+
+    Their centers stand still, so that the lengths of spans are those of the start ``x (nx, B)``.
+    """
+    tight = system.m.once(pretensions)
+    _, C, c = pretension_conditions(Configuration(system, x))
+    firsts = np.cumsum([0, *(len(rows) for _, rows in tight)]).tolist()
+    spans = [(i, k) for i, (_, rows) in enumerate(tight) for k in rows]
+    return firsts, [k for _, k in spans], [np.array([C[i, k] for i, k in spans]), c]
 
 
 def why_no_line(system: System) -> str | None:
@@ -463,7 +486,7 @@ def _orders(begin: Array, q: Array, batch: tuple[int, ...]) -> tuple[Integers, I
 WEIGHT, WRENCH, EFFORT, LAW, BETWEEN, TABLE, TABLE_BETWEEN, CONTACT = range(8)
 """Kinds of loads, as in ``kernel.h``."""
 RUBBING = ("contact", "plane", "ball", "thread", "axis", "couple", "collar")
-"""Ways in which pairs rub, in the order of their kinds from ``CONTACT`` on."""
+"""Ways in which pairs rub, in the order of their kinds from ``CONTACT`` on; behind them teeth."""
 
 
 @dataclass
@@ -546,8 +569,8 @@ def why_not_load(load: Load, m: Mechanism) -> str | None:
         return f"{where} acts between points and reads the freedom {load.reads_freedom!r}"
     if isinstance(load, Law) and load.in_freedom is None and load.along is not None:
         return f"{where} acts along a fixed direction"
-    if isinstance(load, Friction) and (load.of not in m.pair_index or m.pair(load.of).type.opens):
-        return f"{where} is friction of teeth, of a belt, or of a pair that may open"
+    if isinstance(load, Friction) and load.of in m.pair_index and m.pair(load.of).type.opens:
+        return f"{where} is friction of a pair that may open"
     return None
 
 
@@ -616,10 +639,13 @@ def _tabled(places: _Places, load: Any, out: Acting) -> None:
 
 def _friction(places: _Places, load: Any, out: Acting) -> None:
     """Every place of a pair that rubs, and what is viscous."""
-    s = places.system
-    k, L = s.m.place_of_pair(load.of), places.L
-    pair, row, first = s.m.pairs[k], s.groups[int(s.type_of[k])].row, int(s.first_column[k])
+    s, L = places.system, places.L
     load = load.with_numbers(lambda value: value.values if isinstance(value, PerCase) else value)
+    if load.of not in s.m.pair_index:
+        _friction_of_teeth(places, load, out)
+        return
+    k = s.m.place_of_pair(load.of)
+    pair, row, first = s.m.pairs[k], s.groups[int(s.type_of[k])].row, int(s.first_column[k])
     for rubs in places_in(load, row):
         turn, slide = (-1 if j is None else first + j for j in (rubs.turn, rubs.slide))
         if rubs.way == "contact":
@@ -634,6 +660,25 @@ def _friction(places: _Places, load: Any, out: Acting) -> None:
     for j, freedom in enumerate(row.freedoms if load.viscous else ()):
         unit = 1.0 if not freedom.turns else L**-2
         out.add(LAW, first + j, 0, *rows((0.0, 0.0), 2)[:, None], np.atleast_2d(load.viscous * unit))
+
+
+def _friction_of_teeth(places: _Places, load: Any, out: Acting) -> None:
+    """Teeth that rub; belts rub without a force of their own."""
+    s, L = places.system, places.L
+    if not rubbing_loads(s.m, (load,)):
+        return
+    g = next(i for i, c in enumerate(s.m.couplings) if c.name == load.of)
+    at = on_carrier(s, g)
+    assert at is not None
+    arm, line = mean_sliding(s.m, s.m.couplings[g]), sum(bool(c.steps) for c in s.m.couplings[:g])
+    R, p = places.own[:, :3, [at.link]], places.own[:, 3, [at.link]]
+    turn, slide = rotate(R, at.screws[:3]), rotate(R, at.screws[3:])
+    mu, stribeck, efficiency = (0.0 if v is None else v for v in (load.mu, load.stribeck, load.efficiency))
+    numbers = (
+        mu, load.coefficient_at_rest, stribeck / L, load.preload / L, 0.0, -1, arm is None, (arm or 0.0) / L, 0.0, 0.0, 0.0, 0.0, 0.0,
+        efficiency, *at.per, *_by_item(rotate(R, at.points) + p), *_by_item(np.concatenate([turn, slide + cross(p, turn)])),
+    )  # fmt: skip
+    out.add(CONTACT + len(RUBBING), line, 0, *(np.atleast_2d(np.asarray(v, dtype=float)) for v in numbers))
 
 
 KINDS: dict[type[Load], Callable[[_Places, Any, Acting], None]] = {

@@ -30,7 +30,19 @@ from mechgraph.kinematics.layout import ScrewTable, entries_of, run_sums
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import LeastNorm, complement
 from mechgraph.maths.newton import closest_zeros, least_norm_steps
-from mechgraph.maths.se3 import Array, Index, Mask, compose, cross, cross_twist, finite_twist, move_twist, multiplied
+from mechgraph.maths.se3 import (
+    Array,
+    Index,
+    Mask,
+    compose,
+    cross,
+    cross_twist,
+    finite_twist,
+    move_twist,
+    multiplied,
+    rotate,
+    to_matrix,
+)
 from mechgraph.maths.tolerances import PATH, RANKS
 from mechgraph.memo import dataclass
 from mechgraph.model.gears import moving_lines
@@ -414,6 +426,15 @@ class Configuration:
         relative = self.pair_sums(self.S * ddq)
         relative += bias
         return self.system.tree.sums(relative)
+
+
+def user_poses(here: Configuration, links: slice = slice(None)) -> Array:
+    """Poses of the declared link frames (of some links) in the global frame, ``(N, T, 4, 4)``."""
+    par = here.system.par
+    X = here.poses[:, :, links].copy()
+    shift = rotate(X[:, :3], par.offset[:, links, None])
+    X[:, 3] = par.L * X[:, 3] + par.origin[:, None, None] - shift
+    return to_matrix(X)
 
 
 def _summed(matrix: scipy.sparse.csr_array, values: Array) -> Array:

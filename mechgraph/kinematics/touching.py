@@ -19,10 +19,12 @@ from typing import Any
 import numpy as np
 
 from mechgraph.kinematics.lines import LineRows
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.state import Configuration, user_poses
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Array, Mask, compose, cross, identity, inverse, rotate, rotate_back
 from mechgraph.maths.tolerances import MOTIONS
+from mechgraph.memo import dataclass
+from mechgraph.model.belts import BeltDrive, pretensions
 from mechgraph.model.couplings import BaseCoupling, fitting_of
 from mechgraph.model.gears import LineCoupling, moving_lines
 from mechgraph.pairs import pair_type as evaluation
@@ -72,20 +74,54 @@ class _OnTheWay:
         return np.concatenate([rotate_back(R, wrenches[:3] - cross(p, wrenches[3:])), rotate_back(R, wrenches[3:])])
 
 
-def on_carrier(system: System, g: int) -> tuple[int, Array] | None:
-    """The link between gears a and b in which both lines of a coupling stand still, and their wrenches on gear b there ``(6, 2, B)``, for a
-    positive and a negative unit multiplier, internal units; None where there is no such link.
+@dataclass(frozen=True)
+class OnCarrier:
+    """Both lines of a coupling in the frame of the link on which they stand still, internal units.
+
+    ``wrenches (6, 2, B)`` on gear b of a positive and of a negative unit multiplier, the ``points (3, 2, B)`` at which they act and their
+    normal forces ``per (2, B)``; ``screws (6, 2, B)`` in which gears a and b turn.
     """
+
+    link: int
+    wrenches: Array
+    points: Array
+    per: Array
+    screws: Array
+
+
+def on_carrier(system: System, g: int) -> OnCarrier | None:
+    """The link between gears a and b in which both lines of a coupling stand still, with the lines; None where there is no such link."""
     coupling = system.m.couplings[g]
     if coupling.name in system.m.once(moving_lines):
         return None
     ways = [_OnTheWay(system, coupling, coordinate) for coordinate in (0.0, 0.7)]
-    lines = [ContactLines(way).wrenches_of([g])[0][0] for way in ways]
+    lines = [ContactLines(way).wrenches_of([g])[0] for way in ways]
     for link in ways[0].links:
-        one, other = (way.seen_from(link, G) for way, G in zip(ways, lines, strict=True))
+        one, other = (way.seen_from(link, G) for way, (G, _, _) in zip(ways, lines, strict=True))
         if np.abs(one - other).max() <= MOTIONS.rounding * np.abs(one).max():
-            return link, one
+            (_, P, per), R, p = lines[0], ways[0].poses[:, :3, [link]], ways[0].poses[:, 3, [link]]
+            w, v = np.split(np.stack(ContactLines(ways[0]).screws(g), axis=1), 2)
+            screws = np.concatenate([rotate_back(R, w), rotate_back(R, v + cross(w, p))])
+            return OnCarrier(link, one, rotate_back(R, P - p), per, screws)
     return None
+
+
+def pretension_conditions(here: Configuration) -> tuple[list[BeltDrive], Array, Array]:
+    """Belts with a pretension T0, and what it says of the multipliers ``m (n, T)`` of the rows behind those of the loops, ``C m = c``:
+    ``sum l T = T0 sum l`` over the spans of each, ``T = -m``. ``C (b, n, T)``, ``c (b, 1)``.
+    """
+    m, loops = here.system.m, here.system.graph.loop_rows
+    asked = m.once(pretensions)
+    scale = here.system.par.L**2 * np.broadcast_to(here.system.row_scale, (here.system.n_rows, here.T))[loops:]
+    C = np.zeros((len(asked), len(scale), here.T))
+    for i, (belt, rows) in enumerate(asked):
+        poses = user_poses(here)
+        lengths = belt.course_of(
+            m, [np.moveaxis(poses[m.place_of_link(p.link)], 0, 2) for p in belt.pulleys(m)]
+        ).spans.length
+        C[i, rows] = -scale[rows] * lengths / lengths.sum(axis=0)
+    belts = [belt for belt, _ in asked]
+    return belts, C, np.array([[belt.pretension] for belt in belts], dtype=float)
 
 
 class ContactLines:

@@ -18,10 +18,9 @@ from mechgraph.determinacy.report import dead_point_error, undriven_error
 from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, counted
 from mechgraph.files import plain
-from mechgraph.force.loads import user_poses
 from mechgraph.kinematics.assembly import closed_start, named_columns
 from mechgraph.kinematics.prescribed import DriverMotion
-from mechgraph.kinematics.state import CLOSED, Configuration, close_all
+from mechgraph.kinematics.state import CLOSED, Configuration, close_all, user_poses
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import Index

@@ -44,10 +44,10 @@ import numpy as np
 
 from mechgraph.by_kernel import COMPILED
 from mechgraph.errors import DeclarationError
-from mechgraph.force.loads import NOT_FINITE, Site, user_poses, user_twists
+from mechgraph.force.loads import NOT_FINITE, Site, user_twists
 from mechgraph.kinematics.motion_path import DriverPath
 from mechgraph.kinematics.solver import closure_rank, closure_solver
-from mechgraph.kinematics.state import Configuration, FactoredClosure
+from mechgraph.kinematics.state import Configuration, FactoredClosure, user_poses
 from mechgraph.kinematics.system import System
 from mechgraph.maths.newton import Interpolation, Nodes, Paths
 from mechgraph.maths.se3 import Array, Index, cross, rotate

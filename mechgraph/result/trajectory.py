@@ -18,13 +18,13 @@ from mechgraph.equations.terms import State
 from mechgraph.errors import DeclarationError, MechgraphError
 from mechgraph.fields import PerCase
 from mechgraph.force.block import BlockForces
-from mechgraph.force.loads import Site, hold_names, inertia_wrenches, is_idle, kinetic_energy, user_poses, user_twists
+from mechgraph.force.loads import Site, hold_names, inertia_wrenches, is_idle, kinetic_energy, user_twists
 from mechgraph.force.reactions import PairFrames, given_effort_loads, user_state, user_wrench
 from mechgraph.force.redundant import displacement, seats_of, strains
 from mechgraph.kernel.tables import OF_FRICTION, Records
 from mechgraph.kinematics.motion_path import Status, in_blocks
 from mechgraph.kinematics.rates import PassiveMotion, Rates, Velocities
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.state import Configuration, user_poses
 from mechgraph.kinematics.system import System
 from mechgraph.kinematics.touching import ContactLines
 from mechgraph.maths.linear import EVERY, Place
@@ -174,10 +174,9 @@ class Trajectory:
         self._solved[:], self.rubbing = True, rubbing
         asked = (*MOVED, *(("points", *KEPT) if forces else ()), *(OF_FRICTION if rubbing else ()))
         self._kept |= {name: records[name] for name in asked if name in records}
-        if rubbing:  # no teeth rub, and nothing is at rest where the kernel decides
+        if rubbing:  # nothing is at rest where the kernel decides
             own = self._kept["efforts"] - self._kept["given"] - self._kept["coupled"]
-            none = np.zeros((6, len(self.whole.couplings), self._count))
-            self._kept |= {"range": np.stack([own, own], axis=1), "teeth": 0.0 * own, "rubbing": none}
+            self._kept["range"] = np.stack([own, own], axis=1)
         self.has_forces, self.largest = forces, records.largest
 
     def _keep(self, name: str, places: Index, values: Array) -> None:

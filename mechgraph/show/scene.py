@@ -13,9 +13,8 @@ import scipy
 from mechgraph.document import plain
 from mechgraph.errors import DeclarationError
 from mechgraph.force.friction import OUTCOMES
-from mechgraph.force.loads import user_poses
 from mechgraph.kinematics.assembly import assembled
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.state import Configuration, user_poses
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Array
 from mechgraph.memo import dataclass

@@ -21,9 +21,8 @@ from typing import Any
 import numpy as np
 
 from mechgraph.errors import DeclarationError
-from mechgraph.force.loads import user_poses
 from mechgraph.kinematics.prescribed import DriverMotion
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.state import Configuration, user_poses
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Array, Index, cross, move_twist, rotation_exp, turn_tangent
 from mechgraph.memo import dataclass
