@@ -206,17 +206,114 @@ def test_a_unit_runs_in_fmpy(tmp_path):
     unit_.freeInstance()
 
 
-def test_what_is_not_carried_is_named():
-    """Belts with a pretension and friction of teeth, which numpy solves."""
-    pulleys = [mg.Pulley(k, k, (x, 0, 0), (0, 0, 1), radius=0.05) for k, x in (("p", 0.0), ("w", 0.5))]
-    pairs = [mg.Pair(g.link, "R", "frame", g.link, point=g.point, axis=(0, 0, 1)) for g in pulleys]
-    belt = [mg.BeltDrive("b", over=["p", "w"], pretension=300.0)]
-    m = mg.Mechanism("belt", pairs=pairs, gears=pulleys, couplings=belt, drives=["p"])
-    with pytest.raises(mg.DeclarationError, match="tensions of belts with a pretension"):
-        mg.compile(m)
-    train = random_train(1, ("spur",))
-    with pytest.raises(
-        mg.DeclarationError, match=r"load .* is friction of teeth, of a belt, or of a pair that may open"
-    ):
-        mg.compile(train.replace(loads=[mg.Friction("g0", mu=0.1)]))
-    assert mg.solve(m, {"p": 0.2}, loads=[mg.Effort("w", -2.0)]).coupling("b").tension["p-w"] == pytest.approx(280.0)
+def rough_train(seed: int, loaded: bool = True, bearings: bool = True, teeth: bool = True) -> mg.Mechanism:
+    """A random train whose bearings and teeth rub, by a coefficient or an efficiency."""
+    m, rng = random_train(seed), np.random.default_rng(seed)
+    loads = [load for load in m.loads if loaded or not isinstance(load, mg.Effort)]
+    mu = float(rng.uniform(0.02, 0.3))
+    for p in m.pairs if bearings else ():
+        journal = {"radius": 0.02, "length": 0.05} if p.type.symbol == "R" else {}
+        loads.append(mg.Friction(p.name, mu=mu, **journal))
+    for c in m.couplings if teeth else ():
+        one, other = {"mu": float(rng.uniform(0, 0.1))}, {"efficiency": float(rng.uniform(0.7, 0.98))}
+        for given in (one, other) if rng.random() < 0.5 else (other, one):
+            try:
+                m.replace(loads=[*loads, mg.Friction(c.name, **given)])
+            except mg.DeclarationError:  # nothing of a toothed belt rubs, and a number of teeth may be missing
+                continue
+            loads.append(mg.Friction(c.name, **given))
+            break
+    return m.replace(loads=loads)
+
+
+@pytest.mark.seeds(6)
+def test_teeth_that_rub(seed):
+    m = rough_train(100 + seed, loaded=bool(seed % 2), bearings=bool(seed % 3))
+    assert differ(m, turning(m)) < 1e-9
+    c = mg.compile(m)
+    assert beside(c, m, c.tables.home + np.linspace(-0.3, 0.3, 3)[:, None]) < 1e-9
+
+
+@pytest.mark.parametrize("seed", [1, 3, 13])
+def test_friction_turns_the_force_between_teeth_round(seed):
+    """Bearings that rub press on the other flanks than the loads alone."""
+    m = rough_train(seed, loaded=False, teeth=False)
+    smooth = m.replace(loads=[load for load in m.loads if not isinstance(load, mg.Friction)])
+    given = turning(m, 3)
+    solved = [mg.solve(one, given, engine="dense") for one in (m, smooth)]
+    with_, without = (np.array([s.coupling(c.name).force for c in m.couplings]) for s in solved)
+    along = (with_ * without).sum(axis=-1) / np.linalg.norm(with_, axis=-1) / np.linalg.norm(without, axis=-1)
+    assert along.min() < 0.5, "none is turned round"
+    assert differ(m, given) < 1e-9
+
+
+def test_turned_flanks_in_files_of_c_and_derivatives(tmp_path):
+    """The same with teeth that rub, beside numpy and differences."""
+    m = rough_train(1, loaded=False)
+    t = tabled(m)
+    write_c(t, tmp_path / "turned.c")
+    q = (t.home + 0.1).tolist()
+    status, (effort, reaction, _) = run_c(library_of(tmp_path / "turned.c", "turned"), "turned", m, q)
+    s = mg.solve(m, {"S0": mg.Motion(q[0], 2.0, 0.5)}, engine="dense")
+    expected = np.concatenate([s[p.name].reaction for p in m.pairs])
+    assert status == 0
+    np.testing.assert_allclose(reaction, expected, atol=1e-10 * np.abs(expected).max())
+    np.testing.assert_allclose(effort, s["S0"].effort, rtol=1e-10)
+    c, name = mg.compile(m), f"loads[{sum(not isinstance(load, mg.Friction) for load in m.loads)}].mu"
+    c(q[0], 2.0, 0.5)
+    slope, middle, efforts = c.gradient("S0.effort", [name])[0], c.parameters[name], []
+    for change in (1e-4, -1e-4):
+        c.parameters[name] = middle + change
+        efforts.append(c(q[0], 2.0, 0.5)[0])
+    assert slope == pytest.approx((efforts[0] - efforts[1]) / 2e-4, rel=1e-6)
+
+
+def test_teeth_that_rub_in_time():
+    """Accelerations with the friction of a worm, beside those of numpy."""
+    m = rough_train(2)
+    t = np.linspace(0.0, 0.003, 2)
+    one, other = (mg.respond(m, t, rates={"S0": 8.0}, engine=engine) for engine in ("compiled", "dense"))
+    for p in m.pairs:
+        found, expected = one[p.name], other[p.name]
+        np.testing.assert_allclose(found.position, expected.position, rtol=1e-9)
+        np.testing.assert_allclose(found.reaction, expected.reaction, atol=1e-8 * np.abs(expected.reaction).max())
+
+
+def belts(count: int, **more: object) -> mg.Mechanism:
+    """A shaft that drives two others by a flat belt over three pulleys, with a pretension, and with a second belt a fourth one."""
+    at = {"p": (0.0, 0.0, 0.0), "v": (0.5, 0.0, 0.0), "w": (0.2, 0.4, 0.0), "x": (0.9, 0.1, 0.05)}
+    names = list(at)[: 2 + count]
+    pairs = [mg.Pair(k, "R", "frame", k, point=at[k], axis=(0, 0, 1)) for k in names]
+    pulleys = [mg.Pulley(k, k, at[k], (0, 0, 1), radius=0.05 + 0.01 * i) for i, k in enumerate(names[:3])]
+    drives = [mg.BeltDrive("b", over=names[:3], pretension=300.0, toothed=False)]
+    if count == 2:
+        pulleys += [mg.Pulley("vx", "v", (0.5, 0, 0.05), (0, 0, 1), radius=0.04), mg.Pulley("x", "x", at["x"], (0, 0, 1), radius=0.08)]  # fmt: skip
+        drives.append(mg.BeltDrive("b2", over=["vx", "x"], pretension=150.0))
+    loads = [mg.Effort(k, -2.0) for k in names[1:]]
+    return mg.Mechanism("belts", pairs=pairs, gears=pulleys, couplings=drives, drives=["p"], loads=loads, **more)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+@pytest.mark.parametrize("rough", [False, True])
+def test_belts_with_a_pretension(count, rough):
+    """Tensions of all spans, with bearings that rub; the sum of length times tension is that of the pretension."""
+    m = belts(count)
+    if rough:
+        m = m.replace(loads=[*m.loads, mg.Friction("b", mu=0.4), *(mg.Friction(p.name, mu=0.2, radius=0.01) for p in m.pairs)])
+    given = {"p": mg.Motion([0.1, 0.6], 3.0, 2.0)}
+    one, other = (mg.solve(m, given, engine=engine) for engine in ("compiled", "dense"))
+    worst, where, faults = differences(one, other)
+    assert (worst < 1e-10, faults) == (True, []), where
+    for belt, pull in (("b", 300.0), ("b2", 150.0))[:count]:
+        T, expected = one.coupling(belt).tension, other.coupling(belt).tension
+        np.testing.assert_allclose([*T.values()], [*expected.values()], rtol=1e-11)
+        if belt == "b2":  # both spans are as long
+            np.testing.assert_allclose(sum(T.values()) / 2, pull, rtol=1e-12)
+    c = mg.compile(m)
+    c(0.1, 3.0, 2.0)
+    np.testing.assert_allclose(c.reaction("p"), one["p"].reaction[0], rtol=1e-11, atol=1e-10)
+    slope = c.gradient("p.reaction", ["b.pretension"])[:, 0]
+    c.parameters["b.pretension"] = 310.0
+    c(0.1, 3.0, 2.0)
+    if not rough:  # linear in it
+        np.testing.assert_allclose(c.reaction("p") - one["p"].reaction[0], 10.0 * slope, rtol=1e-8, atol=1e-8)

@@ -45,8 +45,8 @@ def compile(m: Mechanism) -> Compiled:
     Raises
     ------
     DeclarationError
-        Names what the kernel cannot carry: curves, surfaces, loads that are functions, links with several passive freedoms; gears and
-        belts whose centers move, their friction, and a belt's pretension.
+        Names what the kernel cannot carry: curves, surfaces, loads that are functions, links with several passive freedoms, gears and
+        belts whose centers move, friction of contacts that may open.
     MissingExtraError
         The kernel was not installed, and there is no C compiler.
 

@@ -1143,8 +1143,8 @@ static double tension(const Model *m, int belt, const double *multiplier) {
   return sum;
 }
 
-/* States of which the last ones, one a belt with a pretension, bring a unit of its own `tension` alone, and the others none: elimination in
- * place. Whether every belt has one. */
+/* States of which the last ones, one a belt with a pretension, that of the first behind all, bring a unit of its own `tension` alone, and the
+ * others none: elimination in place. Whether every belt has one. */
 static int by_belts(const Model *m, int all, double *stress) {
   FOR(b, m->belts) {
     const int count = m->stresses + m->belts - b;
@@ -1244,7 +1244,7 @@ static void borne(const Model *m, Work *w, const double *on, const double *given
   if (m->stresses + m->belts < 1) return;
   at_points(m, w, w->reaction, -1.0);
   FOR(b, m->belts)
-    add_part(p + c + k, pretension * m->pretension[b] - tension(m, b, w->multiplier), w->stress + (size_t)(m->stresses + b) * (p + c + k), w->reaction);
+    add_part(p + c + k, pretension * m->pretension[b] - tension(m, b, w->multiplier), w->stress + (size_t)(m->stresses + m->belts - 1 - b) * (p + c + k), w->reaction);
   FOR(s, m->stresses) {
     const double *stress = w->stress + s * (p + c + k);
     add_part(p + c + k, -dot(stress, w->reaction, p), stress, w->reaction);

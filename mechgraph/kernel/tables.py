@@ -86,7 +86,7 @@ class Layout:
 
     ``places`` and ``shapes`` of the parts of a record; ``side (N,)``: the pose among identity, markers A and markers B in which every link
     stands; ``constant``, ``per_pitch``, ``pair``: of every factor number; ``ends``: links a and b of all pairs;
-    ``border (p, F)``: rates of the passive motions at the start; ``belts``: whose pretension decides of self-stresses.
+    ``border (p, F)``: rates of the passive motions at the start.
     """
 
     I: Integers
@@ -98,7 +98,6 @@ class Layout:
     pair: Index
     ends: tuple[Index, Index]
     border: Array
-    belts: tuple[str, ...]
 
     def record(self, forces: bool) -> int:
         """Numbers of a record, with forces or of the motion alone."""
@@ -188,8 +187,7 @@ def layout(system: System, drives: Index, passive: Sequence[PassiveMotion]) -> L
     term_rows, term_columns = (rows[0].term_rows, rows[0].term_columns) if rows else np.zeros((2, 0), dtype=np.intp)
     K = len(s.m.couplings)
     stresses = g.loop_rows + K + len(passive) - len(unknown)
-    # more belts than self-stresses: their tensions are known without, which is refused with the forces
-    belts = tight if len(tight := s.m.once(pretensions)) <= stresses else []
+    belts = s.m.once(pretensions)  # whose centers stand still: the rows of each depend on one another
     spans = [k for _, rows in belts for k in rows]
     ends = np.stack([s.a, s.b], axis=1)
     moved = [link for motion in passive for link in motion.links]
@@ -204,7 +202,6 @@ def layout(system: System, drives: Index, passive: Sequence[PassiveMotion]) -> L
         np.searchsorted(term_rows, np.arange(K + 1)), term_columns,
         np.cumsum([0, *(len(motion.links) for motion in passive)]), moved, [motion.turns for motion in passive],
     ]  # fmt: skip
-    named = tuple(belt.belt for belt, _ in belts)
     P = len(s.m.pairs)
     side = np.zeros(len(s.m.links), dtype=np.intp)
     side[g.steps[:, 3]] = 1 + g.steps[:, 0] + np.where(g.steps[:, 1] > 0, P, 0)
@@ -217,7 +214,6 @@ def layout(system: System, drives: Index, passive: Sequence[PassiveMotion]) -> L
         np.array([k for k, step in steps for _ in step.constant], dtype=np.intp),
         (s.a, s.b),
         np.array([motion.rates for motion in passive]).reshape(len(passive), s.n_freedoms),
-        named,
     )
 
 
@@ -310,10 +306,9 @@ def tables(known: Layout, system: System, x: Array, loads: Sequence[Load] | None
     inertia = turned[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     acts: Acting | None = Acting([], []) if loads is None else acting(s, own, known.I[HEAD:], loads)
     lines = _Lines([], [], []) if loads is None else _lines(s, own)
-    tight = s.m.once(pretensions)
-    if acts is None or lines is None or (loads is not None and len(known.belts) < len(tight)):
+    if acts is None or lines is None:
         return None
-    belts = _belts(s, x) if known.belts else ([0], [], [])
+    belts = _belts(s, x) if s.m.once(pretensions) else ([0], [], [])
     rows = _coupling_rows(s)
     parts = [
         np.full((1, 1), par.L), par.origin[:, None], x, s.start_coordinates(s.m.start)[:, None], par.frame.reshape(12, 1),

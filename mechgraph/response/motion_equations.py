@@ -62,7 +62,6 @@ from mechgraph.maths.linear import Factors
 from mechgraph.maths.se3 import Array, Index, cross, rotate, rotate_back
 from mechgraph.maths.tolerances import PATH, RESPONSE
 from mechgraph.memo import dataclass
-from mechgraph.model.belts import pretensions
 from mechgraph.model.friction import Friction, rubbing_loads
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
@@ -640,8 +639,6 @@ def cannot(system: System, loads: Loads, held: bool) -> str | None:
     """Why the kernel does not serve a motion; None where it does."""
     if held:
         return "passive freedoms are held at rest"
-    if system.m.once(pretensions) and loads.dry:
-        return "friction follows the pretension of a belt"
     if any(one.rolls is not None for one in rough_freedoms(system, loads.dry)):
         return "friction acts between bodies that may roll on each other, or teeth"
     if system.n_freedoms * len(system.m.links) >= SPARSE_FROM:
