@@ -224,11 +224,20 @@ def _filled(line: Started, library: Any, system: System, x: Array, loads: tuple[
     return Kernel(library, found.rubbing(int(filled[0][HEAD_RUBS])), *filled), forces
 
 
+def served_before(line: Started) -> bool:
+    """Whether a mechanism of the graph, with the same drives and no passive freedoms, has the tables of the kernel, and it is asked for."""
+    return line.options.engine in ("auto", COMPILED) and isinstance(line.system.sized_once.get(_key(line)), Layout)
+
+
+def _key(line: Started) -> tuple[object, ...]:
+    """What of a mechanism is in the layout, beside its graph."""
+    key = COMPILED, line.columns.tobytes(), _passive(line), tuple((c.freedoms, c.steps) for c in line.m.couplings)
+    return *key, tuple((belt.belt, *rows) for belt, rows in line.m.once(pretensions))
+
+
 def _layout(line: Started) -> Layout | str:
     """The layout of a mechanism, or what of it cannot be carried; kept with all mechanisms of its graph, whose couplings may be others."""
-    sized = line.system.sized_once
-    key = COMPILED, line.columns.tobytes(), _passive(line), tuple((c.freedoms, c.steps) for c in line.m.couplings)
-    key = *key, tuple((belt.belt, *rows) for belt, rows in line.m.once(pretensions))
+    sized, key = line.system.sized_once, _key(line)
     if key not in sized:
         why = why_not(line.system)
         sized[key] = layout(line.system, line.columns, line.passive) if why is None else why

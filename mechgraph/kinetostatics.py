@@ -22,11 +22,12 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import cached_property, partial
+from math import prod
 from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
 
-from mechgraph.by_kernel import compiled
+from mechgraph.by_kernel import compiled, served_before
 from mechgraph.determinacy.finite_motion import branches, branches_text
 from mechgraph.determinacy.mobility import Freedoms, actuation_fault, free_motion
 from mechgraph.determinacy.report import (
@@ -93,7 +94,8 @@ class Pipeline:
     passive : passive motions.
     """
 
-    def __init__(self, drive: DriverMotion, options: Options) -> None:
+    def __init__(self, drive: DriverMotion, options: Options, trusting: bool = False) -> None:
+        """``trusting``: where the kernel is likely to serve, its solution is the proof that the drivers determine the motion."""
         self.drive, self.m, self.options = drive, drive.m, options
         self.start = closed_start(self.m, drive.first)
         if drive.free:
@@ -104,20 +106,27 @@ class Pipeline:
         self.unit = np.where(self.system.is_length[self.columns], self.system.par.L, 1.0)
         self._refuse_far()
         # reactions of least norm are found position by position, where nothing is gained from many of them
-        positions = 1 if options.redundant == "minimum_norm" else int(np.prod(drive.batch))
+        positions = 1 if options.redundant == "minimum_norm" else prod(drive.batch)
         self.engine = engine_for(self.system.n_rows, positions, options.engine)
-        self.solver: ClosureSolver
-        self.solver, proved = solver_at_start(self.engine, self.columns, self.start)
         self.lead = np.arange(len(self.columns))
         self.passive: tuple[PassiveMotion, ...] = ()
         self.hold: Index | None = None
+        self.acting = self.columns
+        self.trusts = trusting and drive.actuated is None and served_before(self)
+        self.solver: ClosureSolver = closure_solver(self.engine, self.columns)
+        if not self.trusts:
+            self._determine()
+
+    def _determine(self) -> None:
+        """What leads, what is passive, and what solves the closure equations; raises where the drivers do not determine the motion."""
+        self.solver, proved = solver_at_start(self.engine, self.columns, self.start)
         if not proved:
             self.lead = self.freedoms.leading(self.columns)
             self._check_determinate()
             self.passive, self.hold = self.freedoms.passive, self.freedoms.hold
             self.solver = closure_solver(self.engine, self.leading, self.hold)
             self._check_passive()
-        self.acting = self._acting() if options.method else self.columns
+        self.acting = self._acting() if self.options.method else self.columns
 
     @cached_property
     def freedoms(self) -> Freedoms:
@@ -228,10 +237,14 @@ class Pipeline:
         batch = self.drive.batch if batch is None else batch
         if (done := compiled(self, batch, starts)) is not None:
             return done
+        if self.trusts:
+            self.trusts = False
+            self._determine()
+            return self.run(starts, batch)
         start = None if starts else self.start
         starts = starts or Starts(self.x[:, None], self.system.cases, self.m.loads)
         one = starts.x.shape[1] == 1
-        T = int(np.prod(batch))
+        T = prod(batch)
         shared = starts.sharing > 1
         variant = np.zeros(T, dtype=np.intp) if one and not shared else np.arange(T) // batch[-1]
         followed = (1, batch[-1]) if shared else batch
@@ -243,7 +256,7 @@ class Pipeline:
     def _followed(self, path: DriverPath, starts: Starts, batch: tuple[int, ...]) -> Positions:
         """The positions along the path."""
         values = self.values("position", batch)[self.lead]
-        found = follow(path, requests(starts.x, values, batch), int(np.prod(batch)))
+        found = follow(path, requests(starts.x, values, batch), prod(batch))
         if self.passive:
             self._check_still_passive(path, found)
             found = unspun(path, found, self.passive)
@@ -318,9 +331,9 @@ REFUSED = {
 
 def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exception | None:
     """The named error for the first position that was not solved, with the solution so far."""
-    bad = np.flatnonzero(~np.isin(solution.status.reshape(-1), SOLVED))
-    if not bad.size:
+    if outcome.trajectory.statuses.issubset(SOLVED):
         return None
+    bad = np.flatnonzero(~np.isin(solution.status.reshape(-1), SOLVED))
     first = int(bad[0])
     status = Status(solution.status.reshape(-1)[first])
     wanted = (line.values("position", outcome.batch)[:, first] * line.unit).tolist()
@@ -398,7 +411,7 @@ def _check_drivers(line: Pipeline, outcome: Outcome) -> None:
 
 def _check_actuators(line: Pipeline, outcome: Outcome) -> None:
     status = outcome.trajectory.status().reshape(-1)
-    rest = np.flatnonzero(status == Status.ACTUATORS_REST.value)
+    rest = np.flatnonzero(status == Status.ACTUATORS_REST.value) if line.drive.actuated else status[:0]
     if rest.size and not (status == Status.OK.value).any():
         raise line.actuation_error(Configuration(line.system, outcome.trajectory.states_at(rest[:1])), line.acting)
 
@@ -431,7 +444,7 @@ def _solved(
     line, outcome = _outcome(m, motions, options, actuate)
     solution = Solution(outcome.trajectory)
     reached = (*SOLVED, *(status.value for status in RUBBING))
-    if outcome.found is None and not np.isin(solution.status, reached).all():  # numpy says how far the path led
+    if outcome.found is None and not outcome.trajectory.statuses.issubset(reached):  # numpy says how far the path led
         line, outcome = _outcome(m, motions, replace(options, engine=line.engine), actuate)
         solution = Solution(outcome.trajectory)
     own, tol = (m.declared, m.changes.tol) if isinstance(m, SnappedMechanism) else (m, None)
@@ -463,7 +476,7 @@ def _run(
     """All positions; again with other axes of spheres where some of them, or what ends the path, lie beside poles: of that mechanism."""
     # axes of spheres that are tried for a path: each keeps far from what is known of it, which may be a part
     for _ in range(4):
-        line = Pipeline(DriverMotion(m, motions, actuate), options)
+        line = Pipeline(DriverMotion(m, motions, actuate), options, trusting=True)
         outcome = line.run()
         meant_with = m.changes.tol if isinstance(m, SnappedMechanism) else None
         own = m.declared if isinstance(m, SnappedMechanism) else m

@@ -398,22 +398,30 @@ def door(function: Callable[P, R]) -> Callable[P, R]:
     """
 
     @functools.cache
-    def known() -> tuple[inspect.Signature, dict[str, Wanted | None]]:
+    def known() -> tuple[inspect.Signature, dict[str, Wanted | None], list[str], set[str]]:
         signature = inspect.signature(function)
-        return signature, wanted_of(function, signature)
+        own = signature.parameters.values()
+        by_place = [one.name for one in own if one.kind == one.POSITIONAL_OR_KEYWORD]
+        whole = len(by_place) + sum(one.kind == one.KEYWORD_ONLY for one in own) == len(own)
+        needed = {one.name for one in own if one.default is one.empty}
+        return signature, wanted_of(function, signature), by_place if whole else [], needed
 
     @functools.wraps(function)
     def entered(*args: P.args, **named: P.kwargs) -> R:
-        signature, wanted = known()
-        try:
-            given = signature.bind(*args, **named)
-        except TypeError as error:
-            raise DeclarationError(_called(function, args), [_call_fault(error, named, signature)]) from None
-        bound = given.arguments
-        for name in [name for name, value in bound.items() if isinstance(value, Iterator)]:
-            if (one := wanted[name]) is not None and one.fits(bound[name]):
-                bound[name] = tuple(bound[name])
-                args, named = given.args, given.kwargs  # type: ignore[assignment]
+        signature, wanted, by_place, needed = known()
+        bound = dict(zip(by_place, args, strict=False)) | named
+        several = [name for name, value in bound.items() if isinstance(value, Iterator)]
+        clear = len(bound) == len(args) + len(named) and needed <= bound.keys() <= wanted.keys()
+        if several or not clear or not by_place:  # ``bind`` takes longer
+            try:
+                given = signature.bind(*args, **named)
+            except TypeError as error:
+                raise DeclarationError(_called(function, args), [_call_fault(error, named, signature)]) from None
+            bound = given.arguments
+            for name in [name for name, value in bound.items() if isinstance(value, Iterator)]:
+                if (one := wanted[name]) is not None and one.fits(bound[name]):
+                    bound[name] = tuple(bound[name])
+                    args, named = given.args, given.kwargs  # type: ignore[assignment]
         faults = [
             wrong(value, SPOKEN.get(name, name), one.words)
             for name, value in bound.items()

@@ -88,21 +88,26 @@ def scaled_system(m: Mechanism, q: Array, system: System | None = None) -> Syste
 def scaled_start(m: Mechanism) -> Configuration:
     """The declared start in a system scaled about it.
 
-    The last one of the mechanism itself is kept with it, so that another call with the same start begins with all numbers ready.
+    The last one of the mechanism itself is kept with it. Where it is asked for again all numbers are made ready: a mechanism that is solved
+    once, by the kernel, does without most of them.
     """
     raw = indexed(m)
     q = raw.start_coordinates(m.start)
     kept, key = m.once(_kept_starts), q.tobytes()
-    if key not in kept:
-        here = scaled(Configuration(raw, raw.state_of(q[:, None])))
-        for name in ("numbers", "effort_numbers"):
-            getattr(here.system, name)
-        for name in ("middles", "S", "closure", "solvers"):
-            getattr(here, name)
+    again = key in kept
+    if again:
+        known, evaluated = kept[key]
+        here = Configuration.of(System.remembered(m, known), evaluated)
+    else:
         kept.clear()
+        here = scaled(Configuration(raw, raw.state_of(q[:, None])))
+    if not again or "S" not in evaluated:
+        for name in ("numbers", "n_rows", *(("effort_numbers",) if again else ())):
+            getattr(here.system, name)
+        for name in ("closure", "solvers", *(("middles", "S") if again else ())):
+            getattr(here, name)
         kept[key] = here.system.known(), here.evaluated()
-    known, evaluated = kept[key]
-    return Configuration.of(System.remembered(m, known), evaluated)
+    return here
 
 
 def _kept_starts(m: Mechanism) -> dict[bytes, tuple[dict[str, Any], dict[str, Any]]]:

@@ -12,6 +12,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from itertools import combinations, product
+from math import prod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -524,6 +525,7 @@ class DriverMotion:
         self.actuated = None if actuate is None else actuators(m, actuate)
         self.batch = _batch(self.m, self.motions, asked)
         self.t = next((motion.t for motion in self.motions.values() if motion.t is not None), None)
+        self._values: dict[tuple[str, tuple[int, ...]], Array] = {}
 
     @property
     def free(self) -> tuple[Pair, ...]:
@@ -554,6 +556,8 @@ class DriverMotion:
 
     def values(self, kind: str, batch: tuple[int, ...]) -> Array:
         """Driver ``position``, ``velocity`` or ``acceleration`` ``(d, T)`` in the user's units, spread over a batch."""
-        T = int(np.prod(batch))
-        rows = [np.broadcast_to(getattr(motion, kind), batch).reshape(T) for motion in self.motions.values()]
-        return np.array(rows).reshape(len(rows), T)
+        if (kind, batch) not in self._values:
+            T = prod(batch)
+            rows = [np.broadcast_to(getattr(motion, kind), batch).reshape(T) for motion in self.motions.values()]
+            self._values[kind, batch] = np.array(rows).reshape(len(rows), T)
+        return self._values[kind, batch]

@@ -312,6 +312,14 @@ class DeclaredParts(Formatted, Once):
         """Index of the pair and of the freedom within it, or why there is none."""
         if not isinstance(name, str):
             return f"freedom {shown(name)}: expected a name such as 'B' or 'B.Tz'"
+        known = vars(self).setdefault("_places_of_freedoms", {})
+        found = known.get(name) or self._search_freedom(name)
+        if not isinstance(found, str):
+            known[name] = found
+        return found
+
+    def _search_freedom(self, name: str) -> tuple[int, int] | str:
+        """The same for a name that is sought the first time."""
         k = self._place_of_named(name)
         if k is None:
             return unknown("freedom", name, self.freedom_names(), (*self.pair_index, *self.link_index))
@@ -394,8 +402,9 @@ def declaration_faults(m: DeclaredParts) -> list[str]:
         faults.append("no pairs; a mechanism needs at least one pair")
     if faults:
         return faults
-    if not _links_are_sound(m.links):
-        faults += [fault for link in m.links for fault in link.faults()]
+    before = vars(m).get("_changed_from")  # what is sound of that mechanism is so in this one
+    if (links := _others(m.links, before and before.links)) and not _links_are_sound(links):
+        faults += [fault for link in links for fault in link.faults()]
     if m.planar is not True and m.planar is not False:
         faults.append(wrong(m.planar, "planar", "true or false"))
     if m.planar is True:
@@ -403,8 +412,9 @@ def declaration_faults(m: DeclaredParts) -> list[str]:
     names, pair_names = _texts(m.link_names()), _texts([pair.name for pair in m.pairs])
     faults += _repeated(names, "link") + _repeated(pair_names, "pair")
     tol = sound_tol(m.tol)
-    if not _pairs_are_sound(m.pairs, tol):
-        faults += [fault for pair in m.pairs for fault in pair.faults(tol)]
+    pairs = _others(m.pairs, before and before.pairs if before and before.tol == m.tol else ())
+    if pairs and not _pairs_are_sound(pairs, tol):
+        faults += [fault for pair in pairs for fault in pair.faults(tol)]
     faults += _end_faults(m, names)
     faults += [f"units: {unknown('base unit', key, BASE_UNITS)}" for key in m.units if key not in BASE_UNITS]
     faults += [
@@ -420,6 +430,12 @@ def declaration_faults(m: DeclaredParts) -> list[str]:
         if not isinstance(value, str)
     ]
     return faults + _symbol_faults(m) + _reference_faults(m) + _gear_faults(m) + _coupling_faults(m)
+
+
+def _others(items: Sequence[Any], known: Iterable[Any] | None) -> list[Any]:
+    """The items that are not among the known ones."""
+    places = set(map(id, known or ()))
+    return [one for one in items if id(one) not in places]
 
 
 def mapping_faults(**given: Any) -> list[str]:

@@ -532,9 +532,10 @@ def contacts_of(values: Trajectory) -> dict[str, ContactResult]:
 
 def lift_offs(values: Trajectory) -> tuple[LiftOff, ...]:
     """Where contacts that are only pushed, or do not say that they are held, would have to pull."""
-    found = contacts_of(values).values() if values.has_forces and bool((values.status() == OK).any()) else ()
-    slack = slack_spans(values) if values.has_forces else ()
-    return (*(lift for contact in found for lift in contact.lift_off), *slack, *pulled_flanks(values))
+    if not values.has_forces:
+        return ()
+    found = contacts_of(values).values() if OK in values.statuses else ()
+    return (*(lift for contact in found for lift in contact.lift_off), *slack_spans(values), *pulled_flanks(values))
 
 
 def _flanks(values: Trajectory) -> Iterator[tuple[Mesh, Array, Mask]]:
@@ -554,9 +555,9 @@ def _flanks(values: Trajectory) -> Iterator[tuple[Mesh, Array, Mask]]:
 
 def pulled_flanks(values: Trajectory) -> Iterator[LiftOff]:
     """Where flanks of teeth would have to pull: given ones, and those of gears whose centers move, which touch on one flank."""
-    unit = unit_of(values.mechanism.units, FORCE)
     for one, push, pulls in _flanks(values):
         for found in stretches(values, pulls.reshape(values.batch), push.reshape(values.batch)):
+            unit = unit_of(values.mechanism.units, FORCE)
             pull = f"{found.amount:.4g}{' ' * bool(unit)}{unit}"
             text = (
                 f"mesh {one.name}: its flank would have to pull {found.where}, with up to {pull}; with centers that move it keeps to one "
@@ -578,7 +579,6 @@ def with_other_flanks(m: Mechanism, values: Trajectory) -> Mechanism | None:
 
 def slack_spans(values: Trajectory) -> Iterator[LiftOff]:
     """Where spans of belts would have to push."""
-    unit = unit_of(values.mechanism.units, FORCE)
     belts = [(k, one) for k, one in enumerate(values.whole.couplings) if isinstance(one, BeltDrive)]
     multipliers, loose = values.multipliers() if belts else (np.zeros((0, 0)), np.zeros((0, 0), dtype=bool))
     for name in dict.fromkeys(one.belt for _, one in belts):
@@ -587,6 +587,7 @@ def slack_spans(values: Trajectory) -> Iterator[LiftOff]:
         # part of the greatest tension below which a push is rounding
         slack, least = tensions < -1e-10 * np.abs(tensions).max(initial=0.0), tensions.min(axis=0)
         for found in stretches(values, slack.any(axis=0).reshape(values.batch), least.reshape(values.batch)):
+            unit = unit_of(values.mechanism.units, FORCE)
             push, there = (
                 f"{found.amount:.4g}{' ' * bool(unit)}{unit}",
                 slack[:, found.first : found.last + 1].any(axis=1),

@@ -745,8 +745,10 @@ class Solution(Shown):
         checks = self.checks
         names: tuple[Literal["equilibrium", "power"], ...] = ("equilibrium", "power")
         for check in names:
-            error = np.where(self.status == OK, np.abs(getattr(checks, check)), np.nan)
-            found = _worst(error, CHECKS.balanced)
+            error = np.abs(getattr(checks, check))
+            if not (error > CHECKS.balanced).any():
+                continue
+            found = _worst(np.where(self.status == OK, error, np.nan), CHECKS.balanced)
             if found and not self._forces_are_rounding:
                 yield from (Unbalanced(*one, check) for one in found)
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import copy
+from functools import cached_property
+from math import prod
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -121,7 +123,7 @@ class Trajectory:
         self._system, self._system_at, self.least_norm = system, system_at, not mask_redundant
         self._coordinates, self._L, self.radius = coordinates, float(system.par.L), float(system.par.L)
         self.loads: tuple[Load, ...] = self.whole.loads
-        self._count = int(np.prod(batch))
+        self._count = prod(batch)
         self._asked = batch, t, np.arange(self._count)
         self._status = np.full(self._count, Status.OK.value, dtype="U24")
         self._kept: dict[str, Array] = {}
@@ -303,6 +305,11 @@ class Trajectory:
             raise MechgraphError("this solution has no forces: kinematics() computes none; call solve()")
         return self._of(name)
 
+    @cached_property
+    def _lengths(self) -> Array:
+        """What a coordinate of one is in the user's units ``(F, 1)``."""
+        return np.where(self._system.is_length, self._L, 1.0)[:, None]
+
     def _columns(self, pair: int) -> slice:
         first = self._system.first_column
         return slice(int(first[pair]), int(first[pair + 1]))
@@ -313,13 +320,18 @@ class Trajectory:
         """Named outcomes, one a position."""
         return self._status.reshape(self.batch)
 
+    @property
+    def statuses(self) -> set[str]:
+        """Which outcomes there are."""
+        return set(self._status.tolist())
+
     def coordinates(self, pair: int, rank: int) -> Array:
         """Coordinates (rank 0), rates (1) or accelerations (2) of the freedoms of a pair, ``(..., f)``."""
         columns = self._columns(pair)
         if rank == 0:
-            return self._out(np.where(self._solved, self._coordinates[columns], np.nan))
-        unit = np.where(self._system.is_length[columns], self._L, 1.0)[:, None]
-        return self._out(unit * self._of(("dq", "ddq")[rank - 1])[columns])
+            q = self._coordinates[columns]
+            return self._out(q if self._solved.all() else np.where(self._solved, q, np.nan))
+        return self._out(self._lengths[columns] * self._of(("dq", "ddq")[rank - 1])[columns])
 
     def frame_origin(self, pair: int, k: int) -> Array:
         """Origin of frame k of a pair, global, ``(..., 3)``."""
@@ -331,7 +343,7 @@ class Trajectory:
     def screws(self, pair: int) -> Array:
         """Twists of the freedoms of a pair at unit rates about the global origin, ``(..., 6, f)``."""
         columns = self._columns(pair)
-        unit = np.where(self._system.is_length[columns], self._L, 1.0)[:, None]
+        unit = self._lengths[columns]
         return self._out(self._evaluated(lambda block: user_twists(block.here, block.here.S[:, columns]) / unit))
 
     def link(self, link: int) -> tuple[Array, Array, Array]:
@@ -486,12 +498,16 @@ class Trajectory:
 
     def reaction(self, pair: int) -> Array:
         """Reaction of a pair about the global origin, ``(..., 6)``."""
-        return self._about_origin(self._force("reactions")[:, pair], self._of("stress")[:, pair])
+        reactions = self._force("reactions")
+        if "wrenches" not in self._kept and reactions[0].size <= TOGETHER:
+            self._kept["wrenches"] = user_wrench(self._system.par, reactions)  # of all pairs, as readers ask for one after another
+        own = self._kept["wrenches"][:, pair] if "wrenches" in self._kept else user_wrench(self._system.par, reactions[:, pair])
+        return self._about_origin(own, self._of("stress")[:, pair])
 
     def total(self, pair: int) -> Array:
         """Total wrench of a pair about the global origin, ``(..., 6)``."""
         states = self._transmitted(pair)
-        return self._about_origin(states[:, 0], states[:, 1:])
+        return self._about_origin(user_wrench(self._system.par, states[:, 0]), states[:, 1:])
 
     def _transmitted(self, pair: int) -> Array:
         """What a pair transmits, reaction and efforts, and in every self-stress, ``(6, 1 + s, T)``, internal units."""
@@ -539,9 +555,8 @@ class Trajectory:
         wrench = self._out(self._masked(sign * unit * found[:, 0], found[:, 1:]))
         return wrench, self._out(unique).astype(bool), self._out(sizes)
 
-    def _about_origin(self, value: Array, stress: Array) -> Array:
-        """Wrench ``(6, T)`` in the user's units about the global origin, NaN where ``stress (6, s, T)`` has a part."""
-        wrench = user_wrench(self._system.par, value)
+    def _about_origin(self, wrench: Array, stress: Array) -> Array:
+        """Wrench ``(6, T)`` in the user's units about the global origin, NaN where the internal ``stress (6, s, T)`` has a part."""
         if stress.shape[1]:
             far = self._system.par.origin / self._L
             shifted = np.concatenate([stress[:3] + cross(far[:, None, None], stress[3:]), stress[3:]])
@@ -683,7 +698,9 @@ class Trajectory:
         return self._unit(columns) * own, self._unit(columns) * given
 
     def _driven(self, columns: slice) -> Mask:
-        return np.isin(np.arange(self._system.n_freedoms)[columns], self.driven)[:, None]
+        every = np.zeros((self._system.n_freedoms, 1), dtype=bool)
+        every[self.driven] = True
+        return every[columns]
 
     def _stress_of_drives(self, columns: slice, places: Place = EVERY) -> Array:
         """What self-stresses have in the efforts of drives, ``(f, s, n)``."""
