@@ -89,7 +89,9 @@ class KernelOutcome(Outcome):
         """The pair or coupling of every place that rubs."""
         m, dry = self.line.m, rubbing_loads(self.line.m, self.loads)
         pairs = [m.pair(load.of).type if load.of in m.pair_index else None for load in dry]
-        return tuple(load.of for load, row in zip(dry, pairs, strict=True) for _ in (places_in(load, row) if row else "t"))
+        return tuple(
+            load.of for load, row in zip(dry, pairs, strict=True) for _ in (places_in(load, row) if row else "t")
+        )
 
     def _left_open(self) -> Index:
         """Positions at which the kernel does not say what friction does, or where there is none in motion."""
@@ -262,8 +264,4 @@ def cannot(line: Started) -> str | None:
 
 def gives_forces(line: Started) -> bool:
     """Whether the kernel gives the forces that are asked for."""
-    return (
-        line.options.method == "loop_wrench"
-        and line.options.redundant != "elastic"
-        and line.acting is line.columns
-    )
+    return line.options.method == "loop_wrench" and line.options.redundant != "elastic" and line.acting is line.columns

@@ -329,9 +329,14 @@ REFUSED = {
 """Why a position was not solved, by its outcome."""
 
 
+def _words(solution: Solution) -> set[str]:
+    """Which outcomes there are."""
+    return set(solution.status.reshape(-1).tolist())
+
+
 def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exception | None:
     """The named error for the first position that was not solved, with the solution so far."""
-    if outcome.trajectory.statuses.issubset(SOLVED):
+    if _words(solution) <= {*SOLVED}:
         return None
     bad = np.flatnonzero(~np.isin(solution.status.reshape(-1), SOLVED))
     first = int(bad[0])
@@ -444,7 +449,7 @@ def _solved(
     line, outcome = _outcome(m, motions, options, actuate)
     solution = Solution(outcome.trajectory)
     reached = (*SOLVED, *(status.value for status in RUBBING))
-    if outcome.found is None and not outcome.trajectory.statuses.issubset(reached):  # numpy says how far the path led
+    if outcome.found is None and not _words(solution) <= {*reached}:  # numpy says how far the path led
         line, outcome = _outcome(m, motions, replace(options, engine=line.engine), actuate)
         solution = Solution(outcome.trajectory)
     own, tol = (m.declared, m.changes.tol) if isinstance(m, SnappedMechanism) else (m, None)

@@ -236,7 +236,9 @@ class FollowedPositions(Outcome):
         every, N = np.arange(self.starts.sharing)[:, None], self.batch[-1]
         moved = self._moved(good)
         status = np.where(
-            self.found.status == Status.OK, self.trajectory.first(N), [s.value for s in self.found.status]
+            self.found.status == Status.OK,
+            self.trajectory.status().reshape(-1)[:N],
+            [s.value for s in self.found.status],
         )
         self.trajectory.mark(np.arange(len(self.variant)), np.tile(status, len(every)))
         self.contradicting[:] = np.tile(self.contradicting[:N], len(every))

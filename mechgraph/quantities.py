@@ -409,7 +409,7 @@ def door(function: Callable[P, R]) -> Callable[P, R]:
     @functools.wraps(function)
     def entered(*args: P.args, **named: P.kwargs) -> R:
         signature, wanted, by_place, needed = known()
-        bound = dict(zip(by_place, args, strict=False)) | named
+        bound: dict[str, Any] = dict(zip(by_place, args, strict=False)) | named
         several = [name for name, value in bound.items() if isinstance(value, Iterator)]
         clear = len(bound) == len(args) + len(named) and needed <= bound.keys() <= wanted.keys()
         if several or not clear or not by_place:  # ``bind`` takes longer

@@ -287,7 +287,8 @@ def belts(count: int, **more: object) -> mg.Mechanism:
     pulleys = [mg.Pulley(k, k, at[k], (0, 0, 1), radius=0.05 + 0.01 * i) for i, k in enumerate(names[:3])]
     drives = [mg.BeltDrive("b", over=names[:3], pretension=300.0, toothed=False)]
     if count == 2:
-        pulleys += [mg.Pulley("vx", "v", (0.5, 0, 0.05), (0, 0, 1), radius=0.04), mg.Pulley("x", "x", at["x"], (0, 0, 1), radius=0.08)]  # fmt: skip
+        pulleys.append(mg.Pulley("vx", "v", (0.5, 0, 0.05), (0, 0, 1), radius=0.04))
+        pulleys.append(mg.Pulley("x", "x", at["x"], (0, 0, 1), radius=0.08))
         drives.append(mg.BeltDrive("b2", over=["vx", "x"], pretension=150.0))
     loads = [mg.Effort(k, -2.0) for k in names[1:]]
     return mg.Mechanism("belts", pairs=pairs, gears=pulleys, couplings=drives, drives=["p"], loads=loads, **more)
@@ -299,7 +300,9 @@ def test_belts_with_a_pretension(count, rough):
     """Tensions of all spans, with bearings that rub; the sum of length times tension is that of the pretension."""
     m = belts(count)
     if rough:
-        m = m.replace(loads=[*m.loads, mg.Friction("b", mu=0.4), *(mg.Friction(p.name, mu=0.2, radius=0.01) for p in m.pairs)])
+        m = m.replace(
+            loads=[*m.loads, mg.Friction("b", mu=0.4), *(mg.Friction(p.name, mu=0.2, radius=0.01) for p in m.pairs)]
+        )
     given = {"p": mg.Motion([0.1, 0.6], 3.0, 2.0)}
     one, other = (mg.solve(m, given, engine=engine) for engine in ("compiled", "dense"))
     worst, where, faults = differences(one, other)

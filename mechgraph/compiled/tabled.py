@@ -478,7 +478,8 @@ def _numbers(tables: Tabled) -> Iterator[str]:
         ("rates of the passive motions at the start", (), known["passive motions"] * len(freedoms)),
         ("coefficients of couplings", (), known["terms"]), ("their constants", (), known["couplings"]),
         ("unit wrenches of couplings along lines, on either flank", (), 12 * known["couplings along lines"]),
-        ("belts with a pretension: parts of their spans", (), known["spans of these"]), ("pretensions", (), known["belts with a pretension"]),
+        ("belts with a pretension: parts of their spans", (), known["spans of these"]),
+        ("pretensions", (), known["belts with a pretension"]),
         ("loads", (), known["load numbers"]),
     ]  # fmt: skip
     assert sum(max(1, len(names)) * count for _, names, count in parts) == len(P)

@@ -13,7 +13,7 @@ from mechgraph.errors import DeclarationError
 from mechgraph.fields import PerCase
 from mechgraph.kinematics.rates import PassiveMotion, PassiveMotions, Rates, Velocities
 from mechgraph.kinematics.state import Configuration, user_poses
-from mechgraph.maths.se3 import Array, cross, rotate, rotate_back, to_matrix
+from mechgraph.maths.se3 import Array, cross, rotate, rotate_back
 from mechgraph.maths.tolerances import MOTIONS
 from mechgraph.model.loads import Load, Value
 from mechgraph.model.mechanism import Mechanism

@@ -33,7 +33,7 @@ from mechgraph.maths.linear import Choice, ChosenSystem, add_at, choose, least_s
 from mechgraph.maths.se3 import Array, Index, batch_last, cross, shift_wrench
 from mechgraph.maths.tolerances import STRESSES
 from mechgraph.memo import dataclass
-from mechgraph.model.belts import BeltDrive, pretensions
+from mechgraph.model.belts import pretensions
 from mechgraph.model.gears import moving_lines
 from mechgraph.model.parameters import Parameters
 

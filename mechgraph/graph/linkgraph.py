@@ -170,6 +170,12 @@ class LinkGraph:
         return scipy.sparse.csr_array(self.sparse_loop_matrix.T)
 
     @cached_property
+    def step_after(self) -> Index:
+        """For every step of the loops, one behind the other, the next one of its loop, or the first: their pairs share a link."""
+        loop = self.loop_steps[0]
+        return np.where(np.append(loop[1:], -1) == loop, np.arange(len(loop)) + 1, np.searchsorted(loop, loop))
+
+    @cached_property
     def loop_averages(self) -> scipy.sparse.csr_array:
         """Means over the pairs of every loop, loops x pairs."""
         loop, pair, _ = self.loop_steps

@@ -193,7 +193,8 @@ def layout(system: System, drives: Index, passive: Sequence[PassiveMotion]) -> L
     moved = [link for motion in passive for link in motion.links]
     head = [
         FORMAT, len(s.m.links), len(s.m.pairs), len(steps), s.n_freedoms, s.n_state, g.n_loops, len(pair), K, len(term_columns),
-        len(drives), len(unknown), 0, g.frame, int(numbers[-1]), 0, len(passive), len(moved), g.span.start, g.width, *[0] * 3, len(belts), len(spans),
+        len(drives), len(unknown), 0, g.frame, int(numbers[-1]), 0, len(passive), len(moved), g.span.start, g.width,
+        *[0] * 3, len(belts), len(spans),
     ]  # fmt: skip
     parts = [
         head, first, [step.kind for _, step in steps], columns, states[:-1], numbers[:-1], ends.ravel(), tree.ravel(), g.chords,

@@ -56,9 +56,9 @@ def _told(m: Mechanism) -> set[bytes]:
 def _fault(here: Configuration) -> str:
     s, points, middles = here.system, here.pair_points[:, :, 0], here.middles[:, :, 0]
     loop, pair, _ = s.graph.loop_steps
-    # steps of a loop stand one behind the other: the next pair, or at the end the first one, shares a link
-    after = np.where(np.append(loop[1:], -1) == loop, np.arange(len(loop)) + 1, np.searchsorted(loop, loop))
-    apart, size = np.linalg.norm(points[:, pair] - points[:, pair[after]], axis=0), lengths_of(s.graph, points, middles)
+    after, size = s.graph.step_after, lengths_of(s.graph, points, middles)
+    away = points[:, pair] - points[:, pair[after]]
+    apart = np.sqrt((away * away).sum(axis=0))
     part = apart / size[loop]
     too_near = 10 * RANKS.loop  # up to there it is asked whether a distance was lost in a rank
     # distance over the size of a loop, and singular value, that is rounding

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from functools import cached_property
 from itertools import repeat
+from math import isfinite
 from types import MappingProxyType
 from typing import Annotated, Any
 
@@ -618,8 +619,11 @@ def _coupling_faults(m: DeclaredParts) -> list[str]:
 def flat_start(m: DeclaredParts, start: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:
     """Start values by full freedom name; a pair's name may carry one value for each of its freedoms."""
     flat: dict[str, float] = {}
-    faults = []
+    faults, known = [], set(m.freedom_names())
     for key, given in start.items():
+        if type(given) is float and isfinite(given) and key in known:
+            flat[key] = given
+            continue
         pair = m.pairs[m.pair_index[key]] if isinstance(key, str) and key in m.pair_index else None
         names: Sequence[str] = pair.freedom_names if pair is not None else ()
         several = isinstance(given, list | tuple) or (isinstance(given, np.ndarray) and given.ndim == 1)

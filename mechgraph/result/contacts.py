@@ -534,7 +534,7 @@ def lift_offs(values: Trajectory) -> tuple[LiftOff, ...]:
     """Where contacts that are only pushed, or do not say that they are held, would have to pull."""
     if not values.has_forces:
         return ()
-    found = contacts_of(values).values() if OK in values.statuses else ()
+    found = contacts_of(values).values() if bool((values.status() == OK).any()) else ()
     return (*(lift for contact in found for lift in contact.lift_off), *slack_spans(values), *pulled_flanks(values))
 
 

@@ -243,13 +243,9 @@ class Trajectory:
         out._status = np.full(self._count, Status.DEAD_POINT.value, dtype="U24")
         return out
 
-    def first(self, count: int) -> Any:
-        """The outcomes of the first positions."""
-        return self._status[:count]
-
     # --- shapes and units ----------------------------------------------------------------------------------------------
 
-    def _out(self, values: Array) -> Array:
+    def _out(self, values: Any) -> Any:
         """``(..., T)`` -> batch first ``(*batch, ...)``; read-only."""
         rows = values.transpose(-1, *range(values.ndim - 1)).copy()
         out = rows.reshape((*self.batch, *rows.shape[1:]))
@@ -263,13 +259,10 @@ class Trajectory:
         motions: Iterable[BlockMotion] = self._motions or map(self._motion, in_blocks(np.flatnonzero(self._solved)))
         if self._small:
             motions = self._motions = list(motions)
-        out: Array | None = None
-        for motion in motions:
-            found = value(motion)
-            if out is None:
-                out = np.full((*found.shape[:-1], self._count), np.nan)
-            out[..., motion.places] = found
-        assert out is not None
+        found = [(motion.places, value(motion)) for motion in motions]
+        out = np.full((*found[0][1].shape[:-1], self._count), np.nan)
+        for places, values in found:
+            out[..., places] = values
         return out
 
     @property
@@ -320,17 +313,11 @@ class Trajectory:
         """Named outcomes, one a position."""
         return self._status.reshape(self.batch)
 
-    @property
-    def statuses(self) -> set[str]:
-        """Which outcomes there are."""
-        return set(self._status.tolist())
-
     def coordinates(self, pair: int, rank: int) -> Array:
         """Coordinates (rank 0), rates (1) or accelerations (2) of the freedoms of a pair, ``(..., f)``."""
         columns = self._columns(pair)
         if rank == 0:
-            q = self._coordinates[columns]
-            return self._out(q if self._solved.all() else np.where(self._solved, q, np.nan))
+            return self._out(np.where(self._solved, self._coordinates[columns], np.nan))
         return self._out(self._lengths[columns] * self._of(("dq", "ddq")[rank - 1])[columns])
 
     def frame_origin(self, pair: int, k: int) -> Array:
@@ -344,7 +331,7 @@ class Trajectory:
         """Twists of the freedoms of a pair at unit rates about the global origin, ``(..., 6, f)``."""
         columns = self._columns(pair)
         unit = self._lengths[columns]
-        return self._out(self._evaluated(lambda block: user_twists(block.here, block.here.S[:, columns]) / unit))
+        return self._out(self._evaluated(lambda at: user_twists(at.here, at.here.S[:, columns]) / unit))
 
     def link(self, link: int) -> tuple[Array, Array, Array]:
         """Pose ``(..., 4, 4)``, twist and its rate ``(..., 6)`` of a link."""
@@ -464,9 +451,6 @@ class Trajectory:
         """Closure error, equilibrium and power, the last two relative to the largest term in the whole batch, and accuracy."""
         closure = self._out(self._of("closure"))
         accuracy = self._out(np.where(self._solved, self._of("accuracy"), np.nan))
-        if not self.has_forces:
-            nothing = np.full(self.batch, np.nan)
-            return Checks(closure, nothing, nothing, accuracy)
         wrench, term = (float(size) or 1.0 for size in self.largest)
         balance, power = self._out(self._of("balance") / wrench), self._out(self._of("power") / term)
         return Checks(closure, balance, power, accuracy)
@@ -498,11 +482,12 @@ class Trajectory:
 
     def reaction(self, pair: int) -> Array:
         """Reaction of a pair about the global origin, ``(..., 6)``."""
-        reactions = self._force("reactions")
-        if "wrenches" not in self._kept and reactions[0].size <= TOGETHER:
-            self._kept["wrenches"] = user_wrench(self._system.par, reactions)  # of all pairs, as readers ask for one after another
-        own = self._kept["wrenches"][:, pair] if "wrenches" in self._kept else user_wrench(self._system.par, reactions[:, pair])
-        return self._about_origin(own, self._of("stress")[:, pair])
+        wrenches, stress = self._force("reactions"), self._of("stress")[:, pair]
+        if wrenches[0].size > TOGETHER:
+            return self._about_origin(user_wrench(self._system.par, wrenches[:, pair]), stress)
+        if "wrenches" not in self._kept:  # of all pairs, as readers ask for one after another
+            self._kept["wrenches"] = user_wrench(self._system.par, wrenches)
+        return self._about_origin(self._kept["wrenches"][:, pair], stress)
 
     def total(self, pair: int) -> Array:
         """Total wrench of a pair about the global origin, ``(..., 6)``."""
@@ -549,11 +534,11 @@ class Trajectory:
 
         found = self._evaluated(seen)
         unit = np.repeat([self._L**2, self._L], 3)[:, None]
-        unique = (~_touched(found[:, 1:]) & self._solved).astype(float)
+        unique = ~_touched(found[:, 1:]) & self._solved
         known = found[:, :1] if self.least_norm else found
         sizes = np.stack([self._L**2 * unique_sizes(known[:3]), self._L * unique_sizes(known[3:])])
         wrench = self._out(self._masked(sign * unit * found[:, 0], found[:, 1:]))
-        return wrench, self._out(unique).astype(bool), self._out(sizes)
+        return wrench, self._out(unique), self._out(sizes)
 
     def _about_origin(self, wrench: Array, stress: Array) -> Array:
         """Wrench ``(6, T)`` in the user's units about the global origin, NaN where the internal ``stress (6, s, T)`` has a part."""
@@ -698,9 +683,7 @@ class Trajectory:
         return self._unit(columns) * own, self._unit(columns) * given
 
     def _driven(self, columns: slice) -> Mask:
-        every = np.zeros((self._system.n_freedoms, 1), dtype=bool)
-        every[self.driven] = True
-        return every[columns]
+        return (np.arange(self._system.n_freedoms)[columns, None] == self.driven).any(axis=1, keepdims=True)
 
     def _stress_of_drives(self, columns: slice, places: Place = EVERY) -> Array:
         """What self-stresses have in the efforts of drives, ``(f, s, n)``."""
@@ -737,8 +720,7 @@ class Trajectory:
 
     def efforts_at(self, places: Index) -> tuple[Array, Array, Mask]:
         """Own and applied efforts ``(F, n)``, and which of the former are not unique."""
-        every = slice(None)
-        return *self._efforts(every, places), _touched(self._stress_of_drives(every, places))
+        return *self._efforts(EVERY, places), _touched(self._stress_of_drives(EVERY, places))
 
     def multiplier(self, coupling: int) -> Array:
         """Multiplier of a coupling, ``(...)``."""
