@@ -22,6 +22,7 @@ import mechanisms
 import numpy as np
 import pytest
 from chromium import DRAWS_NOT, Reader, chromium
+from ladder import dyad, four_bar
 from test_cli import run
 from test_hostile_names import NAMES, named
 
@@ -459,6 +460,40 @@ def test_a_response_and_a_study_have_pages() -> None:
     assert "Sensitivities" in page
 
 
+@cache
+def found() -> mg.Syntheses:
+    """Three four-bars that do one function, the last one with a branch defect."""
+    asked = np.deg2rad([[0, 0], [72, -30], [144, -10], [216, 10], [288, 20]])
+    return mg.synthesize(four_bar(), mg.function("A", "D", asked), ["B.point", "C.point"])
+
+
+def test_mechanisms_of_a_synthesis_stand_side_by_side_and_move_through_the_positions() -> None:
+    data = data_of(report_page(found()))
+    assert [item["title"].split(",")[0] for item in data["items"]] == ["0: good", "1: good", "2: branch defect"]
+    for k, (m, item) in enumerate(zip(found(), data["items"], strict=True)):
+        assert item["figure"] == k
+        figure, motion = data["figures"][k], item["motion"]
+        places = [next(i for i, text in enumerate(motion["places"]) if f"position {row}" in text) for row in range(5)]
+        assert ("A.Rz = 144 deg, position 2" in motion["places"]) is (k < 2)
+        moved = numbers(motion["values"])[places].reshape(5, -1, 3, 4)
+        names = [f"link:{name}" for name in m.link_names()]
+        for at, number in enumerate(motion["frames"][: len(names) - 1]):
+            assert np.abs(moved[:, at] - found().poses[k][:, number, :3]).max() < 1e-4
+        (point,) = [text for name, text in figure["pairs"][1]["rows"] if name == "point"]
+        assert [float(v) for v in point.split(", ")] == pytest.approx(found().values[k, :2], rel=1e-5)
+
+
+def test_a_synthesis_without_a_driver_is_shown_position_by_position() -> None:
+    places = [(0, 0, 0), (1, 0.5, 0.4), (2, 0.4, 1.1)]
+    data = data_of(report_page(mg.synthesize(dyad(), mg.poses("body", places), ["B.point"])))
+    (item,) = data["items"]
+    assert item["motion"]["places"] == [f"position {i}" for i in range(3) for _ in range(8)]
+    with pytest.raises(mg.DeclarationError, match="no mechanism to show"):
+        report_page(found().taken([]))
+    with pytest.raises(mg.DeclarationError, match="no solution and no study"):
+        report_page(found(), mg.solve(mg.load("four-bar")))
+
+
 # --- on the command line -----------------------------------------------------------------------------------------------
 
 
@@ -583,6 +618,21 @@ def test_names_of_pairs_with_unknown_reactions_are_hatched(reader: Reader, pages
     reader.open(pages["rcsr"])
     reader.settled()
     assert reader.js(hatched) == []
+
+
+def test_another_mechanism_of_a_synthesis_is_played(reader: Reader, tmp_path: Path) -> None:
+    mg.write_report(found(), path=tmp_path / "found.html")
+    reader.open(tmp_path / "found.html")
+    seen = labels(reader)
+    reader.js("arguments[0].click()", reader.all(".choices button")[2])
+    reader.wait(lambda: reader.text(".play") == "Pause")
+    reader.js("arguments[0].click()", reader.all(".play")[0])
+    assert labels(reader).keys() == seen.keys()
+    assert labels(reader)["C (R)"] != seen["C (R)"]
+    at_slider(reader, 8)
+    assert reader.text(".bar output") == "position 1"
+    assert reader.complaints() == []
+    assert reader.requests() == []
 
 
 def test_play_and_pause(reader: Reader, pages: dict[str, Path]) -> None:

@@ -126,12 +126,13 @@ FITTED = FITTED.replace('conditions = { "D.effort" = [-inf, 40] }', "")
 
 
 def test_a_mechanism_is_found_ranked_drawn_and_written_by_the_program(tmp_path: Path) -> None:
-    path, best, picture = tmp_path / "f.toml", tmp_path / "best.toml", tmp_path / "s.svg"
+    path, best, picture, page = (tmp_path / name for name in ("f.toml", "best.toml", "s.svg", "s.html"))
     path.write_text(FITTED, encoding="utf-8")
-    result = run("synthesize", path, "--good", "--rank", "size", "--out", best, "--plot", picture)
+    result = run("synthesize", path, "--good", "--rank", "size", "--out", best, "--plot", picture, "--page", page)
     assert result.exit_code == 0
     assert "Completeness: searched" in result.output
     assert picture.read_text(encoding="utf-8").startswith("<?xml")
+    assert "0: good" in page.read_text(encoding="utf-8")
     told = json.loads(run("synthesize", path, "--good", "--rank", "size", "--json").output)
     jsonschema.Draft202012Validator(schema("output")).validate(told)
     assert told["fitness"][0]["error"] < 0.02

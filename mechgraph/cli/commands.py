@@ -711,6 +711,7 @@ def synthesize(
         int, typer.Option("--solution", help="Which one is written, counted from 0.", metavar="NUMBER", min=0)
     ] = 0,
     plot: Annotated[Path | None, opt.option("--plot", "Also plot them side by side.", "FILE")] = None,
+    page: Annotated[Path | None, opt.option("--page", "Also write a page on which each can be played.", "FILE")] = None,
     json: opt.AsJson = False,
 ) -> None:
     """Find the mechanisms that do what [synthesis] of a file asks, and report whether the list is complete.
@@ -720,6 +721,7 @@ def synthesize(
     Exit status: 0 success; 1 where no mechanism is left; 2 usage or input error.
     """
     opt.check_out(plot, mechanism, PICTURES)
+    opt.check_out(page, mechanism, PAGES)
     if out is not None:
         opt.refuse_own_file(out, mechanism)
     m = opt.loaded(mechanism)
@@ -732,6 +734,8 @@ def synthesize(
         found = found.good if good else found
         found = found if rank is None else found.ranked(rank)
         figure = found.plot() if plot is not None and len(found) else None
+        if page is not None and found:
+            mg.write_report(found, path=page)
     if found and solution >= len(found):
         opt.refuse("synthesize", f"--solution {solution}: there are {counted(len(found), 'mechanism')}, counted from 0")
     if out is not None and found:
@@ -739,6 +743,8 @@ def synthesize(
     _tell_found("synthesize", found, figure, plot, json)
     if out is not None and found and not json:
         opt.write(f"\nWrote mechanism {solution} to {out}.\n")
+    if page is not None and found and not json:
+        opt.write(f"\nWrote {page}.\n")
     if not found:
         raise typer.Exit(opt.NO_ANSWER)
 

@@ -136,6 +136,8 @@ class Syntheses(Shown, Sequence[Mechanism]):
         Of each, see ``Fitness``; found when first asked for.
     rejected : tuple
         Mechanisms that ``require``, ``conditions`` and ``bounds`` left out: ``mechanism``, ``values``, ``reasons``.
+    driver : str or None
+        The freedom that leads a mechanism through the rows: the input, the one with timing, or the only drive.
     mechanism_of : tuple of Mechanism
         For each the mechanism that it comes from: of chains one of many, with numbers of their own; what one does not have is NaN.
 
@@ -172,6 +174,7 @@ class Syntheses(Shown, Sequence[Mechanism]):
     copies: tuple[tuple[int, ...], ...] = ()
     rejected: tuple[RejectedAnswer, ...] = ()
     sources: tuple[Mechanism, ...] = ()
+    driver: str | None = None
 
     @property
     def mechanism_of(self) -> tuple[Mechanism, ...]:
@@ -318,10 +321,7 @@ class Syntheses(Shown, Sequence[Mechanism]):
         MissingExtraError
             Without matplotlib.
         """
-        drawn = [
-            (m, f"{'good' if fit.good else 'defect'}, {np.rad2deg(fit.transmission):.3g} deg")
-            for m, fit in zip(self, self.fitness, strict=True)
-        ]
+        drawn = [(m, fit.words) for m, fit in zip(self, self.fitness, strict=True)]
         return methods.call("draw_side_by_side", self.mechanism, drawn, "there is no mechanism to draw")
 
     def document(self) -> Document:
@@ -478,6 +478,7 @@ def joined_answers(found: Sequence[Syntheses], told: Sequence[str]) -> Syntheses
         tuple(tuple(n + k for k in mine) for n, s in zip(first, found, strict=False) for mine in s.copies),
         tuple(one for s in found for one in s.rejected),
         tuple(s.mechanism for s in found for _ in s),
+        found[0].driver,
     )
     return out._sorted
 

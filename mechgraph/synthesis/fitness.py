@@ -78,6 +78,13 @@ class Fitness:
         """Whether no defect is known; so too without a driver."""
         return not (self.branch or self.circuit or self.order)
 
+    @property
+    def words(self) -> str:
+        """Defects and transmission, as under a picture."""
+        defects = [name for name in ("branch", "circuit", "order") if getattr(self, name)]
+        told = f"{' and '.join(defects)} defect" if defects else "good"
+        return told + (f", {np.rad2deg(self.transmission):.3g} deg" if np.isfinite(self.transmission) else "")
+
     def lacks(self, wanted: Iterable[Defect]) -> tuple[Defect, ...]:
         """Those of what is wanted (no defect of that name; a full turn) that it falls short of."""
         return tuple(name for name in wanted if getattr(self, name) is not (name == "full_turn"))

@@ -187,6 +187,7 @@ class Synthesis:
             len(orbits(start.x[: of.u], self.symmetries)),
             self.symmetries,
             tuple(tuple(copies[k]) for k in range(len(values))),
+            driver=driver_of(p.m, self.tasks)[0],
         )
         # of a sweep nothing is said of fitness, which takes longer than the solutions, until it is asked for
         return out if self.sweep.names else out._sorted
@@ -370,6 +371,7 @@ class FittedSynthesis:
             found.evidence,
             np.array([1.0 / self.fit.margins(here).min() for here in points]),
             tuple(fitness(m, q, self.driver, self.output, e) for (m, q), e in zip(made, errors, strict=True)),
+            driver=self.driver,
         )
 
 

@@ -31,9 +31,11 @@ from mechgraph.quantities import door, wrong
 from mechgraph.result.solution import Solution
 from mechgraph.show.curves import effort_curve, friction_losses, reaction_ranges
 from mechgraph.show.diagrams import draw_graph, study_histogram, study_tornado
+from mechgraph.show.page.answers import answers_data
 from mechgraph.show.page.content import view_data
 from mechgraph.show.skeleton import draw_skeleton
-from mechgraph.variants.study import IGNORED_TAIL, Study
+from mechgraph.synthesis.answers import Syntheses
+from mechgraph.variants.study import Study
 
 WEB = "web"
 """Folder of the scripts, which build.js of it builds."""
@@ -96,13 +98,15 @@ def declaration(m: Mechanism) -> str:
         return ""
 
 
-def provenance(m: Mechanism, report: DeterminacyReport, s: Solution | None, study: Study | None) -> Document:
+def provenance(
+    m: Mechanism, report: DeterminacyReport | None, s: Solution | None = None, study: Study | None = None
+) -> Document:
     """One table: program, mechanism, options."""
     return Document("", (Table(("what", "value"), tuple(row for row in _rows(m, report, s, study) if row[1])),))
 
 
 def _rows(
-    m: Mechanism, report: DeterminacyReport, s: Solution | None, study: Study | None
+    m: Mechanism, report: DeterminacyReport | None, s: Solution | None, study: Study | None
 ) -> Iterator[tuple[str, str]]:
     text = declaration(m)
     yield "program", f"mechgraph {version()}, numpy {np.__version__}"
@@ -113,7 +117,8 @@ def _rows(
         hashlib.sha256(text.encode()).hexdigest() if text else "none: it holds functions",
     )
     yield "units", ", ".join(f"{base} {unit}" for base, unit in m.units.items()) or "none declared: any consistent set"
-    yield "engine of the report", report.engine or "none: graph alone"
+    if report is not None:
+        yield "engine of the report", report.engine or "none: graph alone"
     if s is not None:
         yield "prescribed", ", ".join(s.prescribed) or "nothing"
         yield "unknown efforts", ", ".join(s.actuated) or "none"
@@ -216,7 +221,7 @@ START = "mechgraphView.start();"
 
 @door
 def write_report(
-    m: Mechanism,
+    m: Mechanism | Syntheses,
     solution: Solution | None = None,
     study: Study | None = None,
     *,
@@ -229,8 +234,8 @@ def write_report(
 
     Parameters
     ----------
-    m : Mechanism
-        The mechanism.
+    m : Mechanism or Syntheses
+        The mechanism; or what ``synthesize`` found: all mechanisms side by side, each to be played.
     solution : Solution, optional
         Of that mechanism. Default: the stored motions, if all drives have one.
     study : Study, optional
@@ -260,8 +265,12 @@ def write_report(
     write_whole(path, [report_page(m, solution, study)])
 
 
-def report_page(m: Mechanism, solution: Solution | None = None, study: Study | None = None) -> str:
+def report_page(m: Mechanism | Syntheses, solution: Solution | None = None, study: Study | None = None) -> str:
     """The page as text; see ``write_report``."""
+    if isinstance(m, Syntheses):
+        if solution is not None or study is not None:
+            raise DeclarationError("write_report", ["a page of syntheses has no solution and no study"])
+        return _filled(_answers_content(m))
     faults = _faults(m, solution, study)
     if faults:
         raise DeclarationError("write_report", faults)
@@ -310,12 +319,32 @@ def _content(m: Mechanism, report: DeterminacyReport, s: Solution | None, study:
         "numbers": list(_numbers(report, s)),
         "brief": _html(Document("", tuple(b for b in report.document().blocks if isinstance(b, Bullets)))),
         "report": _html(Document("", report.document(full=True).blocks)),
-        "data": json_for_script(data) if data is not None else "",
+        "data": json_for_script(data) if data is not None else "", "seen": "The mechanism",
         "stills": stills(m if s is None else s.mechanism, s) if drawn else [],
         "graph": pictures_of_graph(m) if not m.has_geometry else [],
         "results": [(title, _html(document), pictures) for title, document, pictures in _results(s, study)],
         "equations": _html(_equations(report.mechanism)),
         "provenance": _html(provenance(m, report, s, study)), "declaration": declaration(m),
+        "version": version(), "libraries": libraries(),
+    }  # fmt: skip
+
+
+def _answers_content(found: Syntheses) -> dict[str, Any]:
+    """What a page of syntheses holds: the table, what is played, all side by side, and the declaration."""
+    m, document = found.mechanism, found.document()
+    good, tested = len(found.good), found.completeness == "tested"
+    side, word = (
+        ("good", "Complete")
+        if good and tested
+        else ("fair", "Others may exist" if good else "None runs through all positions")
+    )
+    return {
+        "name": m.name or "mechanism", "about": m.description, "side": side, "word": word, "verdict": document.title, "remarks": [],
+        "numbers": [("mechanisms", str(len(found))), ("without defects", str(good)), ("left out", str(len(found.rejected)))],
+        "brief": _html(Document("", document.blocks)), "report": "", "data": json_for_script(answers_data(found)),
+        "seen": "The mechanisms", "stills": [], "graph": [],
+        "results": [("Side by side", "", [("Where each begins, with its least transmission angle", _picture(found.plot))])],
+        "equations": "", "provenance": _html(provenance(m, None)), "declaration": declaration(m),
         "version": version(), "libraries": libraries(),
     }  # fmt: skip
 

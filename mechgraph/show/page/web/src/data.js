@@ -37,6 +37,7 @@
  * @property {number[]} frames those that move
  * @property {Packed} values (steps, frames, 12)
  * @property {"cycle" | "swing" | "spin"} kind
+ * @property {string[]} [places] every step in words
  *
  * @typedef {{ at: number[], force: number[], moment: number[], open: boolean }} Arrow
  *

@@ -108,15 +108,14 @@ export class Stage {
   /** @param {Colours} colours */
   recolour(colours) {
     this.colours = colours;
-    if (this.figure) this.show(this.figure, false);
+    if (this.figure) this.show(this.figure);
   }
 
   /**
-   * Another figure; the camera stays unless it is asked to fit.
+   * Another figure; the camera stays.
    * @param {Figure} figure
-   * @param {boolean} fit
    */
-  show(figure, fit) {
+  show(figure) {
     for (const group of this.frames) dispose(group);
     this.figure = figure;
     this.frames = Array.from({ length: figure.frames.shape[0] }, () => {
@@ -136,7 +135,6 @@ export class Stage {
     });
     for (const label of this.labels) [label.width, label.height] = [label.node.offsetWidth, label.node.offsetHeight];
     this.stand();
-    if (fit) this.fit();
     this.invalidate();
   }
 

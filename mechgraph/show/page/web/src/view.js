@@ -8,7 +8,7 @@ import { canDraw, Stage } from "./stage.js";
 
 /** @typedef {import("./data.js").Data} Data */
 /** @typedef {import("./data.js").Item} Item */
-/** @typedef {{ frames: number[], values: Float32Array, count: number, kind: string }} Moving */
+/** @typedef {{ frames: number[], values: Float32Array, count: number, kind: string, places?: string[] }} Moving */
 
 /** Seconds of a whole cycle, of a way to one side, of a turn. */
 const SECONDS = { cycle: 6, swing: 2, spin: 4 };
@@ -25,6 +25,7 @@ class View {
     this.root = root;
     this.data = data;
     this.item = data.items[0];
+    this.home = -1;
     this.cycle = data.cycle;
     this.frame = 0;
     this.direction = 1;
@@ -47,9 +48,7 @@ class View {
     if (!this.stage) this.ui.stage.append(made("p", { className: "missing", textContent: NO_DRAWING }));
     root.classList.toggle("flat", !this.stage);
     this.listen();
-    this.stage?.show(data.figures[0], true);
     this.choose(this.item, false);
-    this.choosePair(0);
   }
 
   listen() {
@@ -66,7 +65,7 @@ class View {
     ui.select.addEventListener("change", () => this.choosePair(Number(ui.select.value)));
   }
 
-  /** Buttons for all there is to show, and the names of the pairs. */
+  /** Buttons for all there is to show. */
   fill() {
     /** @type {Map<string, Item[]>} */
     const groups = new Map();
@@ -82,9 +81,16 @@ class View {
       this.ui.choices.append(made("h3", { textContent: group }), list);
     }
     if (this.data.note) this.ui.choices.append(made("p", { className: "note", textContent: this.data.note }));
-    const { pairs } = this.data.figures[0];
-    this.ui.select.append(...pairs.map((pair, i) => made("option", { value: String(i), textContent: `${pair.name} (${pair.type}), ${pair.a} \u2013 ${pair.b}` })));
     this.ui.forces.label.hidden = !this.forces.length;
+  }
+
+  /** Another mechanism than before: all of it is seen, and its pairs have names of their own. */
+  arrive() {
+    this.home = this.item.figure;
+    const { pairs } = this.data.figures[this.home];
+    this.ui.select.replaceChildren(...pairs.map((pair, i) => made("option", { value: String(i), textContent: `${pair.name} (${pair.type}), ${pair.a} \u2013 ${pair.b}` })));
+    this.stage?.fit();
+    this.choosePair(Math.min(Math.max(this.pair, 0), pairs.length - 1));
   }
 
   recolour() {
@@ -120,11 +126,12 @@ class View {
     this.stand();
     const last = (this.motion?.count ?? 1) - 1;
     // a freedom begins in the middle, where the mechanism stands; at its end for those who want nothing to move
-    const swings = this.motion?.kind === "swing" && item !== this.data.items[0];
+    const swings = this.motion?.kind === "swing" && !this.motion.places && item !== this.data.items[0];
     this.frame = swings ? (this.still.matches ? last : last / 2) : 0;
     this.ui.bar.hidden = !last;
     this.ui.slider.max = String(last);
     this.ui.slider.setAttribute("aria-label", `position: ${item.title}`);
+    if (this.home !== item.figure) this.arrive();
     this.show();
     if (play && last && !this.still.matches) this.start();
   }
@@ -135,8 +142,8 @@ class View {
     const after = this.after ? item.after : null;
     const figure = this.data.figures[after ? after.figure : item.figure];
     const motion = after ? null : item.motion;
-    this.motion = motion && { frames: motion.frames, values: unpacked(motion.values), count: motion.values.shape[0], kind: motion.kind };
-    if (this.stage && this.stage.figure !== figure) this.stage.show(figure, false);
+    this.motion = motion && { frames: motion.frames, values: unpacked(motion.values), count: motion.values.shape[0], kind: motion.kind, places: motion.places };
+    if (this.stage && this.stage.figure !== figure) this.stage.show(figure);
     else this.stage?.stand();
     this.stage?.add(after ? [] : item.pieces);
     this.stage?.mark(item.marked.filter((pair) => pair < figure.pairs.length), item.axes);
@@ -200,7 +207,7 @@ class View {
 
   /** @param {number} pair */
   choosePair(pair) {
-    const found = this.data.figures[0].pairs[pair];
+    const found = this.data.figures[this.item.figure].pairs[pair];
     if (!found) return;
     this.pair = pair;
     this.ui.select.value = String(pair);
@@ -217,7 +224,7 @@ class View {
 
   show() {
     const whole = Math.round(this.frame);
-    const text = this.cycling ? this.cycle?.places[whole] : this.motion ? `${whole + 1} of ${this.motion.count}` : "";
+    const text = this.cycling ? this.cycle?.places[whole] : this.motion ? (this.motion.places?.[whole] ?? `${whole + 1} of ${this.motion.count}`) : "";
     this.ui.slider.value = String(whole);
     this.ui.place.textContent = text ?? "";
     this.ui.slider.setAttribute("aria-valuetext", text ?? "");
