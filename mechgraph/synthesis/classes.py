@@ -18,11 +18,11 @@ from functools import cached_property
 import numpy as np
 
 from mechgraph.graph.linkgraph import link_graph
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.state import CLOSED, Configuration, close
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import complement, rank_of, singular_values
 from mechgraph.maths.newton import least_norm_steps
-from mechgraph.maths.se3 import Index, cross, finite_twist, pose_exp, rotation_exp
+from mechgraph.maths.se3 import Index, cross, finite_twist, inverse, move_twist, pose_exp, rotation_exp
 from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
 from mechgraph.modes.family import Array, Family, common, generated
@@ -99,9 +99,15 @@ class TaskClass:
         self.orders = np.where(asked, np.arange(1 + orders), 0).max(axis=1, initial=0)
         self.free = self._free_columns()
         start = problem.inside(problem.unknowns.declared[:, None])
-        # declared values may be anything, all in one place too: the class is read at others
-        spread = problem.numbers.with_values(problem.places, start + rng.normal(size=start.shape))
-        here = Configuration(problem.system_with(spread), problem.at_rest[:, None])
+        # declared values may be anything, all in one place too: the class is read at others, with which some may not close
+        for _ in range(8):
+            spread = problem.numbers.with_values(problem.places, start + rng.normal(size=start.shape))
+            here = Configuration(problem.system_with(spread), problem.at_rest[:, None])
+            if problem.closed_at_start or close(here.system, here.x[:, 0], _NONE)[1] < CLOSED:
+                break
+        if not problem.closed_at_start:
+            here = Configuration(here.system, close(here.system, here.x[:, 0], _NONE)[0][:, None])
+        self.here = here
         self.W = spread.norms.size if any(p.array != "point" for own in problem.places for p in own) else 0
         self.family = self
         self.of_row = Equations(Family(here, problem.columns, np.zeros((s.n_freedoms, 0))), None)
@@ -121,7 +127,7 @@ class TaskClass:
         return out
 
     def _algebras(self, here: Configuration) -> list[Array]:
-        """For every pair a basis ``(6, k)`` of the motions by which its place may be moved, in the global frame.
+        """For every pair a basis ``(6, k)`` of the motions by which its place may be moved, in the global frame ``here``.
 
         Of loops of the mechanism itself their own twists tell; of those that only what is asked of a link closes, its poses do too.
         """
@@ -153,7 +159,10 @@ class TaskClass:
             return np.einsum("iat,abt,bjt->ijt", *turns), values[:3]
 
         R, place = pose(values)
-        e = finite_twist(R, place, np.zeros_like(place))
+        # from the first pose, which is the identity where pairs stand by point and axis
+        turn = np.einsum("iat,ja->ijt", R, R[:, :, 0])
+        moved = place - np.einsum("ijt,j->it", turn, place[:, 0])
+        e = finite_twist(turn, moved, np.zeros_like(place))
         # where twists are asked their rates add to the motions: derivatives by complex steps
         for rates in (rates[:, at].T for rates in problem.rates[:1]):
             step = np.nan_to_num(rates) * MODES.span
@@ -252,15 +261,15 @@ class TaskClass:
 
     def _random_places(self, rng: np.random.Generator) -> Array:
         """Known places moved at random, such that loops keep the groups in which they move ``(3, 4, 2, P, 1)``."""
-        P = len(self.problem.whole.pairs)
+        P, s = len(self.problem.whole.pairs), self.problem.system
         moves = np.zeros((6, 2, P, 1), dtype=complex)
         for k, basis in enumerate(self.algebras):
-            # a place that is declared on each link by itself moves on each by itself
-            sides = [slice(0, 2)] if self.problem.m.pairs[k].on_a is None else [0, 1]
-            for side in sides:
-                moves[:, side, k] = (basis @ (0.5 * _random(rng, basis.shape[1]))).reshape(
-                    6, *(1,) * (2 if side == slice(0, 2) else 1)
-                )
+            moves[:, :, k] = (basis @ (0.5 * _random(rng, basis.shape[1])))[:, None, None]
+            if self.problem.m.pairs[k].on_a is not None:
+                # a place that is declared on each link by itself moves on each by itself
+                for side, link in enumerate((s.a[k], s.b[k])):
+                    own = basis @ (0.5 * _random(rng, basis.shape[1]))
+                    moves[:, side, k] = move_twist(inverse(self.here.poses[:, :, link]), own[:, None])
         return pose_exp(moves)
 
     def random_members(self, rng: np.random.Generator, n: int) -> list[ClassMember]:
@@ -394,6 +403,7 @@ class TaskClass:
         return np.concatenate([np.array(z).reshape(self.u, rows.T), norms, rows.x.reshape(-1, rows.T)])
 
 
+_NONE: Index = np.zeros(0, dtype=np.intp)
 MOST_TURNED = 2.0
 """Imaginary part of an angle up to which a random mechanism serves as a start."""
 

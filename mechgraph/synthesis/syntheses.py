@@ -58,11 +58,6 @@ class Synthesis:
         ]
         if p.tasks is not None and p.tasks.scaled:
             faults.append('function with scale="free": the factor is not sought by exact synthesis yet')
-        placed = [pair.name for pair in m.pairs if pair.on_a is not None and pair.contact is None]
-        if placed:
-            faults.append(
-                f"pairs {', '.join(placed)}: are placed on each link by itself; exact synthesis takes pairs by point= and axis= so far"
-            )
         guided = [pair.name for pair in m.pairs if pair.contact is not None or pair.type.takes_pitch]
         if guided:
             faults.append(
@@ -103,9 +98,16 @@ class Synthesis:
         DeclarationError
         """
         p, wanted = self.problem, int(self.of.conditions.sum())
-        if wanted == p.u:
-            return
         names = [p.unknowns.names[k] for k in p.sought]
+        if wanted == p.u:
+            at = np.zeros(1, dtype=np.intp)
+            _, sigma, V = np.linalg.svd(self.of.leg(self.of.start, self.of.start).at(self.of.x[:, None], np.zeros(1), at).matrix[0])
+            idle = V[int((sigma > MODES.generic * sigma[0]).sum()) :] if p.u else V
+            if not len(idle):
+                return
+            which = ", ".join(name for name, column in zip(names, np.abs(idle).T, strict=True) if column.max() > MODES.span)
+            fault = f"{counted(len(idle), 'way')} to change {which} together {'leaves' if len(idle) == 1 else 'leave'} all that is asked as it is"
+            raise DeclarationError(p.name, [f"{fault} (frames of links, size or place of the whole): fix as many, and ask for more"])
         each = ", ".join(f"{c} at row {row}" for row, c in zip(p.rows, self.of.conditions, strict=True))
         counts = f"{counted(wanted, 'condition')} ({each}) for {counted(p.u, 'unknown')} ({', '.join(names)})"
         if wanted < p.u:

@@ -22,7 +22,7 @@ import numpy as np
 
 from mechgraph.errors import DeclarationError
 from mechgraph.kinematics.prescribed import DriverMotion
-from mechgraph.kinematics.state import Configuration, user_poses
+from mechgraph.kinematics.state import Configuration, close, user_poses
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Array, Index, cross, move_twist, rotation_exp, turn_tangent
 from mechgraph.memo import dataclass
@@ -106,14 +106,15 @@ class RowNumbers:
 class FirstPoses:
     """Links that begin at other poses than the identity, ``poses (4, 4)`` by link.
 
-    Pairs by point and axis want the frames of their links on the global one at row 0. So such a link is sought in a frame of its own that
-    lies there, ``m`` and ``tasks``; what is found comes ``back`` in the frame that was declared, its pairs by markers.
+    Pairs by point and axis want the frames of their links on the global one at row 0. So a link with such pairs is sought in a frame of its
+    own that lies there, ``m`` and ``tasks``; what is found comes ``back`` in the frame that was declared, its pairs by markers.
     """
 
     def __init__(self, declared: Mechanism, tasks: Any, unknown: Sequence[str], faults: list[str]) -> None:
         every = tasks if isinstance(tasks, list | tuple) else [tasks]
         found = [(task.link, task.first(declared)) for task in every if isinstance(task, PoseTask)]
-        known = [(link, X) for link, X in found if X is not None and link in declared.link_names()]
+        at_once = {link for pair in declared.pairs if pair.on_a is None for link in (pair.a, pair.b)}
+        known = [(link, X) for link, X in found if X is not None and link in at_once]
         self.declared, self.poses = declared, dict(known)
         self.m, self.tasks = declared, tasks
         if not self.poses:
@@ -123,6 +124,12 @@ class FirstPoses:
             for name in unknown
             for link in self.poses
             if name.startswith(f"{link}.")
+        ]
+        faults += [
+            f"pair {pair.name!r}: is placed on each link by itself, others of its link are not, of which the first pose is not the identity; "
+            "place all of them alike"
+            for pair in declared.pairs
+            if pair.on_a is not None and self.poses.keys() & {pair.a, pair.b}
         ]
         moved = [
             link.replace(points={name: X[:3, :3] @ p + X[:3, 3] for name, p in link.points.items()})
@@ -293,9 +300,10 @@ class RowProblem:
 
     @cached_property
     def at_rest(self) -> Array:
-        """State ``(nx,)`` of the declared configuration, free pairs too: all coordinates zero but those of named points."""
+        """State ``(nx,)`` of the declared configuration, free pairs too: all coordinates zero but those of named points, where pairs stand by
+        point and axis; else near ``start``."""
         s = self.system
-        q = np.zeros((s.n_freedoms, 1))
+        q = s.start_coordinates(self.m.start)[:, None] / s.in_user_units(np.ones((s.n_freedoms, 1)))
         for k in range(len(self.m.pairs), len(self.whole.pairs)):
             for j in range(int(s.first_column[k + 1] - s.first_column[k])):
                 column = int(s.first_column[k]) + j
@@ -305,7 +313,8 @@ class RowProblem:
                     q[column, 0] = float(
                         np.asarray(a.pose())[:3, :3] @ axis @ (np.asarray(b.point) - np.asarray(a.point))
                     )
-        return s.state_of(q)[:, 0]
+        x = s.state_of(q)[:, 0]
+        return x if self.closed_at_start else close(s, x, np.zeros(0, dtype=np.intp))[0]
 
     # --- the unknowns ------------------------------------------------------------------------------------------------
 

@@ -2,7 +2,8 @@
 
 Of an element only what matters is sought. Let a pair do the motions ``g``, and let its place move with a twist ``eta``; the pair then does
 ``exp(eta) g exp(-eta)``, the same motions where ``eta - Ad_g eta`` is a motion of the pair at every ``g``. So a line is 4 numbers for a
-turn about it, a direction 2 for a slide, a point 3 for a ball. Of the components of a point, an axis and a second direction those are
+turn about it, a direction 2 for a slide, a point 3 for a ball. Where a pair is placed on each link by itself, the place on one link
+matters as far as ``eta`` is no motion of the pair. Of the components of a point, an axis and a second direction those are
 sought that tell these apart best; the others stay as they are declared.
 """
 
@@ -24,7 +25,7 @@ from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import declared
 from mechgraph.modes.family import span
-from mechgraph.variants.numbers import MARKER, AnyField, Field, ItemField, clashes, field_values, find_field, varied
+from mechgraph.variants.numbers import MARKER, SIDES, AnyField, Field, ItemField, clashes, field_values, find_field, varied
 
 
 @dataclass(frozen=True)
@@ -65,13 +66,15 @@ class Unknowns:
             if name.startswith(f"{link.name}.") and name.removeprefix(f"{link.name}.") in link.points:
                 return [f"{name}.{at}" for at in axes]
         owner, _, what = name.partition(".")
-        if owner not in self.m.pair_index or what not in ("", *MARKER):
+        if owner not in self.m.pair_index or self.m.pairs[k := self.m.pair_index[owner]].contact is not None:
             return [name]
-        k = self.m.pair_index[owner]
-        if self.m.pairs[k].on_a is not None or self.m.pairs[k].contact is not None:
-            return [name]
-        candidates = [f"{owner}.{field}.{at}" for field in ([what] if what else MARKER) for at in axes]
-        return mattering(self.m, k, candidates) or [name]
+        out = list[str]()
+        for side in ("",) if self.m.pairs[k].on_a is None else SIDES:
+            own = [f"{side}.{field}".lstrip(".") for field in MARKER]
+            if what in ("", side, *own):
+                asked = [what] if what in own else own
+                out += mattering(self.m, k, [f"{owner}.{field}.{at}" for field in asked for at in axes])
+        return out or [name]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -142,11 +145,12 @@ def mattering(m: Mechanism, k: int, candidates: Sequence[str]) -> list[str]:
     places = []
     for field in map(fields.__getitem__, known):
         assert isinstance(field, Field)
-        places.append(UnknownPlace(field.array, 0, field.places[0][1], k))
-    numbers, here = declared(m), [k] * len(places)
-    vectors = [getattr(numbers, name)[0][:, here] for name in MARKER]
+        (side, component, _), *_ = field.places
+        places.append(UnknownPlace(field.array, 0 if side == slice(None) else side, component, k))
+    numbers, side = declared(m), [place.side for place in places]
+    vectors = [np.moveaxis(getattr(numbers, name)[side, :, k], 0, 1) for name in MARKER]
     twists = marker_twists(vectors, norms_of(*vectors[1:]), unit_rates(places))
-    told = _told(m, k) @ twists[:, :, 0]
+    told = _told(m, k, side[0]) @ twists[:, :, 0]
     # all places of directions are counted alike, whatever the length of the declared vector
     size = np.abs(told).max(axis=0)
     told = told / np.where(size > MODES.span, size, 1.0) * (size > MODES.span)
@@ -155,8 +159,8 @@ def mattering(m: Mechanism, k: int, candidates: Sequence[str]) -> list[str]:
     return [known[i] for i in sorted(picked.tolist())]
 
 
-def _told(m: Mechanism, k: int) -> Array:
-    """Rows ``(n, 6)`` that vanish for twists of the place of a pair by which its motions stay the same."""
+def _told(m: Mechanism, k: int, side: int) -> Array:
+    """Rows ``(n, 6)`` that vanish for twists of the place of a pair, on both links or on that of a side, by which its motions stay the same."""
     pair = m.pairs[k]
     alone = Mechanism(pair.name, [m.link(pair.a), m.link(pair.b)], [pair], planar=m.planar)
     zero = np.zeros((3, 2))
@@ -166,8 +170,11 @@ def _told(m: Mechanism, k: int) -> Array:
     for _ in range(8):
         dq = rng.uniform(-1.0, 1.0, (s.n_freedoms, 1))
         here = Configuration(s, s.advance(s.state_of(np.zeros((s.n_freedoms, 1))), dq))
-        D, basis = here.poses[:, :, s.b[0]], span(here.S[:, :, 0])
-        change = np.eye(6) - move_twist(D, np.eye(6))
+        D, basis = here.poses, span(here.S[:, :, 0])
+        if pair.on_a is None:
+            change = np.eye(6) - move_twist(D[:, :, s.b[0]], np.eye(6))
+        else:
+            change = move_twist(D[:, :, (s.a, s.b)[side][0]], np.eye(6))
         rows.append(change - basis @ (basis.T @ change))
     return np.concatenate(rows)
 
