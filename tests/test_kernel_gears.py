@@ -250,16 +250,16 @@ def test_friction_turns_the_force_between_teeth_round(seed):
 def test_turned_flanks_in_files_of_c_and_derivatives(tmp_path):
     """The same with teeth that rub, beside numpy and differences."""
     m = rough_train(1, loaded=False)
-    t = tabled(m)
-    write_c(t, tmp_path / "turned.c")
-    q = (t.home + 0.1).tolist()
+    c = mg.compile(m)
+    c.write(tmp_path / "turned.c")
+    q = (c.tables.home + 0.1).tolist()
     status, (effort, reaction, _) = run_c(library_of(tmp_path / "turned.c", "turned"), "turned", m, q)
     s = mg.solve(m, {"S0": mg.Motion(q[0], 2.0, 0.5)}, engine="dense")
     expected = np.concatenate([s[p.name].reaction for p in m.pairs])
     assert status == 0
     np.testing.assert_allclose(reaction, expected, atol=1e-10 * np.abs(expected).max())
     np.testing.assert_allclose(effort, s["S0"].effort, rtol=1e-10)
-    c, name = mg.compile(m), f"loads[{sum(not isinstance(load, mg.Friction) for load in m.loads)}].mu"
+    name = f"loads[{sum(not isinstance(load, mg.Friction) for load in m.loads)}].mu"
     c(q[0], 2.0, 0.5)
     slope, middle, efforts = c.gradient("S0.effort", [name])[0], c.parameters[name], []
     for change in (1e-4, -1e-4):

@@ -35,7 +35,7 @@ from mechgraph.show.page.answers import answers_data
 from mechgraph.show.page.content import view_data
 from mechgraph.show.skeleton import draw_skeleton
 from mechgraph.synthesis.answers import Syntheses
-from mechgraph.variants.study import Study
+from mechgraph.variants.study import IGNORED_TAIL, Study
 
 WEB = "web"
 """Folder of the scripts, which build.js of it builds."""
