@@ -1,9 +1,9 @@
 """Hypothesis profiles: ``dev`` at the desk, ``ci`` (always the same examples) where CI is set. Golden files."""
 
-import datetime
 import importlib
 import itertools
 import os
+import subprocess
 import zlib
 from collections.abc import Callable, Generator
 from pathlib import Path
@@ -27,7 +27,16 @@ DAILY = 2
 """Seeds of a test that are run every day; its others are slow."""
 TURNS = 3
 HEAVY = frozenset(Path(__file__).with_name("turns.txt").read_text(encoding="utf-8").split())
-"""Tests of more than .4 s of processor a case. Their cases take turns: every day a third of them, the others are slow."""
+"""Tests of more than .4 s of processor a case. Their cases take turns: a third of them with each commit, the others are slow."""
+
+
+def turn_of_commit() -> int:
+    """The same commit runs the same tests, wherever and whenever; where nothing is committed, the first third."""
+    try:
+        asked = subprocess.run(["git", "rev-parse", "HEAD"], cwd=GOLDEN, capture_output=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return 0
+    return int(asked.stdout, 16) % TURNS
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -42,13 +51,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--turn",
         type=int,
-        default=datetime.date.today().toordinal() % TURNS,
-        help=f"which of {TURNS} parts of the heavy tests is run",
+        default=turn_of_commit(),
+        help=f"which of {TURNS} parts of the heavy tests is run, by default as the commit says; -1 for all",
     )
 
 
 def pytest_report_header(config: pytest.Config) -> str:
-    """By what the tests of this day are repeated on another."""
+    """Which part of the heavy tests is run."""
     return f"heavy tests: --turn {config.getoption('--turn')} of {TURNS}"
 
 
@@ -98,10 +107,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         for i in set(range(len(found))) - kept:
             found[i].add_marker(pytest.mark.slow)
     for item in items:
-        if (
-            item.nodeid.partition("[")[0] in HEAVY
-            and zlib.crc32(item.nodeid.encode()) % TURNS != item.config.getoption("--turn") % TURNS
-        ):
+        turn, heavy = item.config.getoption("--turn"), item.nodeid.partition("[")[0] in HEAVY
+        if heavy and turn >= 0 and zlib.crc32(item.nodeid.encode()) % TURNS != turn:
             item.add_marker(pytest.mark.slow)
 
 

@@ -269,14 +269,12 @@ def test_turned_flanks_in_files_of_c_and_derivatives(tmp_path):
 
 
 def test_teeth_that_rub_in_time():
-    """Accelerations with the friction of a worm, beside those of numpy."""
+    """They may hold each other at rest, where the kernel does not follow them: numpy does, by whatever engine is free to choose."""
     m = rough_train(2)
     t = np.linspace(0.0, 0.003, 2)
-    one, other = (mg.respond(m, t, rates={"S0": 8.0}, engine=engine) for engine in ("compiled", "dense"))
-    for p in m.pairs:
-        found, expected = one[p.name], other[p.name]
-        np.testing.assert_allclose(found.position, expected.position, rtol=1e-9)
-        np.testing.assert_allclose(found.reaction, expected.reaction, atol=1e-8 * np.abs(expected.reaction).max())
+    with pytest.raises(mg.DeclarationError, match="or teeth"):
+        mg.respond(m, t, rates={"S0": 8.0}, engine="compiled")
+    assert mg.respond(m, t, rates={"S0": 8.0}).engine != "compiled"
 
 
 def belts(count: int, **more: object) -> mg.Mechanism:
