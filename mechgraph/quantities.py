@@ -18,6 +18,7 @@ import os
 import reprlib
 import sys
 import types
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from math import isclose, pi, prod
@@ -340,6 +341,13 @@ def wrong(value: Any, what: str, wanted: str) -> str:
     """The fault of a value that is not what is ``wanted``."""
     hint = "; quantities are converted where the mechanism declares units that they fit, else give plain numbers"
     return f"{what} = {shown(value)}: expected {wanted}{hint if has_quantity(value) else ''}"
+
+
+def repeated(names: Sequence[Any], what: str) -> list[str]:
+    """Names that stand more than once, one line each."""
+    if len(set(names)) == len(names):
+        return []
+    return [f"{what} {n!r} is declared {c} times; names must differ" for n, c in Counter(names).items() if c > 1]
 
 
 def unknown(what: str, name: object, known: Iterable[str], also: Iterable[str] = ()) -> str:

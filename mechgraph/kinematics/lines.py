@@ -133,7 +133,10 @@ class LineRows:
         (closed, x0), at = self._closed(type(here)), self.lines(here.poses)
         rows, out = np.arange(len(self.couplings)), at.value - closed
         ends = [self._places(here.poses, side, rows) for side in (0, 1)]
-        turned = lambda name: self._gained(here.x, x0, name)
+
+        def turned(name: str) -> Array:
+            return self._gained(here.x, x0, name)
+
         for i, c in enumerate(self.couplings):
             own = [LinePlaces(*(part[:, i : i + 1] for part in end)) for end in ends]
             more = c.whole_turns(at.along[:, i : i + 1], own[0], own[1], turned)

@@ -814,7 +814,7 @@ def rank_of_rows(
     tolerance = RANKS.position if tolerance is None else tolerance
     proved = RANKS.proved if proved is None else proved
     # rows from which ``auto`` takes the sparse engine: measured on verdicts of ladders and grids, where the two meet at 100 to 240 rows
-    if engine == "dense" or not rows.graph.n_loops or (engine == "auto" and rows.count < 144):
+    if engine == "dense" or not rows.count or (engine == "auto" and rows.count < 144):
         reduced = ReducedRows(rows, fixed, dense=True)
         return ClosureRank(reduced, _Dense(reduced, tolerance), tolerance)
     bordered = LoopSystem(rows, fixed)

@@ -21,7 +21,7 @@ from mechgraph.fields import (
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import SHAPES
 from mechgraph.memo import dataclass
-from mechgraph.model.pair import Marker, Nameable, Pair
+from mechgraph.model.pair import Nameable, Pair, pairs_are_sound
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.quantities import LENGTH, PURE, is_numeric, shown, without_units, wrong
 
@@ -240,7 +240,9 @@ def fitting_of(m: Any) -> float:
 
 def are_placed(m: Any) -> bool:
     """Whether every pair says where it sits, without faults."""
-    return all(pair.has_geometry and not pair.faults() for pair in m.pairs)
+    return all(pair.has_geometry for pair in m.pairs) and (
+        pairs_are_sound(m.pairs, 0.0) or not any(pair.faults() for pair in m.pairs)
+    )
 
 
 def motion_of(pair: Pair) -> str:
@@ -331,13 +333,13 @@ def followed(
     for step in steps[: 1 if motion == "slide" else None]:
         pair: Pair = m.pairs[step.pair]
         before, behind = (pair.markers[int((step.sense > 0) == later)] for later in (False, True))
-        q, w = line_of(before)
+        q, w = before.line
         off = 0.0 if motion == "slide" else _largest_of_cross(q - p, z)
         lean = _largest_of_cross(z, w)
         if motion_of(pair) != motion or lean > fitting or off > fitting * max(1.0, float(np.abs(q - p).max())):
             return p, z, senses, off
         senses.append(float(np.sign(z @ w)))
-        along, (p, w) = (p - q) @ z, line_of(behind)
+        along, (p, w) = (p - q) @ z, behind.line
         z = senses[-1] * w
         p = p + along * z
     return p, z, senses, 0.0
@@ -347,12 +349,6 @@ def _largest_of_cross(u: Array, v: Array) -> float:
     """The largest part of ``u x v (3,)``, by numbers: arrays of three take longer."""
     (a, b, c), (d, e, f) = u.tolist(), v.tolist()
     return max(abs(b * f - c * e), abs(c * d - a * f), abs(a * e - b * d))
-
-
-def line_of(marker: Marker) -> tuple[Array, Array]:
-    """The axis of a marker: a point and the unit direction."""
-    z = np.array(marker.axis, dtype=float)
-    return np.array(marker.point, dtype=float), z / np.linalg.norm(z)
 
 
 def tooth_angle(meaning: str, minimum: float | None = None) -> FieldFormat:

@@ -6,8 +6,6 @@ through one by one, to say in words what is wrong with which.
 
 from __future__ import annotations
 
-import operator
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from functools import cached_property
@@ -35,15 +33,14 @@ from mechgraph.fields import (
     tolerance_fault,
 )
 from mechgraph.maths.inertia import physical
-from mechgraph.maths.se3 import IN_PLANE, IN_SPACE, Array
-from mechgraph.maths.tolerances import SHAPES
+from mechgraph.maths.se3 import IN_PLANE, IN_SPACE
 from mechgraph.memo import Once, dataclass, of_graph
 from mechgraph.model.couplings import BaseCoupling, fitting_of
 from mechgraph.model.friction import LOADS
-from mechgraph.model.gears import GEARS
+from mechgraph.model.gears import GEARS, gear_faults
 from mechgraph.model.loads import Load
 from mechgraph.model.motion import Drive
-from mechgraph.model.pair import NO_POINTS, Link, Marker, Pair, largest_cosine
+from mechgraph.model.pair import NO_POINTS, Link, Pair, are_names, pairs_are_sound, types_of
 from mechgraph.model.plane import plane_faults
 from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.model.synthesis_setup import SynthesisSetup
@@ -56,6 +53,7 @@ from mechgraph.quantities import (
     column,
     is_numeric,
     items_of,
+    repeated,
     shown,
     unknown,
     without_units,
@@ -363,12 +361,6 @@ def _places(names: Iterable[Any]) -> dict[Any, int]:
     return out
 
 
-def _repeated(names: Sequence[Any], what: str) -> list[str]:
-    if len(set(names)) == len(names):
-        return []
-    return [f"{what} {n!r} is declared {c} times; names must differ" for n, c in Counter(names).items() if c > 1]
-
-
 def _kind_faults(m: DeclaredParts) -> list[str]:
     """Items that are no links, pairs, couplings, drives or loads at all."""
     faults = []
@@ -411,10 +403,10 @@ def declaration_faults(m: DeclaredParts) -> list[str]:
     if m.planar is True:
         faults += plane_faults(m.links, m.pairs, m.loads, m.gears)
     names, pair_names = _texts(m.link_names()), _texts([pair.name for pair in m.pairs])
-    faults += _repeated(names, "link") + _repeated(pair_names, "pair")
+    faults += repeated(names, "link") + repeated(pair_names, "pair")
     tol = sound_tol(m.tol)
     pairs = _others(m.pairs, before and before.pairs if before and before.tol == m.tol else ())
-    if pairs and not _pairs_are_sound(pairs, tol):
+    if pairs and not pairs_are_sound(pairs, tol):
         faults += [fault for pair in pairs for fault in pair.faults(tol)]
     faults += _end_faults(m, names)
     faults += [f"units: {unknown('base unit', key, BASE_UNITS)}" for key in m.units if key not in BASE_UNITS]
@@ -430,7 +422,7 @@ def declaration_faults(m: DeclaredParts) -> list[str]:
         for what, value in (("source", m.source), ("description", m.description))
         if not isinstance(value, str)
     ]
-    return faults + _symbol_faults(m) + _reference_faults(m) + _gear_faults(m) + _coupling_faults(m)
+    return faults + _symbol_faults(m) + _reference_faults(m) + m.once(gear_faults) + _coupling_faults(m)
 
 
 def _others(items: Sequence[Any], known: Iterable[Any] | None) -> list[Any]:
@@ -466,15 +458,10 @@ def _end_faults(m: DeclaredParts, names: Sequence[str]) -> list[str]:
     return faults
 
 
-def _types(pairs: Sequence[Pair]) -> list[Any]:
-    """The types of pairs, each object once."""
-    return list({id(pair.type): pair.type for pair in pairs}.values())
-
-
 def _symbol_faults(m: DeclaredParts) -> list[str]:
     """Pair types that share a symbol and differ."""
     by_symbol: dict[str, PairType] = {}
-    rows = [row for row in _types(m.pairs) if isinstance(row, PairType) and not travels(row)]
+    rows = [row for row in types_of(m.pairs) if isinstance(row, PairType) and not travels(row)]
     others = {id(row) for row in rows if by_symbol.setdefault(row.symbol, row) != row}
     return [
         f"pair {pair.name!r}: its type shares the symbol {pair.type.symbol!r} with another type; rename one"
@@ -487,13 +474,9 @@ def _texts(names: Sequence[Any]) -> Sequence[str]:
     return names if set(map(type, names)) <= {str} else [name for name in names if isinstance(name, str)]
 
 
-def _are_names(names: Sequence[Any]) -> bool:
-    return set(map(type, names)) <= {str} and all(names)
-
-
 def _links_are_sound(links: Sequence[Link]) -> bool:
     """Whether every link passes, checked in columns; False where it takes a closer look."""
-    if not _are_names([link.name for link in links]) or {type(link.unphysical) for link in links} != {bool}:
+    if not are_names([link.name for link in links]) or {type(link.unphysical) for link in links} != {bool}:
         return False
     mass = column([link.mass for link in links], ())
     placed = [link.center for link in links if link.center is not None]
@@ -513,43 +496,6 @@ def _links_are_sound(links: Sequence[Link]) -> bool:
     apart, size = np.abs(A - A.swapaxes(0, 1)).max(axis=(0, 1)), np.abs(A).max(axis=(0, 1))
     symmetric = apart <= 1e-9 * size  # to rounding, as the fault of a link has it
     return bool((symmetric & physical(0.5 * (A + A.swapaxes(0, 1))) | meant).all())
-
-
-def _pairs_are_sound(pairs: Sequence[Pair], tol: float) -> bool:
-    """Whether every pair passes, checked in columns; False where it takes a closer look."""
-    types = _types(pairs)
-    if not _are_names([p.name for p in pairs]) or not all(isinstance(t, PairType) for t in types):
-        return False
-    a, b = [p.a for p in pairs], [p.b for p in pairs]
-    if not set(map(type, a)) | set(map(type, b)) <= {str} or any(map(operator.eq, a, b)):
-        return False
-    closer = {id(t) for t in types if t.takes_pitch or travels(t)}
-    if any(p.faults(tol) for p in pairs if p.says_more or id(p.type) in closer):
-        return False
-    by_markers = [p for p in pairs if p.on_a is not None or p.on_b is not None]
-    if not all(isinstance(side, Marker) for p in by_markers for side in (p.on_a, p.on_b)):
-        return False
-    by_point = [p for p in pairs if p.point is not None or p.axis is not None]
-    if by_markers and any(p.on_a is not None for p in by_point):
-        return False
-    markers = [*by_point, *(p.on_a for p in by_markers), *(p.on_b for p in by_markers)]
-    square = np.array([p.type.square_second for p in (*by_point, *by_markers, *by_markers)], dtype=bool)
-    return _markers_are_sound(markers, np.where(square, largest_cosine(tol), 1 - SHAPES.parallel))
-
-
-def _markers_are_sound(markers: Sequence[Any], most: Array) -> bool:
-    """Whether points, axes and second directions (of markers or of pairs placed by point and axis) are what they must be.
-
-    ``most`` are the largest cosines that axis and second direction may have.
-    """
-    p, z, x = (column([getattr(marker, name) for marker in markers], (3,)) for name in ("point", "axis", "second"))
-    if p is None or z is None or x is None:
-        return False
-    length = np.sqrt((z * z).sum(axis=1)), np.sqrt((x * x).sum(axis=1))
-    if not all((one > 1e-12).all() for one in length):
-        return False
-    cosine = np.abs((z * x).sum(axis=1)) / (length[0] * length[1])
-    return not (cosine > most).any()
 
 
 def item_faults(m: DeclaredParts) -> list[str]:
@@ -580,7 +526,7 @@ def _reference_faults(m: DeclaredParts) -> list[str]:
         else:
             drives.append(m.full_name(drive.freedom))
             faults += drive.faults()
-    faults += _repeated(drives, "drive")
+    faults += repeated(drives, "drive")
     for load in m.loads:
         faults += load.faults(m)
     if isinstance(m.response, ResponseSetup):
@@ -594,18 +540,8 @@ def _reference_faults(m: DeclaredParts) -> list[str]:
     return faults
 
 
-def _gear_faults(m: DeclaredParts) -> list[str]:
-    faults = []
-    for gear in m.gears:
-        where = f"{gear.kind} {shown(gear.name)}: "
-        faults += gear.value_faults(where)
-        if isinstance(gear.link, str) and gear.link not in m.link_index:
-            faults.append(where + unknown("link", gear.link, m.link_names()))
-    return faults + _repeated(_texts([gear.name for gear in m.gears]), "gear")
-
-
 def _coupling_faults(m: DeclaredParts) -> list[str]:
-    if _gear_faults(m):
+    if m.once(gear_faults):
         return []
     own = [coupling.faults(m) for coupling in m.couplings]
     faults = [fault for found in own for fault in found]
@@ -613,7 +549,7 @@ def _coupling_faults(m: DeclaredParts) -> list[str]:
     names = [c.name for c in m.couplings if isinstance(c.name, str) and c.name]
     shared = [name for name in dict.fromkeys(names) if name in m.pair_index]
     faults += [f"coupling {name!r}: a pair has that name; names must differ" for name in shared]
-    return faults + _repeated(names, "coupling")
+    return faults + repeated(names, "coupling")
 
 
 def flat_start(m: DeclaredParts, start: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:

@@ -248,11 +248,11 @@ def with_play(m: Mechanism) -> tuple[Mechanism, list[Stop]]:
     """
     pairs, links, couplings, stops, loads = list(m.pairs), list(m.links), [], [], list(m.loads)
 
-    def freed(c: Mesh, name: str, flank: str, *ends: float | None) -> Mesh:
+    def freed(c: Mesh, name: str, flank: str, low: float | None, high: float | None = None) -> Mesh:
         play = f"{name}.play"
         links.append(Link(play))
         pairs.append(Pair(play, "P", m.frame, play, point=(0.0, 0.0, 0.0), axis=(1.0, 0.0, 0.0)))
-        stops.append(Stop(f"{play}.Tz", *ends, restitution=c.restitution))
+        stops.append(Stop(f"{play}.Tz", low, high, c.restitution))
         return c.replace(name=name, play=f"{play}.Tz", flank=flank)
 
     for c in m.couplings:

@@ -33,7 +33,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from mechgraph.errors import DeclarationError
 from mechgraph.fields import (
     DIRECTION,
     FLAG,
@@ -54,14 +53,13 @@ from mechgraph.model.couplings import (
     BaseCoupling,
     MeshStep,
     fitting_of,
-    line_of,
     meeting,
     motion_of,
     plain_pairs,
     tooth_angle,
 )
 from mechgraph.pairs import pair_type as evaluation
-from mechgraph.quantities import LENGTH, PURE, door, shown, wrong
+from mechgraph.quantities import LENGTH, PURE, repeated, shown, unknown, wrong
 
 # --- couplings along lines ------------------------------------------------------------------------------------------
 
@@ -541,6 +539,17 @@ GEARS: dict[str, type[Described]] = {Pulley.kind: Pulley, **TOOTHED}
 """What stands in ``gears=``, by the name of its kind in files."""
 
 
+def gear_faults(m: Any) -> list[str]:
+    """What is wrong with the gears and pulleys of a mechanism by themselves, one line each."""
+    faults = []
+    for gear in m.gears:
+        where = f"{gear.kind} {shown(gear.name)}: "
+        faults += gear.value_faults(where)
+        if isinstance(gear.link, str) and gear.link not in m.link_index:
+            faults.append(where + unknown("link", gear.link, m.link_names()))
+    return faults + repeated([gear.name for gear in m.gears if isinstance(gear.name, str)], "gear")
+
+
 def gears_by_name(m: Any) -> Mapping[str, Any]:
     """The gears of a mechanism that have teeth, by name."""
     return {gear.name: gear for gear in m.gears if isinstance(gear, _Toothed) and isinstance(gear.name, str)}
@@ -556,51 +565,6 @@ def tip_radius(gear: Any, shorter: float = 0.0) -> float:
 # --- their places -----------------------------------------------------------------------------------------------------------
 
 
-@door
-def planet_places(sun: int, ring: int, n: int) -> Array:
-    """Return the angles ``(n,)`` [rad] at which ``n`` planets between a sun and a ring can be put in, as evenly as teeth allow.
-
-    The planets have ``(ring - sun) / 2`` teeth. Even places need ``(sun + ring) / n`` whole; others are multiples of ``2 pi / (sun +
-    ring)``. Neighbors need ``(sun + planet) sin(pi / n) > planet + 2``.
-
-    Parameters
-    ----------
-    sun, ring, n : int
-        Teeth of the sun and of the ring; number of planets.
-
-    Raises
-    ------
-    DeclarationError
-        Planets that would overlap, or whose teeth are no whole number.
-
-    Examples
-    --------
-    >>> import mechgraph as mg
-    >>> import numpy as np
-    >>> np.rad2deg(mg.planet_places(20, 54, 3)).round(4)
-    array([  0.    , 121.6216, 238.3784])
-    """
-    faults = [
-        f"{name} = {shown(value)}: expected a whole number above 0"
-        for name, value in (("sun", sun), ("ring", ring), ("n", n))
-        if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < 1
-    ]
-    if not faults and (ring - sun < 2 or (ring - sun) % 2):
-        faults.append(f"sun = {sun}, ring = {ring}: planets have half the difference, a whole number above 0")
-    if not faults:
-        planet, steps = (ring - sun) // 2, np.round(np.arange(n) * (sun + ring) / n)
-        found = 2 * pi * steps / (sun + ring)
-        gaps = np.diff(np.append(found, 2 * pi))
-        room = float((sun + planet) * np.sin(min(gaps.min(), pi) / 2)) if n > 1 else np.inf
-        if room <= planet + 2:
-            faults.append(
-                f"n = {n}: neighbors overlap, ({sun} + {planet}) sin(half their angle) = {room:.6g}; expected more than {planet + 2}"
-            )
-    if faults:
-        raise DeclarationError("planet_places", faults)
-    return np.asarray(found)
-
-
 def off_axis(m: Any) -> Iterator[str]:
     """Gears and pulleys beside the axis about which their link turns."""
     near, turning, fitting = m.once(meeting), m.once(plain_pairs), fitting_of(m)
@@ -610,7 +574,7 @@ def off_axis(m: Any) -> Iterator[str]:
             continue
         away = {}
         for pair in pairs:
-            (p, w), z = line_of(pair.markers[int(pair.b == gear.link)]), np.array(gear.place.axis)
+            (p, w), z = pair.markers[int(pair.b == gear.link)].line, np.array(gear.place.axis)
             d = p - gear.point
             if motion_of(pair) == "turn" and np.abs(cross(z, w)).max() <= fitting:
                 away[pair.name] = float(np.linalg.norm(cross(d, z))), fitting * max(1.0, float(np.abs(d).max()))

@@ -35,10 +35,10 @@ from mechgraph.model.declaration import (
     mapping_faults,
 )
 from mechgraph.model.loads import Gravity, Load
-from mechgraph.model.meshes import gear_doubts
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.model.plane import in_space, is_flat, pair_in_plane, pair_in_space, spatial_row
+from mechgraph.model.planets import gear_doubts
 from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.model.synthesis_setup import SynthesisSetup
 from mechgraph.pairs.contact_types import row_of, travels

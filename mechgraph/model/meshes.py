@@ -1,13 +1,9 @@
-"""Meshes between gears: what fits, the relation of every kind of axes, and how it stands in a mechanism (see ``model.gears``); planets.
-
-Source: G. Niemann and H. Winter, Maschinenelemente II, 2003, chapter 23 (planetary gears: conditions of assembly and of neighbors).
-"""
+"""Meshes between gears: what fits, the relation of every kind of axes, and how it stands in a mechanism (see ``model.gears``)."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
-from itertools import combinations
 from math import atan, cos, pi, sin, tan
 from typing import Annotated, Any, ClassVar, Self
 
@@ -22,6 +18,7 @@ from mechgraph.memo import dataclass
 from mechgraph.model.couplings import (
     OF_TEETH,
     MeshStep,
+    are_placed,
     fitting_of,
     followed,
     meeting,
@@ -32,20 +29,18 @@ from mechgraph.model.gears import (
     CROSSING,
     CYLINDRICAL,
     RACKED,
-    Gear,
     GearRack,
     LineCoupling,
     LinePlaces,
-    LinesAt,
     LinkPlace,
     Relation,
     Worm,
     angle,
     dot,
     feet,
+    gear_faults,
     gears_by_name,
     involute,
-    off_axis,
     pose_along,
     tip_radius,
 )
@@ -98,8 +93,7 @@ class Meshing(LineCoupling):
         met = self.seen(m)
         ends, coefficients = (met.one.place, met.two.place), None
         if plain:
-            line = met.flanks(self.flank != "backward")[0](met.a, met.b, np.array(met.numbers)[:, None, None])
-            coefficients = self._coefficients(m, steps, line, ends)
+            coefficients = self._coefficients(m, steps)
         both = self.flank == "auto" or (bool(self.play) and coefficients is not None)
         flanks = met.flanks(both or self.flank == "forward")
         if coefficients is not None and self.play:
@@ -119,22 +113,22 @@ class Meshing(LineCoupling):
         """Coefficients by freedom without geometry."""
         return {name: 1.0 for step in steps for name in m.pairs[step.pair].freedom_names}
 
-    def _coefficients(
-        self, m: Any, steps: tuple[MeshStep, ...], line: LinesAt, ends: tuple[LinkPlace, LinkPlace]
-    ) -> dict[str, float] | None:
-        """Coefficients by freedom where every pair on the way turns about the axis of one of the gears, or slides along a rack."""
-        P, n = line.point[:, 0, 0], line.along[:, 0, 0]
+    def _about(self, m: Any, steps: tuple[MeshStep, ...]) -> tuple[list[float], list[float], float]:
+        """The senses of the pairs on the way about either gear, see ``about_ends``."""
         met = self.seen(m)
-        racks = [isinstance(gear, GearRack) for gear in (met.one, met.two)]
-        forward, backward, _ = about_ends(m, steps, ends, racks)
+        return about_ends(
+            m, steps, (met.one.place, met.two.place), [isinstance(g, GearRack) for g in (met.one, met.two)]
+        )
+
+    def _coefficients(self, m: Any, steps: tuple[MeshStep, ...]) -> dict[str, float] | None:
+        """Coefficients by freedom where every pair on the way turns about the axis of one of the gears, or slides along a rack."""
+        forward, backward, _ = self._about(m, steps)
         if len(forward) + len(backward) < len(steps):
             return None
-        powers = []
-        for place, rack in zip((met.a, met.b), racks, strict=True):
-            z, p = place.axis[:, 0, 0], place.point[:, 0, 0]
-            powers.append(float(n @ (z if rack else cross(z, P - p))))
-        powers[1] = float(np.copysign(powers[0] * met.ratio, powers[1]))
-        signs = [*((s, powers[0]) for s in forward), *((s, powers[1]) for s in reversed(backward))]
+        met = self.seen(m)
+        first, other = met.powers(self.flank != "backward")
+        other = float(np.copysign(first * met.ratio, other))
+        signs = [*((s, first) for s in forward), *((s, other) for s in reversed(backward))]
         return {
             m.pairs[step.pair].freedom_names[0]: step.sense * sign * power
             for step, (sign, power) in zip(steps, signs, strict=True)
@@ -298,12 +292,8 @@ def _placed_soundly(m: Any) -> bool:
     """Whether all pairs and gears are sound and hang together, so that places can be looked at."""
     known = set(m.link_names())
     links = all(g.link in known for g in m.gears) and all(p.a in known and p.b in known for p in m.pairs)
-    return (
-        links
-        and all(pair.has_geometry and not pair.faults() for pair in m.pairs)
-        and not any(gear.value_faults("") for gear in m.gears)
-        and all(gear.link in m.once(_reached) for gear in m.gears)
-    )
+    sound = links and m.once(are_placed) and not m.once(gear_faults)
+    return sound and all(gear.link in m.once(_reached) for gear in m.gears)
 
 
 class Meeting(ABC):
@@ -324,6 +314,15 @@ class Meeting(ABC):
     @abstractmethod
     def flanks(self, forward: bool) -> tuple[Relation, Relation]:
         """The relation of the flank that is asked for, and that of the other one."""
+
+    def powers(self, forward: bool) -> tuple[float, float]:
+        """Powers of a unit force along the line of a flank at unit rates of both gears."""
+        line = self.flanks(forward)[0](self.a, self.b, np.array(self.numbers)[:, None, None])
+        (P, n), out = (part[:, 0, 0] for part in line[1:]), []
+        for place, gear in ((self.a, self.one), (self.b, self.two)):
+            z, p = place.axis[:, 0, 0], place.point[:, 0, 0]
+            out.append(float(n @ (z if isinstance(gear, GearRack) else cross(z, P - p))))
+        return out[0], out[1]
 
     def misfits(self, fitting: float) -> list[str]:
         """What is wrong with the gears and their places, and what would fit."""
@@ -379,6 +378,11 @@ class Parallel(Meeting):
         """See ``Meeting``."""
         order = (1.0, -1.0) if forward else (-1.0, 1.0)
         return CYLINDRICAL[order[0]], CYLINDRICAL[order[1]]
+
+    def powers(self, forward: bool) -> tuple[float, float]:
+        """See ``Meeting``: the base radii times the cosine of the lean of the line."""
+        ka, kb, straight = self.one.base_radius, self.two.base_radius, cos(atan(self.one.base_lean))
+        return abs(ka) * straight, -np.sign(ka) * kb * straight * np.sign(self._ways())
 
     @property
     def sum_of_teeth(self) -> int:
@@ -742,65 +746,3 @@ def met_at(one: Any, two: Any, pose: Array) -> Meeting:
 
 def _words_of_kinds(kind: str) -> str:
     return " or ".join(f"a {b}" for a, b in _KINDS if a == kind)
-
-
-# --- planets, and what is doubtful -----------------------------------------------------------------------------------------------
-
-
-def gear_doubts(m: Any) -> list[str]:
-    """What is doubtful about the places of gears, pulleys and planets; nothing without geometry."""
-    return [*off_axis(m), *planet_faults(m)] if m.has_geometry else []
-
-
-def planet_faults(m: Any) -> list[str]:
-    """Planets between the same two gears that cannot be put in, or overlap, at the declared places.
-
-    The value of a mesh with the first gear less that with the second one leaves the turn of the planet out; modulo the base pitch it is
-    the same for all that fit.
-    """
-    meshes = [c for c in m.couplings if isinstance(c, Mesh)]
-    of_gear: dict[str, list[Mesh]] = {}
-    for c in meshes:
-        for name in (c.a, c.b):
-            of_gear.setdefault(name, []).append(c)
-    groups: dict[tuple[str, str], list[tuple[str, float, Gear]]] = {}
-    period = {}
-    for name, own in of_gear.items():
-        if len(own) != 2 or not any(getattr(g, "internal", False) for c in own for g in c.pair_of(m)):
-            continue
-        met = [c.seen(m) for c in own]
-        if not all(isinstance(one, Parallel) for one in met):
-            continue
-        values, mates = [], []
-        for c, one in zip(own, met, strict=True):
-            value = float(one.flanks(True)[0](one.a, one.b, np.array(one.numbers)[:, None, None]).value[0, 0])
-            values.append(value * np.sign(one.one.base_radius))
-            mates.append(c.b if c.a == name else c.a)
-        order = np.argsort(mates)
-        key = mates[order[0]], mates[order[1]]
-        gear = next(g for g in (met[0].one, met[0].two) if g.name == name)
-        groups.setdefault(key, []).append((name, values[order[0]] - values[order[1]], gear))
-        period[key] = met[0].period
-    return [fault for key, planets in groups.items() for fault in _group_faults(m, key, planets, period[key])]
-
-
-def _group_faults(m: Any, key: tuple[str, str], planets: list[tuple[str, float, Gear]], period: float) -> Iterator[str]:
-    """See ``planet_faults``, for the planets between two gears."""
-    first, tolerance = planets[0], max(1e-6, 10 * fitting_of(m))
-    for name, value, _ in planets[1:]:
-        off = (value - first[1]) / period
-        if abs(off - round(off)) > tolerance:
-            yield (
-                f"planets {first[0]!r} and {name!r} between {key[0]!r} and {key[1]!r} cannot both be put in: their teeth are off by "
-                f"{abs(off - round(off)):.4g} of a tooth; mg.planet_places gives places that fit"
-            )
-    for (one, _, gear), (two, _, other) in combinations(planets, 2):
-        # planets on one carrier keep their distance
-        apart = float(np.linalg.norm(np.subtract(gear.point, other.point)))
-        if m.once(_as_assembled) and gear.link != other.link and apart < tip_radius(gear) + tip_radius(other):
-            yield f"planets {one!r} and {two!r} overlap: {apart:.6g} apart; expected more than {tip_radius(gear) + tip_radius(other):.6g}"
-
-
-def _as_assembled(m: Any) -> bool:
-    """Whether all places are in one frame."""
-    return all(pair.on_a is None for pair in m.pairs)

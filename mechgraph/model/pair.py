@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import operator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, field
-from functools import partial
+from functools import cached_property, partial
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Protocol
 
@@ -44,12 +45,13 @@ from mechgraph.pairs.contact_types import (
     row_of,
     shape_faults_of,
     surface_faults,
+    travels,
 )
 from mechgraph.pairs.curves import Curve, parallel_faults
 from mechgraph.pairs.journal import Journal, film_faults
 from mechgraph.pairs.pair_type import TABLE, PairType
 from mechgraph.pairs.surfaces import Surface
-from mechgraph.quantities import FORCE_PER_LENGTH, INERTIA, LENGTH, MASS, MOMENT, is_numeric, shown, wrong
+from mechgraph.quantities import FORCE_PER_LENGTH, INERTIA, LENGTH, MASS, MOMENT, column, is_numeric, shown, wrong
 
 NO_POINTS: Mapping[str, tuple[float, ...]] = MappingProxyType({})
 
@@ -317,6 +319,12 @@ class Marker(Described):
                 )
         return found
 
+    @cached_property
+    def line(self) -> tuple[Array, Array]:
+        """Its axis: a point and the unit direction ``(3,)``."""
+        z: Array = np.array(self.axis, dtype=float)
+        return np.array(self.point, dtype=float), z / np.linalg.norm(z)
+
     def pose(self) -> Array:
         """The marker as a pose ``(3, 4)`` in the frame of its link."""
         return np.column_stack([axes_of(self.axis, self.second), np.asarray(self.point)])
@@ -565,7 +573,7 @@ class Pair(Described):
             return self.lead / (2 * np.pi)
         return 0.0 if self.pitch is None else self.pitch
 
-    @property
+    @cached_property
     def markers(self) -> tuple[Marker, Marker]:
         """The markers on ``a`` and ``b``; for the point/axis form one marker in coinciding frames."""
         if self.on_a is not None and self.on_b is not None:
@@ -641,3 +649,50 @@ class Pair(Described):
         elif not given and self.has_geometry:
             yield f"{where}type {self.type.symbol} needs a pitch (advance per radian) or a lead (advance per turn)"
         yield from (self.formats[n].fault(v, where + n) for n, v in given)
+
+
+def types_of(pairs: Sequence[Pair]) -> list[Any]:
+    """The types of pairs, each object once."""
+    return list({id(pair.type): pair.type for pair in pairs}.values())
+
+
+def are_names(names: Sequence[Any]) -> bool:
+    """Whether all of them are texts that say something."""
+    return set(map(type, names)) <= {str} and all(names)
+
+
+def pairs_are_sound(pairs: Sequence[Pair], tol: float) -> bool:
+    """Whether every pair passes, checked in columns; False where it takes a closer look."""
+    types = types_of(pairs)
+    if not are_names([p.name for p in pairs]) or not all(isinstance(t, PairType) for t in types):
+        return False
+    a, b = [p.a for p in pairs], [p.b for p in pairs]
+    if not set(map(type, a)) | set(map(type, b)) <= {str} or any(map(operator.eq, a, b)):
+        return False
+    closer = {id(t) for t in types if t.takes_pitch or travels(t)}
+    if any(p.faults(tol) for p in pairs if p.says_more or id(p.type) in closer):
+        return False
+    by_markers = [p for p in pairs if p.on_a is not None or p.on_b is not None]
+    if not all(isinstance(side, Marker) for p in by_markers for side in (p.on_a, p.on_b)):
+        return False
+    by_point = [p for p in pairs if p.point is not None or p.axis is not None]
+    if by_markers and any(p.on_a is not None for p in by_point):
+        return False
+    markers = [*by_point, *(p.on_a for p in by_markers), *(p.on_b for p in by_markers)]
+    square = np.array([p.type.square_second for p in (*by_point, *by_markers, *by_markers)], dtype=bool)
+    return _markers_are_sound(markers, np.where(square, largest_cosine(tol), 1 - SHAPES.parallel))
+
+
+def _markers_are_sound(markers: Sequence[Any], most: Array) -> bool:
+    """Whether points, axes and second directions (of markers or of pairs placed by point and axis) are what they must be.
+
+    ``most`` are the largest cosines that axis and second direction may have.
+    """
+    p, z, x = (column([getattr(marker, name) for marker in markers], (3,)) for name in ("point", "axis", "second"))
+    if p is None or z is None or x is None:
+        return False
+    length = np.sqrt((z * z).sum(axis=1)), np.sqrt((x * x).sum(axis=1))
+    if not all((one > 1e-12).all() for one in length):
+        return False
+    cosine = np.abs((z * x).sum(axis=1)) / (length[0] * length[1])
+    return not (cosine > most).any()

@@ -25,7 +25,6 @@ from mechgraph.model.couplings import (
     MeshStep,
     are_placed,
     fitting_of,
-    line_of,
     motion_of,
     tooth_angle,
     turning_pairs,
@@ -88,6 +87,11 @@ def _ways(m: Any) -> dict[ShortForm, tuple[MeshStep, ...] | str]:
     return {}
 
 
+def _abouts(m: Any) -> dict[ShortForm, tuple[list[float], list[float], float]]:
+    """The senses of the pairs on the ways, as far as they were asked for."""
+    return {}
+
+
 def _seats(m: Any) -> dict[ShortForm, GearSeats]:
     """Where the pairs of short forms sit, as far as it was asked for."""
     return {}
@@ -137,13 +141,21 @@ class ShortForm(Meshing):
     def _places_faults(self, m: Any, steps: tuple[MeshStep, ...]) -> list[str]:
         """What is wrong with the pairs on the way, or with the places of the gears."""
         seats = self._seats(m)
-        forward, backward, off = about_ends(m, steps, seats.places, (False, self.slides))
+        forward, backward, off = self._about(m, steps)
         if len(forward) + len(backward) == len(steps):
             return self.misfits(seats, fitting_of(m))
         return [
             f"pair {m.pairs[steps[len(forward)].pair].name!r} between the gears is not about the axis of {self.a!r} (off by {off:.3g}); "
             f"{self.a!r} and {self.b!r} need a common carrier"
         ]
+
+    def _about(self, m: Any, steps: tuple[MeshStep, ...]) -> tuple[list[float], list[float], float]:
+        """See ``Meshing``: as the faults have found it."""
+        known = m.once(_abouts)
+        if self not in known:
+            known[self] = about_ends(m, steps, self._seats(m).places, (False, self.slides))
+        found: tuple[list[float], list[float], float] = known[self]
+        return found
 
     def _way(self, m: Any) -> tuple[MeshStep, ...] | str:
         """The pairs from gear a to gear b, or why there is no carrier between them."""
@@ -188,7 +200,7 @@ class ShortForm(Meshing):
         for step, behind in ((steps[0], False), (steps[-1], True)):
             pair = m.pairs[step.pair]
             side = int((step.sense > 0) == behind)
-            p, z = line_of(pair.markers[side])
+            p, z = pair.markers[side].line
             places.append(LinkPlace(pair.b if side else pair.a, tuple(p), tuple(z), second_direction(z)))
         return GearSeats(places[0], places[1], pose_along(m, steps))
 
