@@ -289,6 +289,10 @@ class Integration:
                     # part of the time below which a step is rounding
                     rounding = stepper.t - t <= 1e-13 * max(abs(t), abs(stepper.t))
                     known = bool(np.isfinite(stepper.y).all())
+                    if known and stepper.status != "failed":
+                        # evaluated at more places, which may be out of reach
+                        dense = stepper.dense_output()
+                        known = bool(np.isfinite(dense(0.5 * (t + stepper.t))).all())
                     if stepper.status == "failed" or (rounding and not known):
                         raise stage.trouble or Stopped(
                             f"{message or ''} Steps collapse where loads are stiff or jump, and at positions where the mechanism locks or "
@@ -299,7 +303,7 @@ class Integration:
                         h = 0.25 * (stepper.t - t)
                         break
                     self.work.steps += 1
-                    self.segments.append(StepSpan(t, stepper.t, stage, stepper.dense_output(), before))
+                    self.segments.append(StepSpan(t, stepper.t, stage, dense, before))
                     # the step goes on with its length, which a multistep method finds anew, and any behind a break
                     h = None if self.method in ("BDF", "LSODA") or stepper.t == goal else stepper.t - t
                     t, y, self.done = stepper.t, stepper.y, before + _SUMS @ stepper.y[-2:]

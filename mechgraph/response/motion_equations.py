@@ -138,6 +138,9 @@ class Chart:
         rows = system.single_rows[prescribed]
         # turns of balls that are held stay as they are, since nothing moves them
         self._given, self._rows = rows >= 0, rows[rows >= 0]
+        # a slide along a straight line, which may travel far beyond the size of a mechanism, leads to no other branch
+        curved = [c for b in system.moving_batches for c in np.ravel(np.arange(system.n_freedoms)[b.columns])]
+        self._bends = ~system.is_length | np.isin(np.arange(system.n_freedoms), curved)
 
     def shape(self, f: FactoredClosure) -> tuple[float, float]:
         """The largest rate of a freedom for unit rates of the independent ones, and the condition, at a state."""
@@ -176,7 +179,7 @@ class Chart:
             here = Configuration(s, x)
             f = self.solver.factored(here, np.repeat(self.which, here.T))
             step = f.solve(-here.residual[:, None])[:, 0]
-            size = np.abs(step).max(axis=0, initial=0.0)
+            size, bent = (np.abs(way).max(axis=0, initial=0.0) for way in (step, step[self._bends]))
             if self.turns:
                 y = s.difference(x, self.x0[:, None])
                 Z = f.sensitivity()[:, :n]
@@ -185,7 +188,7 @@ class Chart:
                 a = np.linalg.solve(np.moveaxis(A, -1, 0), wanted.T[..., None])[..., 0].T
                 step = step + (Z * a).sum(axis=1)
                 size = np.maximum(size, np.abs(u - y[self.free]).max(axis=0, initial=0.0))
-            total = total + size
+            total = total + bent
             with np.errstate(invalid="ignore"):
                 # below what is asked for, or twice below what rounding (1e-15) allows where the condition is poor
                 most = np.maximum(10 * RESPONSE.last_step, 1e-15 * f.condition)
