@@ -539,8 +539,8 @@ class TrackGroup:
                 progress(f"{N} assemblies of a random member, {self.quiet} loops without a further one")
             # so many that where none brings a further one they are enough, and no fewer than are followed at the cost of one
             enough = int(np.ceil(np.log(missed / self.chance) / -np.log(N + 1.0)))
-            # 48 tracks are followed together at least, of as many loops as it takes
-            loops = max(min(enough, TRACKS_TOGETHER // N), 48 // N, 1)
+            # 96 tracks are followed together at least, of as many loops as it takes: a step of so many costs little more than one of few
+            loops = max(min(enough, TRACKS_TOGETHER // N), 96 // N, 1)
             there = self._round(family, loops, rng)
             poses = self.equations.fingerprints(self.base, there)
             new = distinct(poses, self.known)
