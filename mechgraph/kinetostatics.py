@@ -17,7 +17,6 @@ are those of least norm.
 
 from __future__ import annotations
 
-import dataclasses
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
@@ -182,10 +181,11 @@ class Pipeline:
         start = dict(zip(m.freedom_names(), q.tolist(), strict=True))
         names = [*drive.names, *(m.freedom_names()[c] for c in kept)]
         at_rest = DriverMotion(m.replace(drives=names, start=start), {name: start[name] for name in names})
-        line = Pipeline(at_rest, self.options)
+        options = replace(self.options, engine=self.engine)
+        line = Pipeline(at_rest, options)
         found = line.run().trajectory
         if found.has_forces and not found.bears_nothing(line.columns[len(drive.names) :]):
-            found = Pipeline(at_rest, dataclasses.replace(self.options, method=None)).run().trajectory
+            found = Pipeline(at_rest, replace(options, method=None)).run().trajectory
             found.has_forces = True
         return Solution(found.shown_as(m, line.columns[: len(drive.names)]))
 

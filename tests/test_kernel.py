@@ -149,6 +149,24 @@ def test_an_end_of_the_reach_is_named_by_numpy():
         mg.solve(m, {"A": np.linspace(0.0, 6.0, 7)}, engine="compiled")
 
 
+@pytest.mark.parametrize("engine", ["auto", "compiled", "dense"])
+def test_a_dead_point_at_the_start_is_one_in_every_engine(engine):
+    """Of a crank that is stationary where coupler and rocker are in line, also as a change of a mechanism that the kernel has solved."""
+    at = {"A": (0, 0, 0), "B": (0, 3, 0), "C": (2.4, 1.2, 0), "D": (4, 0, 0)}
+    m = mg.Mechanism("in line", pairs=loop_of(at), drives=["A"])
+    regular = m.replace(pairs=loop_of(at | {"C": (3.0, 3.0, 0)}))
+    assert mg.solve(regular, {"A": 0.1}).status == "ok"
+    for one in (m, regular.replace(pairs=m.pairs)):
+        with pytest.raises(mg.DeadPointError, match=r"A.Rz is stationary there"):
+            mg.solve(one, {"A": [0.0, 0.05]}, engine=engine)
+
+
+def loop_of(at):
+    """Turning pairs around one loop of links."""
+    ends = zip(("o", "a", "b", "c"), ("a", "b", "c", "o"), strict=True)
+    return [mg.Pair(k, "R", *both, point=at[k], axis=(0, 0, 1)) for k, both in zip(at, ends, strict=True)]
+
+
 def test_rotation_vectors_go_on_beyond_half_a_turn():
     """On the way to a position alone as well as over all of them."""
     m = mg.load("haug-slider-crank")
