@@ -40,6 +40,30 @@ def slider_crank() -> mg.Mechanism:
     return mg.Mechanism("slider-crank", links, pairs, drives=["A"], planar=True)
 
 
+def by_markers(kind: str, **at: tuple[float, float]) -> mg.Mechanism:
+    """A planar dyad or four-bar whose pairs are placed on each link by itself: ``A_a`` on the first link of A."""
+
+    def pair(name: str, a: str, b: str) -> mg.Pair:
+        sides = (mg.Marker((*at.get(f"{name}_{side}", (0.0, 0.0)), 0.0)) for side in "ab")
+        return mg.Pair(name, "R", a, b, **dict(zip(("on_a", "on_b"), sides, strict=True)))
+
+    last = "body" if kind == "dyad" else "coupler"
+    made = [pair("A", "frame", "crank"), pair("B", "crank", last)]
+    made += [pair("C", "coupler", "rocker"), pair("D", "frame", "rocker")] if kind == "four-bar" else []
+    return mg.Mechanism(f"{kind} by markers", pairs=made, drives=["A"] if kind == "four-bar" else [], planar=True)
+
+
+def geared_five_bar(B: tuple[float, float] = (0.2, 0.9), D: tuple[float, float] = (2.8, 1.1)) -> mg.Mechanism:
+    """A five-bar whose second crank turns half as fast as the first."""
+    at = {"A": (0, 0), "B": B, "C": (1.5, 1.5), "D": D, "E": (3, 0)}
+    links = ["frame", "first", mg.Link("rod", points={"tip": at["C"]}), "other", "second"]
+    ends = {"A": (0, 1), "B": (1, 2), "C": (2, 3), "D": (3, 4), "E": (0, 4)}
+    links = [mg.Link(link) if isinstance(link, str) else link for link in links]
+    pairs = [mg.Pair(n, "R", links[i].name, links[k].name, point=at[n]) for n, (i, k) in ends.items()]
+    geared = [mg.Coupling({"A": -1, "E": 2})]
+    return mg.Mechanism("geared five-bar", links, pairs, drives=["A"], planar=True, couplings=geared)
+
+
 def spatial(name: str, *pairs: tuple[str, tuple[float, ...], tuple[float, ...] | None]) -> mg.Mechanism:
     """An open or closed chain of pairs O, P, Q, ... (type, point, axis) from the frame on; closed where there are three or more."""
     last = len(pairs) - 1
@@ -88,6 +112,19 @@ LADDER: dict[str, Callable[[], Rung]] = {
     "four-bar path, 5 points, timed": lambda: (
         four_bar(), mg.path("coupler.tip", _rows(5, 2, (1.5, 1.2)), at={"A": _rows(5, 1)[:, 0]}),
         ["A.point", "B.point", "C.point", "D.point"], 12,
+    ),
+    "slider-crank function up to a factor, 5 pairs": lambda: (
+        slider_crank(), mg.function("A", "D", _rows(5, 2), scale="free"), ["B.point.y", "C.point"], 3,
+    ),
+    "four-bar function by markers, 3 pairs": lambda: (
+        by_markers("four-bar", B_a=(1, 0), C_a=(2.5, 0), C_b=(2, 0), D_a=(3, 0)).replace(start={"A": 0.5, "D": 1.6}),
+        mg.function("A", "D", [[0.5, 1.6], [1.0, 1.7], [1.5, 1.9]]), ["B.on_a.point.x", "C.on_a.point.x", "C.on_b.point.x"], 4,
+    ),
+    "R-R dyad by markers, 3 poses": lambda: (
+        by_markers("dyad"), mg.poses("body", _rows(3, 3)), ["B.on_a.point.x", "B.on_b.point"], 2,
+    ),
+    "geared five-bar path, 3 points, timed": lambda: (
+        geared_five_bar(), mg.path("rod.tip", _rows(3, 2, (1.5, 1.5)), at={"A": [0, -0.2, -0.45]}), ["B.point", "D.point"], 1,
     ),
     "four-bar of two dyads, 5 poses": lambda: (
         four_bar(), mg.poses("coupler", _rows(5, 3)), ["A.point", "B.point", "C.point", "D.point"], 12,

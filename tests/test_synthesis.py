@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ladder import LADDER, dyad, four_bar, slider_crank, spatial
+from ladder import LADDER, by_markers, dyad, four_bar, geared_five_bar, slider_crank, spatial
 
 import mechgraph as mg
 from mechgraph.synthesis.classes import TaskClass
@@ -128,16 +128,78 @@ def test_faults_of_tasks_and_unknowns_are_told_together() -> None:
 
 def test_what_is_not_served_is_refused_by_name() -> None:
     pairs = [[0, 0], [0.3, 0.2], [0.6, 0.5]]
-    m = four_bar()
-    marker = mg.Marker((0.3, 1.0))
-    moved = [p if p.name != "B" else mg.Pair("B", "R", "crank", "coupler", on_a=marker, on_b=marker) for p in m.pairs]
-    with pytest.raises(mg.DeclarationError, match="pairs B: are placed on each link"):
-        mg.synthesize(m.replace(pairs=moved), mg.function("A", "D", pairs), ["C.point"])
-    with pytest.raises(mg.DeclarationError, match="the factor is not sought"):
-        mg.synthesize(m, mg.function("A", "D", pairs, scale="free"), ["C.point"])
-    geared = m.replace(couplings=[mg.Coupling({"A": 1, "D": -2})])
-    with pytest.raises(mg.DeclarationError, match="couplings: are not served"):
-        mg.synthesize(geared, mg.function("A", "D", pairs), ["C.point"])
+    with pytest.raises(mg.DeclarationError, match=r"output D.Rz turns; of angles times an unknown factor"):
+        mg.synthesize(four_bar(), mg.function("A", "D", pairs, scale="free"), ["C.point"])
+    screw = mg.Mechanism(
+        "jack",
+        pairs=[
+            mg.Pair("A", "H", "frame", "nut", point=(0, 0, 0), axis=(0, 0, 1), pitch=0.1),
+            mg.Pair("B", "P", "frame", "nut", point=(1, 0, 0), axis=(0, 0, 1)),
+        ],
+    )
+    with pytest.raises(mg.DeclarationError, match="pairs A: a screw ties an angle to a length"):
+        mg.synthesize(screw, mg.function("A", "B", pairs), ["B.axis"])
+
+
+def test_numbers_that_change_nothing_together_are_told() -> None:
+    """The frame of a crank by markers may stand anywhere; a four-bar without a given length may have any size."""
+    with pytest.raises(mg.DeclarationError, match=r"1 way to change B.on_a.point.x, B.on_a.point.y together"):
+        mg.synthesize(by_markers("dyad"), mg.poses("body", np.eye(4)[:, :3]), ["B.on_a.point", "B.on_b.point"])
+    pairs = np.random.default_rng(0).normal(size=(7, 2))
+    unknown = ["A.point.x", "A.point.y", "B.point", "C.point"]
+    with pytest.raises(mg.DeclarationError, match="2 ways to change"):
+        mg.synthesize(four_bar(), mg.function("A", "D", pairs), unknown)
+
+
+def test_a_four_bar_by_markers_is_that_of_freudensteins_equation() -> None:
+    """With the angles of crank and rocker from the line of the pivots ``K1 cos b - K2 cos a + K3 = cos(a - b)`` is linear in all three."""
+    m = by_markers("four-bar", B_a=(1, 0), C_a=(2.5, 0), C_b=(2, 0), D_a=(3, 0)).replace(start={"A": 0.5})
+    a = np.array([0.5, 1.0, 1.5])
+    b = mg.kinematics(m, {"A": a})["D"].position[:, 0]
+    K = np.linalg.solve(np.column_stack([np.cos(b), -np.cos(a), np.ones(3)]), np.cos(a - b))
+    crank, rocker = 3 / K[0], 3 / K[1]
+    rod = np.sqrt(crank**2 + rocker**2 + 9 - 2 * crank * rocker * K[2])
+    declared = by_markers("four-bar", B_a=(1.2, 0), C_a=(2, 0), C_b=(1.5, 0), D_a=(3, 0)).replace(
+        start={"A": 0.5, "D": b[0]}
+    )
+    unknown = ["B.on_a.point.x", "C.on_a.point.x", "C.on_b.point.x"]
+    s = mg.synthesize(declared, mg.function("A", "D", np.column_stack([a, b])), unknown)
+    assert s.values == pytest.approx(np.array([[crank, -rod, rocker], [crank, rod, rocker]]), abs=1e-9)
+    assert s.total == 4
+    assert [one.kind for one in s.degenerate] == ["coincident"]
+    for one in s:
+        assert mg.kinematics(one, {"A": a})["D"].position[:, 0] == pytest.approx(b, abs=1e-9)
+
+
+def test_a_dyad_by_markers_has_the_pins_of_one_by_points() -> None:
+    poses = np.array([[0, 0, 0], [1.0, 0.4, 0.3], [1.6, 1.1, 0.9]])
+    plain = mg.synthesize(dyad(), mg.poses("body", poses), ["B.point"])
+    s = mg.synthesize(by_markers("dyad"), mg.poses("body", poses), ["B.on_a.point.x", "B.on_b.point"])
+    assert s.total == 2 * plain.total
+    # the crank may point to the pin or away from it
+    assert s.values[:, 1:] == pytest.approx(np.repeat(plain.values, 2, axis=0), abs=1e-9)
+    assert np.sort(s.values[:, 0]) == pytest.approx(np.hypot(*plain.values[0]) * np.array([-1, 1]), abs=1e-9)
+
+
+def test_a_function_up_to_a_factor_is_done_by_larger_and_smaller_mechanisms() -> None:
+    """A slider-crank about the pivot times a factor moves its slider by as much more."""
+    m, task, unknown, _ = LADDER["slider-crank function, 5 pairs"]()
+    given = mg.synthesize(m, task, unknown).values
+    free = mg.function("A", "D", task.pairs, scale="free")
+    s = mg.synthesize(m, free, ["B.point.y", "C.point"])
+    factor = m.pair("B").point[0] / given[:, :1]
+    wanted = np.column_stack([given[:, 1:] * factor, factor])
+    assert s.unknown == ("B.point.y", "C.point.x", "C.point.y", "D.Tz.scale")
+    assert np.sort(s.values, axis=0) == pytest.approx(np.sort(wanted, axis=0), abs=1e-8)
+
+
+def test_a_geared_five_bar_is_found_again_from_its_path() -> None:
+    m, angles = geared_five_bar(B=(0.3, 1.0), D=(2.7, 1.2)), np.array([0, -0.2, -0.45])
+    tip = mg.kinematics(m, {"A": angles}).link("rod").at("tip").position[:, :2]
+    s = mg.synthesize(geared_five_bar(), mg.path("rod.tip", tip, at={"A": angles}), ["B.point", "D.point"])
+    # two cranks that turn by given angles: each is unique for three places
+    assert (s.total, s.completeness) == (1, "tested")
+    assert s.values == pytest.approx(np.array([[0.3, 1.0, 2.7, 1.2]]), abs=1e-9)
 
 
 @pytest.mark.parametrize(

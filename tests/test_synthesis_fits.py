@@ -32,6 +32,10 @@ def asked(task: object, unknown: list[str]) -> Fit:
 
 EVERYTHING = ["A.point", "B.point", "C.point", "D.point", "coupler.tip"]
 TASKS = {
+    "up to a factor": (
+        mg.function("A", "D", [[0, 0], [0.3, 0.1], [0.6, 0.3], [0.9, 0.6]], scale="free"),
+        ["B.point", "C.point"],
+    ),
     "path": (mg.path("coupler.tip", ellipse(9)), EVERYTHING),
     "timed path": (mg.path("coupler.tip", ellipse(5), at={"A": np.linspace(0, 1.5, 5)}), EVERYTHING),
     "poses": (
@@ -67,6 +71,15 @@ def test_a_curve_of_the_mechanism_is_met_and_the_driver_of_every_row_is_found() 
     assert fit.errors(best).max() < 1e-8
     assert np.allclose(np.mod(best.theta[:, 0] + 1e-6, 2 * np.pi), angles, atol=1e-5)
     assert fit.p.outside(best.z[:, None])[:, 0] == pytest.approx([0, 1, 3, 2.5], abs=1e-6)
+
+
+def test_a_function_is_met_up_to_the_factor_that_it_was_divided_by() -> None:
+    angles = np.linspace(0.0, 1.2, 9)
+    turned = mg.kinematics(four_bar(), {"A": angles})["D"].position[:, 0]
+    fit = asked(mg.function("A", "D", np.column_stack([angles, turned / 1.5]), scale="free"), ["B.point.x", "C.point"])
+    best = fitted(fit, "least_squares", 1, {}).points[0]
+    assert fit.p.unknowns.names[-1] == "D.Rz.scale"
+    assert fit.p.outside(best.z[:, None])[:, 0] == pytest.approx([0, 3, 2.5, 1.5], abs=1e-7)
 
 
 def test_the_least_largest_error_is_below_that_of_least_squares() -> None:

@@ -86,7 +86,7 @@ class TaskClass:
         # behind the state of a row stand the coefficients of its rates, as far as any are asked
         orders, F = len(problem.rates), s.n_freedoms
         self.nx, self.F = s.n_state + orders * F, F * (1 + orders)
-        self.columns: Index = np.concatenate([problem.columns + k * F for k in range(1 + orders)])
+        self.columns = problem.asked_columns
         rows = [s.single_rows[problem.columns], *(s.n_state + k * F + problem.columns for k in range(orders))]
         self.asked_rows: Index = np.concatenate(rows)
         self.is_length = np.concatenate(
@@ -108,7 +108,7 @@ class TaskClass:
         if not problem.closed_at_start:
             here = Configuration(here.system, close(here.system, here.x[:, 0], _NONE)[0][:, None])
         self.here = here
-        self.W = spread.norms.size if any(p.array != "point" for own in problem.places for p in own) else 0
+        self.W = spread.norms.size if any(p.turns for own in problem.places for p in own) else 0
         self.family = self
         self.of_row = Equations(Family(here, problem.columns, np.zeros((s.n_freedoms, 0))), None)
         self.algebras = self._algebras(here)
@@ -238,7 +238,7 @@ class TaskClass:
             for i in np.flatnonzero(~np.isnan(X[:, 0]).any(axis=0))[: n - len(members)]:
                 own = numbers.taken(np.array([i]))
                 x = self._with_rates(own, X[:, :, i, None], rng)
-                members.append(ClassMember(own, x[:, self.asked_rows]))
+                members.append(ClassMember(own, x[:, self.asked_rows] / problem.factors(own)))
                 states.append(np.concatenate([z[:, i], own.norms.ravel()[: self.W], x.ravel()]))
             if len(members) == n:
                 return members, np.array(states).T
@@ -379,7 +379,7 @@ class TaskClass:
     def turning(self) -> Mask:
         """Which markers ``(2 P,)`` have unknown directions: the others go on rigidly from member to member."""
         out = np.zeros((2, len(self.problem.whole.pairs)), dtype=bool)
-        for p in (p for own in self.problem.places for p in own if p.array != "point"):
+        for p in (p for own in self.problem.places for p in own if p.turns):
             out[p.side, p.pair] = True
         return out.ravel()
 
@@ -391,10 +391,11 @@ class TaskClass:
     def at(self, member: ClassMember, x: Array) -> ArrowRows:
         """The equations of members at states of which what is asked is set to what they ask."""
         near = x[self.u : self.head].reshape(2, 2, -1, x.shape[1]) if self.W else None
-        X = x[self.head :].reshape(self.R, self.nx, -1).copy()
+        numbers = member.numbers.with_values(self.problem.places, x[: self.u], near)
+        X, drive = x[self.head :].reshape(self.R, self.nx, -1).copy(), member.drive * self.problem.factors(numbers)
         for i, given in enumerate(self.given):
-            X[i, self.asked_rows[given]] = member.drive[i, given]
-        return self.problem.equations(member.numbers.with_values(self.problem.places, x[: self.u], near), X)
+            X[i, self.asked_rows[given]] = drive[i, given]
+        return self.problem.equations(numbers, X, np.where(self.given[:, :, None], member.drive, 0.0))
 
     def state(self, rows: ArrowRows) -> Array:
         """The states of equations."""
@@ -559,7 +560,7 @@ class Arrow:
     def rates(self, idle: Array) -> tuple[Array, Array]:
         """Rates of increments with ``t``."""
         of, columns = self.of, self.of.columns
-        change = np.where(of.given[:, :, None], self._change, 0.0)
+        change = np.where(of.given[:, :, None], self._change * of.problem.factors(self.rows.numbers), 0.0)
         J = self.rows.by_coordinates
         opened = np.einsum("rndt,rdt->rnt", J[:, :, columns], np.broadcast_to(change, (*change.shape[:2], self.rows.T)))
         if (moving := self.leg.moving).size:
@@ -567,7 +568,10 @@ class Arrow:
             side, pair = moving // P, moving % P
             opened = opened + self.rows.moved(side, pair, self._known_rates()[:, :, side, pair]).sum(axis=2)
         out = self.solve(-opened)
-        whole = out[of.head :].reshape(of.R, of.F, -1)
+        whole, factor_of = out[of.head :].reshape(of.R, of.F, -1), of.problem.factor_of
+        if (scaled := factor_of >= 0).any() and self.rows.drive is not None:
+            first = of.u - 1 - factor_of.max()
+            change[:, scaled] += self.rows.drive[:, scaled] * out[first + factor_of[scaled]]
         for i, given in enumerate(of.given):
             whole[i][columns[given]] = change[i, given]
         return out, idle
@@ -576,6 +580,6 @@ class Arrow:
         """Rates ``(3, 3, 2, P, T)`` of points, axes and second directions that are known."""
         out = self._rates.copy()
         for places in self.of.problem.places:
-            for p in places:
+            for p in (p for p in places if p.array in MARKER):
                 out[MARKER.index(p.array), p.component, p.side, p.pair] = 0.0
         return out

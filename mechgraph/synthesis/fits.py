@@ -56,7 +56,7 @@ class Fit:
     theta, open : (n, d) arrays
         Values of the drivers, and which are unknown.
     wanted : (n, k) array
-        Values of the other coordinates asked ``others (k,)``, NaN where nothing is.
+        Values of the other coordinates asked ``others (k,)``, NaN where nothing is; times ``factors`` where these are unknown.
     """
 
     def __init__(self, problem: RowProblem, tasks: Any) -> None:
@@ -82,7 +82,7 @@ class Fit:
             self.open[0] = False
         kept = [j for column, j in place.items() if column not in self.drivers]
         self.others: Index = problem.columns[kept]
-        self.wanted = problem.asked[:, kept]
+        self.wanted, self.factor_of = problem.asked[:, kept], problem.factor_of[kept]
         self._check(x)
 
     def _drivers(self, tasks: Any) -> Index:
@@ -111,8 +111,6 @@ class Fit:
             faults.append("several drivers without timing: give their values at all rows, e.g. mg.path(..., at={...})")
         if not np.isfinite(self.wanted).any():
             faults.append("nothing is asked beside values of drivers")
-        if self.p.tasks is not None and self.p.tasks.scaled:
-            faults.append(f"{listed(self.p.tasks.scaled)}: a function with a free scale is not fitted; give the scale")
         if self.p.unknowns.others:
             faults.append(f"unknown {listed(self.p.unknowns.others)}: only points and directions can be fitted")
         if faults:
@@ -216,7 +214,7 @@ class Fit:
             ways = begin + reach * np.linspace(-1.0, 1.0, 181)
             states, came = self.led(z, ways[:, None], x)
             ways, states = ways[came], states[:, came]
-            apart = self._coordinates(states)[:, None] - self.wanted
+            apart = self._coordinates(states)[:, None] - self.wanted * self._factors(z)
             far = np.nansum(self._wrapped(apart) ** 2, axis=2)
             nearest = ways[np.argmin(far, axis=0)]
             theta[:, 0] = np.where(self.open[:, 0], nearest, theta[:, 0])
@@ -250,16 +248,25 @@ class Fit:
         """Rows and coordinates of what is asked."""
         return np.nonzero(np.isfinite(self.wanted))  # type: ignore[return-value]
 
+    def _factors(self, z: Array) -> Array:
+        """By what ``(k,)`` that which is asked is multiplied."""
+        scaled = self.factor_of >= 0
+        out = np.ones(len(scaled))
+        out[scaled] = z[len(z) - self.factor_of.max(initial=-1) - 1 :][self.factor_of[scaled]]
+        return out
+
     def residual(self, here: FitPoint) -> Array:
         """By how much each is missed."""
-        return self._wrapped(self._coordinates(here.x) - self.wanted)[self.asked]
+        return self._wrapped(self._coordinates(here.x) - self.wanted * self._factors(here.z))[self.asked]
 
     def jacobian(self, here: FitPoint) -> Array:
         """Its derivatives by the unknowns and the open drivers."""
         by_z, by_theta = self.rates(here)
         row, k = self.asked
         column = self.others[k]
-        out = [by_z[row, column]]
+        out, u = [by_z[row, column].copy()], len(here.z)
+        for i in np.flatnonzero(self.factor_of[k] >= 0):
+            out[0][i, u - self.factor_of.max() - 1 + self.factor_of[k[i]]] -= self.wanted[row[i], k[i]]
         for i, j in np.argwhere(self.open):
             out.append(np.where(row == i, by_theta[row, column, j], 0.0)[:, None])
         return np.concatenate(out, axis=1)

@@ -77,11 +77,13 @@ class TaskLabelling:
             for c in range(first[k], first[k + 1])
             for order in range(1 + len(p.rates))
         ]
+        factors = of.problem.factor_of[p.system.pair_of_freedom[of.columns % p.system.n_freedoms] == k]
+        asked += [("scaled", *factors.tolist())] if (factors >= 0).any() else []
         unknown = sorted((q.array, q.side, q.component) for own in p.places for q in own if q.pair == k)
         B = of.algebras[k] if k < len(of.algebras) else np.zeros((6, 0))
         # decimals that a class keeps of the motions by which markers may be moved
         moves: object = (np.round(B @ B.T, 5) + 0.0).tolist() if 0 < B.shape[1] < 6 else B.shape[1]
-        lines = [(c.coefficients, c.constant) for c in p.m.couplings]
+        lines = p.system.coupling_matrix[:, first[k] : first[k + 1], 0].tolist()
         return (
             repr(freedoms),
             tuple(asked),
@@ -103,7 +105,7 @@ class TaskLabelling:
         """For every unknown in canonical order its number."""
         place = np.argsort(self.pairs)
         told = [
-            sorted((int(place[q.pair]), MARKER.index(q.array), q.side, q.component) for q in own)
+            sorted((int(place[q.pair]), (*MARKER, "factor").index(q.array), q.side, q.component) for q in own)
             for own in self.of.problem.places
         ]
         return np.array(sorted(range(len(told)), key=told.__getitem__), dtype=np.intp)

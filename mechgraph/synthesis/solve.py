@@ -12,6 +12,8 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Callable
+from fractions import Fraction
+from math import lcm, prod
 from pathlib import Path
 from typing import Any
 
@@ -77,9 +79,10 @@ class TaskStart:
 
 
 class TaskPencil:
-    """Tasks on a line through that of a member: of one row ``exp(i q)`` of angles and lengths grow linearly with ``z``.
+    """Tasks on a line through that of a member: of one row ``exp(i q / n)`` of angles and lengths grow linearly with ``z``.
 
-    The line leads towards a task that some mechanism does; the other rows leave a curve of mechanisms, which it cuts.
+    The line leads towards a task that some mechanism does; the other rows leave a curve of mechanisms, which it cuts. Where couplings turn
+    freedoms by parts of each other's angles, ``n`` is such that all are whole multiples of ``q / n``.
     """
 
     first = 16
@@ -90,8 +93,8 @@ class TaskPencil:
         row, length = int(np.argmax(equations.conditions)), equations.is_length
         other = equations.random_members(rng, 1)[0].drive[row, :, 0] - base.drive[row, :, 0]
         part = rng.normal(size=2) @ [0.7, 0.7j]
-        self.rate = np.zeros(base.drive.shape[:2], dtype=complex)
-        self.rate[row] = part * np.where(length, other, np.exp(1j * np.where(length, 0.0, other)) - 1.0)
+        self.rate, self.parts = np.zeros(base.drive.shape[:2], dtype=complex), _parts_of_turns(equations)
+        self.rate[row] = part * np.where(length, other, np.exp(1j / self.parts * np.where(length, 0.0, other)) - 1.0)
         self.weights = rng.normal(size=(equations.u, 2)) @ [1.0, 1.0j]
 
     def members(self, phi: Array) -> ClassMember:
@@ -99,7 +102,7 @@ class TaskPencil:
         grown = self.rate[:, :, None] * (np.exp(1j * phi) - 1.0)
         length = self.of.is_length
         drive = self.base.drive + np.where(
-            length[:, None], grown, -1j * np.log(1.0 + np.where(length[:, None], 0.0, grown))
+            length[:, None], grown, -1j * self.parts * np.log(1.0 + np.where(length[:, None], 0.0, grown))
         )
         return ClassMember(self.base.numbers.taken(np.zeros(len(phi), dtype=np.intp)), drive)
 
@@ -113,6 +116,14 @@ class TaskPencil:
         good = np.repeat(good.reshape(-1, 2).all(axis=1), 2)
         z = np.exp(1j * phi)
         return z[good], g.sum(axis=1)[good], (np.maximum(1.0, np.abs(z)) / size)[good]
+
+
+def _parts_of_turns(of: TaskClass) -> int:
+    """The least ``n`` such that couplings make all angles whole multiples of the ``n``-th part of each."""
+    rows = (row[row != 0].tolist() for row in of.problem.system.coupling_matrix[:, :, 0])
+    # teeth of which ratios are made
+    parts = ([Fraction(a / b).limit_denominator(1000).denominator for a in row for b in row] for row in rows)
+    return prod(lcm(*row) for row in parts)
 
 
 def start_set(of: TaskClass, rng: np.random.Generator, progress: Progress) -> TaskStart:

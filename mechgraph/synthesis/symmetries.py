@@ -83,10 +83,11 @@ def _label(problem: RowProblem, k: int) -> str:
                 if name != "second"
             ]
     s = problem.system
-    asked = problem.columns[(problem.columns >= s.first_column[k]) & (problem.columns < s.first_column[k + 1])]
+    own = slice(s.first_column[k], s.first_column[k + 1])
     pair = problem.whole.pairs[k]
-    # of which something is asked is like no other
-    return str((pair.type.symbol, known, k if asked.size else -1))
+    # of which something is asked, or which a coupling joins to others, is like no other
+    alone = ((problem.columns >= own.start) & (problem.columns < own.stop)).any() or s.coupling_matrix[:, own].any()
+    return str((pair.type.symbol, known, k if alone else -1))
 
 
 def orbits(z: Array, of: tuple[Symmetry, ...]) -> list[list[int]]:

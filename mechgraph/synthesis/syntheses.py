@@ -56,15 +56,24 @@ class Synthesis:
         faults += [
             f"unknown {name!r}: is no component of a point, an axis or a second direction" for name in p.unknowns.others
         ]
-        if p.tasks is not None and p.tasks.scaled:
-            faults.append('function with scale="free": the factor is not sought by exact synthesis yet')
-        guided = [pair.name for pair in m.pairs if pair.contact is not None or pair.type.takes_pitch]
-        if guided:
-            faults.append(
-                f"pairs {', '.join(guided)}: screws, curves and surfaces are not served by exact synthesis so far"
-            )
-        if m.couplings:
-            faults.append("couplings: are not served by exact synthesis so far; leave them out (couplings=[])")
+        faults += [
+            f"function with scale='free': the output {name} turns; of angles times an unknown factor there is no finite number of "
+            "solutions; give the scale, or fit (fit=)"
+            for name in (p.tasks.scaled if p.tasks else ())
+            if p.system.m.turns(name)
+        ]
+        for what, why in (
+            (
+                "pitch",
+                "a screw ties an angle to a length: the equations are not algebraic, their number of solutions has no end",
+            ),
+            (
+                "contact",
+                "curves and surfaces are made of pieces: solutions on one cannot be led to those on all others",
+            ),
+        ):
+            named = [p.name for p in m.pairs if (p.type.takes_pitch if what == "pitch" else p.contact is not None)]
+            faults += [f"pairs {', '.join(named)}: {why}; exact synthesis does not serve them"] if named else []
         self.sweep = Unknowns(m, p.whole, list(sweep), faults)
         faults += [
             f"sweep {name!r}: is unknown; leave it out there" for name in self.sweep.names if name in p.unknowns.names
@@ -101,13 +110,20 @@ class Synthesis:
         names = [p.unknowns.names[k] for k in p.sought]
         if wanted == p.u:
             at = np.zeros(1, dtype=np.intp)
-            _, sigma, V = np.linalg.svd(self.of.leg(self.of.start, self.of.start).at(self.of.x[:, None], np.zeros(1), at).matrix[0])
+            _, sigma, V = np.linalg.svd(
+                self.of.leg(self.of.start, self.of.start).at(self.of.x[:, None], np.zeros(1), at).matrix[0]
+            )
             idle = V[int((sigma > MODES.generic * sigma[0]).sum()) :] if p.u else V
             if not len(idle):
                 return
-            which = ", ".join(name for name, column in zip(names, np.abs(idle).T, strict=True) if column.max() > MODES.span)
-            fault = f"{counted(len(idle), 'way')} to change {which} together {'leaves' if len(idle) == 1 else 'leave'} all that is asked as it is"
-            raise DeclarationError(p.name, [f"{fault} (frames of links, size or place of the whole): fix as many, and ask for more"])
+            which = ", ".join(
+                name for name, column in zip(names, np.abs(idle).T, strict=True) if column.max() > MODES.span
+            )
+            ways = f"{counted(len(idle), 'way')} to change {which} together"
+            fault = f"{ways} {'changes' if len(idle) == 1 else 'change'} nothing that is asked"
+            raise DeclarationError(
+                p.name, [f"{fault} (frames of links, size or place of the whole): fix as many, and ask for more"]
+            )
         each = ", ".join(f"{c} at row {row}" for row, c in zip(p.rows, self.of.conditions, strict=True))
         counts = f"{counted(wanted, 'condition')} ({each}) for {counted(p.u, 'unknown')} ({', '.join(names)})"
         if wanted < p.u:

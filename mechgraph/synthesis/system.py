@@ -39,18 +39,20 @@ from mechgraph.variants.numbers import MARKER
 class RowNumbers:
     """``point, axis, second (2, 3, P, B)`` of all markers, points over L about the origin of the problem; complex for members.
 
-    ``norms (2, 2, P, B)`` are those of both directions, see ``unknowns.norms_of``.
+    ``norms (2, 2, P, B)`` are those of both directions, see ``unknowns.norms_of``; ``factors (n, B)`` are those of what is asked up to one.
     """
 
     point: Array
     axis: Array
     second: Array
     norms: Array
+    factors: Array
 
     @staticmethod
     def of(point: Array, axis: Array, second: Array, near: Array | None = None) -> RowNumbers:
         """Numbers with norms, nearest to others."""
-        return RowNumbers(point, axis, second, norms_of(axis.swapaxes(0, 1), second.swapaxes(0, 1), near))
+        norms = norms_of(axis.swapaxes(0, 1), second.swapaxes(0, 1), near)
+        return RowNumbers(point, axis, second, norms, np.zeros((0, norms.shape[-1])))
 
     @staticmethod
     def joined(numbers: Sequence[RowNumbers]) -> RowNumbers:
@@ -70,26 +72,30 @@ class RowNumbers:
     def at(self, places: Sequence[UnknownPlace]) -> Array:
         """What stands at the places of a number, ``(B,)``."""
         p = places[0]
+        if p.array == "factor":
+            return np.asarray(self.factors[p.component])
         return np.asarray(getattr(self, p.array)[p.side, p.component, p.pair])
 
     def moved(self, X: Array) -> RowNumbers:
         """Markers moved rigidly by poses ``X (3, 4, 2, P, B)``."""
         point, axis, second = (np.einsum("ijspb,sjpb->sipb", X[:, :3], v) for v in self.vectors)
         norms = np.broadcast_to(self.norms, (*self.norms.shape[:-1], X.shape[-1]))
-        return RowNumbers(point + X[:, 3].swapaxes(0, 1), axis, second, norms)
+        return RowNumbers(point + X[:, 3].swapaxes(0, 1), axis, second, norms, self.factors)
 
     def with_values(self, places: Sequence[Sequence[UnknownPlace]], z: Array, near: Array | None = None) -> RowNumbers:
         """The same with unknowns ``z (u, B)`` at their places, and norms nearest to others."""
         B, out = z.shape[1], []
         for v in self.vectors:
             out.append(np.array(np.broadcast_to(v, (*v.shape[:-1], B)), dtype=np.result_type(v, z)))
+        factors = z[np.array([own[0].array == "factor" for own in places], dtype=bool)]
         for value, own in zip(z, places, strict=True):
-            for p in own:
+            for p in (p for p in own if p.array in MARKER):
                 out[MARKER.index(p.array)][p.side, p.component, p.pair] = value
         point, axis, second = out
-        if all(p.array == "point" for own in places for p in own):
-            return RowNumbers(point, axis, second, np.broadcast_to(self.norms, (*self.norms.shape[:-1], B)))
-        return RowNumbers.of(point, axis, second, near)
+        if not any(p.turns for own in places for p in own):
+            norms = np.broadcast_to(self.norms, (*self.norms.shape[:-1], B))
+            return RowNumbers(point, axis, second, norms, factors)
+        return replace(RowNumbers.of(point, axis, second, near), factors=factors)
 
     @property
     def poses(self) -> Array:
@@ -126,7 +132,7 @@ class FirstPoses:
             if name.startswith(f"{link}.")
         ]
         faults += [
-            f"pair {pair.name!r}: is placed on each link by itself, others of its link are not, of which the first pose is not the identity; "
+            f"pair {pair.name!r}: is placed on each link by itself, others of its link are not, and its first pose is not the identity; "
             "place all of them alike"
             for pair in declared.pairs
             if pair.on_a is not None and self.poses.keys() & {pair.a, pair.b}
@@ -205,9 +211,17 @@ class RowProblem:
         given = DriverMotion(m, filled, asked="synthesis of")
         self.free = given.free
         self.whole = given.m.replace(pairs=[*given.m.pairs, *given.free], drives=given.names)
-        self.unknowns = Unknowns(m, self.whole, unknown, faults)
+        faults += [
+            f"function with scale='free': {name} begins at {m.start[name]:g}; expected 0"
+            for name in self.tasks.scaled
+            if m.start.get(name, 0.0)
+        ]
+        self.unknowns = Unknowns(m, self.whole, unknown, faults, self.tasks.scaled)
         if faults:
             raise DeclarationError(self.name, faults)
+        # of every column that is asked, and of its rates, the number of its factor, -1 where it has none
+        factor_of = [self.tasks.scaled.index(name) if name in self.tasks.scaled else -1 for name in given.names]
+        self.factor_of = np.tile(factor_of, 1 + len(self.tasks.rates))
         user = np.array([values.get(name, values.get(self._user_name(name))) for name in given.names]).T
         numbers = declared(self.whole)
         self.origin, self.L = self._unit(numbers)
@@ -300,8 +314,9 @@ class RowProblem:
 
     @cached_property
     def at_rest(self) -> Array:
-        """State ``(nx,)`` of the declared configuration, free pairs too: all coordinates zero but those of named points, where pairs stand by
-        point and axis; else near ``start``."""
+        """State ``(nx,)`` of the declared configuration, free pairs too: where pairs stand by point and axis all coordinates are zero but
+        those of named points; else it is closed near ``start``.
+        """
         s = self.system
         q = s.start_coordinates(self.m.start)[:, None] / s.in_user_units(np.ones((s.n_freedoms, 1)))
         for k in range(len(self.m.pairs), len(self.whole.pairs)):
@@ -391,12 +406,25 @@ class RowProblem:
         par = replace(par, offset=old.offset, frame=old.frame, origin=old.origin, L=old.L, pitch=old.pitch)
         return self.system.with_parameters(par)
 
-    def equations(self, numbers: RowNumbers, x: Array) -> ArrowRows:
+    @cached_property
+    def asked_columns(self) -> Index:
+        """Columns of all that is asked; behind them those of its rates."""
+        return np.concatenate([self.columns + k * self.system.n_freedoms for k in range(1 + len(self.rates))])
+
+    def factors(self, numbers: RowNumbers) -> Array:
+        """By what ``(d, B)`` that which is asked is multiplied."""
+        out = np.ones((len(self.factor_of), numbers.point.shape[-1]), dtype=numbers.factors.dtype)
+        scaled = self.factor_of >= 0
+        out[scaled] = numbers.factors[self.factor_of[scaled]]
+        return out
+
+    def equations(self, numbers: RowNumbers, x: Array, drive: Array | None = None) -> ArrowRows:
         """The equations of tracks with such numbers of markers (unknowns among them) at states ``x (R, nx, T)``, in internal units.
 
-        Where rates are asked, behind the state of every row stand the Taylor coefficients of its freedoms, order by order.
+        ``drive (R, d, T)`` is asked up to factors. Where rates are asked, behind every row stand the Taylor coefficients of its
+        freedoms, order by order.
         """
-        return ArrowRows(self, numbers, x)
+        return ArrowRows(self, numbers, x, drive)
 
 
 class ArrowRows:
@@ -404,8 +432,8 @@ class ArrowRows:
     row, where rates are asked, one node after the other.
     """
 
-    def __init__(self, problem: RowProblem, numbers: RowNumbers, x: Array) -> None:
-        self.problem, self.numbers, self.x = problem, numbers, x
+    def __init__(self, problem: RowProblem, numbers: RowNumbers, x: Array, drive: Array | None = None) -> None:
+        self.problem, self.numbers, self.x, self.drive = problem, numbers, x, drive
         system, s = problem.system_with(numbers), problem.system
         self.R, _, self.T = x.shape
         # nodes of the circles on which coefficients of curves are found, and below their radius times the rates: the first coefficient of
@@ -466,13 +494,18 @@ class ArrowRows:
     def by_unknowns(self) -> Array:
         """Derivatives ``(R, n, u, T)`` by the unknown dimensions."""
         places = self.problem.places
-        every = [p for own in places for p in own]
-        which = np.repeat(np.arange(len(places)), [len(own) for own in places])
+        every = [p for own in places for p in own if p.array in MARKER]
+        which = [k for k, own in enumerate(places) for p in own if p.array in MARKER]
         side, pair = (np.array([getattr(p, name) for p in every], dtype=int) for name in ("side", "pair"))
         each = self.moved(side, pair, unit_rates(every))
         out = np.zeros((*each.shape[:2], len(places), self.T), dtype=each.dtype)
         for i, k in enumerate(which):
             out[:, :, k] += each[:, :, i]
+        for k, (p, *_) in enumerate(places):
+            if p.array == "factor" and self.drive is not None:
+                scaled = self.problem.factor_of == p.component
+                J = self.by_coordinates[:, :, self.problem.asked_columns[scaled]]
+                out[:, :, k] += np.einsum("rndt,rdt->rnt", J, self.drive[:, scaled])
         return out
 
     def moved(self, side: Index, pair: Index, rates: Array) -> Array:

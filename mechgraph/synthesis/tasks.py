@@ -374,7 +374,8 @@ def function(
     pairs : (n, 2) array
         Values of both [rad, length], counted from row 0.
     scale : {"given", "free"}
-        With ``"free"`` the output is times an unknown factor; ``synthesize`` refuses "free" so far.
+        With ``"free"`` the output is the given one times an unknown factor, ``"D.Tz.scale"`` among the unknowns: of a sliding output
+        exactly, of any in fits (of an angle there is no finite number of solutions).
     rates, accelerations : (n,) arrays, optional
         First and second derivatives of the output by the input there, one condition each. NaN asks for nothing.
 

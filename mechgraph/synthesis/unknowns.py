@@ -25,28 +25,45 @@ from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import declared
 from mechgraph.modes.family import span
-from mechgraph.variants.numbers import MARKER, SIDES, AnyField, Field, ItemField, clashes, field_values, find_field, varied
+from mechgraph.variants.numbers import (
+    MARKER,
+    SIDES,
+    AnyField,
+    Field,
+    ItemField,
+    clashes,
+    field_values,
+    find_field,
+    varied,
+)
 
 
 @dataclass(frozen=True)
 class UnknownPlace:
-    """A component of ``point``, ``axis`` or ``second`` of the marker of a pair on one side."""
+    """A component of ``point``, ``axis`` or ``second`` of the marker of a pair on a side; of no pair (-1) a ``factor`` of what is asked."""
 
     array: str
     side: int
     component: int
     pair: int
 
+    @property
+    def turns(self) -> bool:
+        """Whether directions change with it."""
+        return self.array in MARKER[1:]
+
 
 class Unknowns:
     """The numbers sought, in the order given: ``names (u,)``, and ``places`` where each stands; ``m`` is the mechanism as declared.
 
     ``whole`` is the mechanism with free pairs behind its own, whose markers at named points are places of these. Faults of ``given``
-    are put to ``faults``.
+    are put to ``faults``. Behind the fields stand ``factors``, of freedoms that are asked up to one: ``D.scale`` of ``D``.
     """
 
-    def __init__(self, m: Mechanism, whole: Mechanism, given: Sequence[str], faults: list[str]) -> None:
-        self.m, self.whole = m, whole
+    def __init__(
+        self, m: Mechanism, whole: Mechanism, given: Sequence[str], faults: list[str], factors: Sequence[str] = ()
+    ) -> None:
+        self.m, self.whole, self.factors = m, whole, tuple(factors)
         self.fields: dict[str, AnyField] = {}
         for name in given:
             for one in self._expanded(name):
@@ -79,12 +96,12 @@ class Unknowns:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of all numbers."""
-        return tuple(self.fields)
+        return (*self.fields, *(f"{name}.scale" for name in self.factors))
 
     @cached_property
     def declared(self) -> Array:
         """Their declared values ``(u,)``."""
-        return np.array(list(field_values(self.m, self.fields).values()), dtype=float)
+        return np.array([*field_values(self.m, self.fields).values(), *(1.0 for _ in self.factors)], dtype=float)
 
     @cached_property
     def others(self) -> list[str]:
@@ -94,7 +111,8 @@ class Unknowns:
     @cached_property
     def places(self) -> list[list[UnknownPlace]]:
         """For every number its places, of which none is known for others than components of points and directions."""
-        return [self._places_of(name, field) for name, field in self.fields.items()]
+        own = [self._places_of(name, field) for name, field in self.fields.items()]
+        return own + [[UnknownPlace("factor", 0, i, -1)] for i in range(len(self.factors))]
 
     def _places_of(self, name: str, field: AnyField) -> list[UnknownPlace]:
         if isinstance(field, Field) and field.array in MARKER:
@@ -112,6 +130,7 @@ class Unknowns:
 
     def mechanism(self, values: Array) -> Mechanism:
         """The mechanism with the numbers ``values (u,)``."""
+        values = values[: len(self.fields)]
         points = {
             name: value for (name, field), value in zip(self.fields.items(), values, strict=True) if _on_link(field)
         }
@@ -126,10 +145,6 @@ class Unknowns:
             assert isinstance(field, ItemField)
             links[field.index] = field.changed(links[field.index], float(value))
         return m.replace(links=links)
-
-    def values_of(self, m: Mechanism) -> Array:
-        """The numbers ``(u,)`` that a mechanism has."""
-        return np.array(list(field_values(m, self.fields).values()), dtype=float)
 
 
 def _on_link(field: AnyField) -> bool:
@@ -160,7 +175,7 @@ def mattering(m: Mechanism, k: int, candidates: Sequence[str]) -> list[str]:
 
 
 def _told(m: Mechanism, k: int, side: int) -> Array:
-    """Rows ``(n, 6)`` that vanish for twists of the place of a pair, on both links or on that of a side, by which its motions stay the same."""
+    """Rows ``(n, 6)`` that vanish for twists of a pair's place, on both links or on that of a side, by which its motions stay the same."""
     pair = m.pairs[k]
     alone = Mechanism(pair.name, [m.link(pair.a), m.link(pair.b)], [pair], planar=m.planar)
     zero = np.zeros((3, 2))

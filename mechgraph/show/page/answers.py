@@ -11,7 +11,7 @@ import numpy as np
 from mechgraph.document import plain
 from mechgraph.errors import DeclarationError, MechgraphError, MechgraphWarning, counted
 from mechgraph.kinetostatics import kinematics
-from mechgraph.maths.se3 import Array
+from mechgraph.maths.se3 import Index
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.result.values import driver_value
 from mechgraph.show.page.content import MOST_ITEMS, Data, Figure
@@ -61,7 +61,7 @@ class _ShownAnswer:
         self.scene = scene_at(self.m, place, np.arange(len(self.words)))
         self.figure = Figure(self.scene, {name: X[self.rows[:1]] for name, X in self.scene.frames.items()})
 
-    def _led(self) -> tuple[list[str], Array, DrawnPlace] | None:
+    def _led(self) -> tuple[list[str], Index, DrawnPlace] | None:
         """Positions over the driver, those of the rows among them; None where it does not lead from the first one to all others."""
         if self.found.driver is None:
             return None
@@ -90,7 +90,7 @@ class _ShownAnswer:
         poses = {name: X[good, i] for i, name in enumerate(names)}
         return words, rows, DrawnPlace(poses, {p.name: s[p.name].position[good].T for p in self.m.pairs})
 
-    def _at_rows(self) -> tuple[list[str], Array, DrawnPlace]:
+    def _at_rows(self) -> tuple[list[str], Index, DrawnPlace]:
         """The rows alone, each for a while."""
         steps, names = 8, self.m.freedom_names()
         which = np.repeat(np.arange(len(self.q)), steps)
