@@ -276,6 +276,29 @@ def test_turns_count_on_flat_belts_whose_centers_move():
     np.testing.assert_allclose(s["i"].position[:, 0] + s["arm"].position[:, 0], -1.25 * turns, atol=1e-8)
 
 
+def test_a_serpentine_belt_is_checked_though_a_small_motion_would_let_pulleys_meet() -> None:
+    """Five pulleys, two on the back, one of them on an arm: what is near its geometry is looked for without leaving the belt."""
+    at = {
+        "crank": (0, 0),
+        "alternator": (0.2, 0.1),
+        "idler": (0.125, 0.14),
+        "steering": (0.02, 0.24),
+        "pump": (-0.06, 0.13),
+    }
+    radii = (0.07, 0.03, 0.035, 0.06, 0.05)
+    pairs = [mg.Pair(k, "R", "arm" if k == "idler" else "frame", k, point=p) for k, p in at.items()]
+    m = mg.Mechanism(
+        "serpentine belt",
+        pairs=[*pairs, mg.Pair("arm", "R", "frame", "arm", point=(0.15, 0.21))],
+        gears=[mg.Pulley(k, k, p, radius=r) for (k, p), r in zip(at.items(), radii, strict=True)],
+        couplings=[mg.BeltDrive("belt", over=[*at], backs=["idler", "pump"], toothed=False)],
+        drives=["crank"],
+        loads=[mg.TorsionSpring("arm", stiffness=40.0, free=-1.0)],
+        planar=True,
+    )
+    assert "Determinate (planar): 1 driver, 18 unknowns, 18 equations" in str(mg.check(m))
+
+
 @pytest.mark.parametrize("turns_on_it", [False, True])
 def test_a_pulley_on_an_eccentric_goes_round_and_round(turns_on_it):
     """A pulley 3 mm off its shaft: with every turn of that the arm returns, and a length 2 pi r of belt has passed."""

@@ -604,9 +604,11 @@ def _followed(system: System, x: Array, rank: int, step: float, open_: float) ->
 
 
 def _closed(system: System, x: Array, rank: int, times: int = 4) -> Array:
-    """States ``(nx, T)`` after some least-squares corrections with the ``rank`` largest singular values."""
+    """States ``(nx, T)`` after some least-squares corrections with the ``rank`` largest singular values; NaN where belts or teeth let go."""
     for _ in range(times):
         here = Configuration(system, x)
+        if not np.isfinite(here.J).all():
+            return np.full_like(x, np.nan)
         U, s, Vt = np.linalg.svd(here.J.transpose(2, 0, 1), full_matrices=False)
         part = np.einsum("tmr,mt->tr", U[:, :, :rank], here.residual) / s[:, :rank]
         x = system.advance(x, -np.einsum("tr,trn->nt", part, Vt[:, :rank]))
