@@ -276,6 +276,7 @@ def test_turns_count_on_flat_belts_whose_centers_move():
     np.testing.assert_allclose(s["i"].position[:, 0] + s["arm"].position[:, 0], -1.25 * turns, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_a_serpentine_belt_is_checked_though_a_small_motion_would_let_pulleys_meet() -> None:
     """Five pulleys, two on the back, one of them on an arm: what is near its geometry is looked for without leaving the belt."""
     at = {

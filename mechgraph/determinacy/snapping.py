@@ -604,7 +604,7 @@ def _followed(system: System, x: Array, rank: int, step: float, open_: float) ->
 
 
 def _closed(system: System, x: Array, rank: int, times: int = 4) -> Array:
-    """States ``(nx, T)`` after some least-squares corrections with the ``rank`` largest singular values; NaN where belts or teeth let go."""
+    """States ``(nx, T)`` after some least-squares corrections with the ``rank`` largest singular values; NaN where a belt lets go."""
     for _ in range(times):
         here = Configuration(system, x)
         if not np.isfinite(here.J).all():
