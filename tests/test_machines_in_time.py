@@ -250,17 +250,10 @@ def _impacts() -> Iterator[Motion]:
 
 
 def _pins(r: mg.Response) -> float:
-    """Size of what both pins of the crank give it."""
-    pairs, strike = r._course.mechanism.pairs, r.events[0].impulses
-    return float(
-        np.linalg.norm(
-            sum(
-                (1 if pair.b == "crank" else -1) * strike[pair.name][3:]
-                for pair in pairs
-                if "crank" in (pair.a, pair.b)
-            )
-        )
-    )
+    """Size of what both pins of the crank give it in its plane."""
+    strike, ends = r.events[0].impulses, {pair.name: pair.b for pair in r._course.mechanism.pairs}
+    given = (strike[name][3:5] * (1 if ends[name] == "crank" else -1) for name in "AB")
+    return float(np.linalg.norm(sum(given)))
 
 
 # --- declared otherwise -----------------------------------------------------------------------------------------------------
@@ -351,7 +344,7 @@ def fits(motion: Motion, form: str) -> bool:
 
 def off(expected: float, found: float) -> float:
     """The error of a number, over its size."""
-    return abs(found - expected) / (abs(expected) or 1.0)
+    return float(np.nan_to_num(abs(found - expected) / (abs(expected) or 1.0), nan=np.inf))
 
 
 DAILY = [(18, "as it is"), (20, "mm, t"), (21, "moved"), (22, "swapped"), (23, "numpy")]

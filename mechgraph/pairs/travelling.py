@@ -382,7 +382,7 @@ def across(curve: Curve, place: AlongCurve, z: Sequence[float] | Array | None) -
     k, y = here.k[:, 0], here.y[:, 0]
     # digits to which the direction of a plane is rounded, for the same reason
     along, beside = (round(v / float(np.linalg.norm(z)), 12) for v in (k @ np.asarray(z), y @ np.asarray(z)))
-    return curve.replace(frame="guided", guide=along * k + beside * y) if beside else curve
+    return curve.replace(frame="guided", guide=along * k + beside * y) if beside or along < 0.0 else curve
 
 
 def center_path(curve: Curve, roller: float | None, point: Sequence[float] | None) -> Curve:
