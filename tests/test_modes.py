@@ -674,6 +674,20 @@ def test_an_assembly_that_rounding_had_told_apart_from_itself_is_one() -> None:
     assert (known.x.shape[1], moved.shape[1]) == (4, 4)
 
 
+def test_tracks_to_infinity_are_none_that_come_to_an_assembly_elsewhere() -> None:
+    """A horizontal platform on a usual base: twelve of forty tracks have no end, and Newton leads from there to ends of others.
+
+    That eight of the others are real was found by Newton from 400 random poses of the platform, with the lengths of the legs alone.
+    """
+    feet, heads = (
+        np.array([[r * np.cos(a), r * np.sin(a), z] for a in np.deg2rad(angles)])
+        for r, z, angles in ((1.0, 0.0, [-10, 10, 110, 130, 230, 250]), (0.6, 1.0, [-50, 50, 70, 170, 190, 290]))
+    )
+    modes = mg.assemblies(platform(feet, heads), {f"P{i}": 0.0 for i in range(6)})
+    assert (len(modes), len(modes.complex), modes.infinite, modes.completeness) == (8, 20, 12, "proved")
+    assert "Some paths failed" not in str(modes)
+
+
 def test_a_platform_on_a_sphere_has_not_the_bound_of_one_in_a_plane() -> None:
     """Spherical triads have eight assemblies, planar ones six."""
 

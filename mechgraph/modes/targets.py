@@ -243,21 +243,24 @@ class _Told:
         self.regular &= (self.least == MODES.one_assembly) | unreal
         some = np.flatnonzero(run.singular)
         closed, error = close_all(self.system, self.x[:, some], family.columns)
-        self.doubtful, some = int((error >= CLOSED).sum()), some[error < CLOSED]
-        self.x[:, some] = closed[:, error < CLOSED]
+        # an assembly at the end of a track is close to it; what closes elsewhere has come to infinity, and Newton leads anywhere from there
+        moved = np.abs(family.prints(Configuration(self.system, closed)) - self.poses[:, some]).max(axis=0, initial=0.0)
+        near = (error < CLOSED) & (moved <= FAR_APART * size[some])
+        self.doubtful, some = int((~near).sum()), some[near]
+        self.x[:, some] = closed[:, near]
         ends = np.union1d(np.flatnonzero(self.regular), some)
         weak = ends[irregular(family, Configuration(self.system, self.x[:, ends]))]
         # what was led round has come to a regular point, to which no other track comes
         self.regular[np.setdiff1d(some, weak)] = True
-        near = {i: Nearby(family, self.system, self.x[:, [i]]) for i in weak.tolist()}
-        self.moving[weak] = [about.moves for about in near.values()]
+        about = {i: Nearby(family, self.system, self.x[:, [i]]) for i in weak.tolist()}
+        self.moving[weak] = [one.moves for one in about.values()]
         self.regular[self.moving] = False
         self._print()
         left = weak[~self.moving[weak]]
         while left.size:
             apart = np.abs(self.poses[:, left] - self.poses[:, left[:1]]).max(axis=0)
             mine = left[apart <= MODES.real_singular * np.maximum(1.0, np.abs(self.poses[:, left[0]]).max())]
-            self._resolve(mine, next((near[i] for i in mine.tolist() if not self.regular[i]), None))
+            self._resolve(mine, next((about[i] for i in mine.tolist() if not self.regular[i]), None))
             left = np.setdiff1d(left, mine)
         self._print()
         self.error = np.where(
