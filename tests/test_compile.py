@@ -329,3 +329,23 @@ def test_a_number_that_opens_redundant_loops_has_no_derivatives() -> None:
     assert np.isnan(found[0])
     assert np.isfinite(found[1])
     assert c.status == "ok"
+
+
+def test_what_is_not_unique_has_no_derivative():
+    """Of a component that may be any number the derivative is none, not zero; those beside it have theirs."""
+    c = mg.compile(mg.load("four-bar"))
+    c(0.7, 2.0, 1.0)
+    slope = c.gradient("B.reaction", ["coupler.mass"])[:, 0]
+    assert (np.isnan(slope) == np.isnan(c.reaction("B"))).all()
+    assert np.isfinite(slope).sum() == 3
+
+
+def test_viscous_friction_that_begins_at_zero():
+    """Tables are as long with as without: set in place, and its derivative."""
+    m = mg.load("four-bar")
+    m = m.replace(loads=[*m.loads, mg.Friction("C", mu=0.1, radius=0.02)])
+    c, name = mg.compile(m), f"loads[{len(m.loads) - 1}].viscous"
+    before = c(0.7, 2.0, 1.0)[0]
+    slope = c.gradient("A.effort", [name])[0]
+    c.parameters[name] = 1e-4
+    assert c(0.7, 2.0, 1.0)[0] - before == pytest.approx(1e-4 * slope, rel=1e-5)

@@ -268,6 +268,23 @@ def test_turned_flanks_in_files_of_c_and_derivatives(tmp_path):
     assert slope == pytest.approx((efforts[0] - efforts[1]) / 2e-4, rel=1e-6)
 
 
+def test_teeth_of_unknown_size_have_an_efficiency_in_files_of_c():
+    """How fast they slide is not known, which is no number in a file; derivatives are those of differences."""
+    m = rough_train(7)
+    c = mg.compile(m)
+    c(0.15, 1.3, 0.4)
+    assert np.isfinite(c.P).all()
+    slope, mass = c.gradient("S0.effort", ["l0.mass"])[0], c.parameters["l0.mass"]
+    efforts = []
+    for part in (1.001, 0.999):
+        c.parameters["l0.mass"] = part * mass
+        efforts.append(c(0.15, 1.3, 0.4)[0])
+    assert slope == pytest.approx((efforts[0] - efforts[1]) / (0.002 * mass), rel=1e-6)
+    assert differ(m, turning(m)) < 1e-9
+    rubs = mg.solve(m, turning(m), engine="compiled")
+    assert np.isnan(rubs._values.at_places("speeds", "g2")).all()
+
+
 def test_teeth_that_rub_in_time():
     """They may hold each other at rest, where the kernel does not follow them: numpy does, by whatever engine is free to choose."""
     m = rough_train(2)

@@ -22,7 +22,8 @@ static const double STEP = 1e-40; /* its square is lost beside a derivative of a
 /* Bytes of memory for mgk_derivative, P having `count` numbers. */
 size_t mgk_derivative_size(const int *I, int count) { return mgk_state_size(I) + (count + I[MGK_STATES]) * sizeof(number); }
 
-static double derivative(number value) { return cimag(value) / STEP; }
+/* What is not unique has no derivative either. */
+static double derivative(number value) { return isnan(creal(value)) ? creal(value) : cimag(value) / STEP; }
 
 /* Derivatives along dP[count] at the closed state x, the drives moving as in motion[3][drives] (q, which stands in x, v, a): of efforts,
  * reactions and coordinates as of mgk_solve; of a rotation the rate w = 2 q' q^-1 in place of that of the coordinates. */

@@ -1389,7 +1389,7 @@ static void rubs_between(const Model *m, const Work *w, const int *load, double 
   }
   *speed = made_unit(u, TURNING * size_of(twist, 6));
   if (slides) force_at(at, u, 1.0, U);
-  else memcpy(U, u, sizeof u), *speed *= arm;
+  else memcpy(U, u, sizeof u), *speed = REAL_PART(arm) < 0.0 ? NAN : *speed * arm;
   const double part = fabs(efficiency) > 0.0 ? part_lost(push, X, n + MGK_SCREWS, twist, U, efficiency) : (slides ? 1.0 : arm) * coefficient(n, *speed);
   FOR(i, 6) D[i] = -part * U[i];
   *reads = sign * per;

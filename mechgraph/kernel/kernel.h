@@ -57,7 +57,7 @@ enum { MGK_WEIGHT, MGK_WRENCH, MGK_EFFORT, MGK_LAW, MGK_BETWEEN, MGK_TABLE, MGK_
  * a contact: the factor before which the frame of its normal force stands), radius, part of the force that a friction circle leaves (1) or
  * not (0), pitch, one over the distance of two places on an axis with the side on which it lies (0: in the middle), width of a guide,
  * tangent of the flank of a thread. Of teeth in place of a pair the number among the lines; the radius is the arm at which they slide against
- * each other's turn, or where a slide is named (1) they slide at their point. Behind the others their efficiency (0: they have a
+ * each other's turn, negative where that is not known, or where a slide is named (1) they slide at their point. Behind the others their efficiency (0: they have a
  * coefficient); for both flanks the normal force of a unit multiplier and the point, screws of gears a and b in the frame of the carrier. */
 enum { MGK_MU, MGK_STATIC, MGK_SPEED, MGK_PRELOAD, MGK_AT_B, MGK_TURN_OF, MGK_SLIDE_OF, MGK_RADIUS, MGK_CIRCLE, MGK_PITCH, MGK_SIDE, MGK_WIDTH, MGK_FLANK, MGK_EFFICIENCY, MGK_PER, MGK_MESHES_AT = MGK_PER + 2, MGK_SCREWS = MGK_MESHES_AT + 6 };
 

@@ -653,7 +653,8 @@ def _friction(places: _Places, load: Any, out: Acting) -> None:
             s.par.pitch[k], rubs.side and rubs.side / (load.length / L), width / L, np.tan(load.flank),
         )  # fmt: skip
         out.add(CONTACT + RUBBING.index(rubs.way), k, 0, *(np.atleast_2d(np.asarray(v, dtype=float)) for v in numbers))
-    for j, freedom in enumerate(row.freedoms if load.viscous else ()):
+    # also where it is zero: the layout of a table does not hang on its numbers
+    for j, freedom in enumerate(row.freedoms if len({f.turns for f in row.freedoms}) == 1 else ()):
         unit = 1.0 if not freedom.turns else L**-2
         out.add(LAW, first + j, 0, *rows((0.0, 0.0), 2)[:, None], np.atleast_2d(load.viscous * unit))
 
@@ -667,11 +668,12 @@ def _friction_of_teeth(places: _Places, load: Any, out: Acting) -> None:
     at = on_carrier(s, g)
     assert at is not None
     arm, line = mean_sliding(s.m, s.m.couplings[g]), sum(bool(c.steps) for c in s.m.couplings[:g])
+    radius = 0.0 if arm is None else -1.0 if np.isnan(arm) else arm / L
     R, p = places.own[:, :3, [at.link]], places.own[:, 3, [at.link]]
     turn, slide = rotate(R, at.screws[:3]), rotate(R, at.screws[3:])
     mu, stribeck, efficiency = (0.0 if v is None else v for v in (load.mu, load.stribeck, load.efficiency))
     numbers = (
-        mu, load.coefficient_at_rest, stribeck / L, load.preload / L, 0.0, -1, arm is None, (arm or 0.0) / L, 0.0, 0.0, 0.0, 0.0, 0.0,
+        mu, load.coefficient_at_rest, stribeck / L, load.preload / L, 0.0, -1, arm is None, radius, 0.0, 0.0, 0.0, 0.0, 0.0,
         efficiency, *at.per, *_by_item(rotate(R, at.points) + p), *_by_item(np.concatenate([turn, slide + cross(p, turn)])),
     )  # fmt: skip
     out.add(CONTACT + len(RUBBING), line, 0, *(np.atleast_2d(np.asarray(v, dtype=float)) for v in numbers))
