@@ -126,6 +126,22 @@ LADDER: dict[str, Callable[[], Rung]] = {
     "geared five-bar path, 3 points, timed": lambda: (
         geared_five_bar(), mg.path("rod.tip", _rows(3, 2, (1.5, 1.5)), at={"A": [0, -0.2, -0.45]}), ["B.point", "D.point"], 1,
     ),
+    "four-bar, a pose and two points": lambda: (
+        four_bar(), mg.positions([{}, {"coupler": (0.3, -0.2, 0.4)}, {"coupler.tip": (1.2, 1.6)}, {"coupler.tip": (0.9, 1.7)}]),
+        ["B.point", "C.point"], 6,
+    ),
+    "four-bar, function and path, 3 rows": lambda: (
+        four_bar(), [mg.function("A", "D", _rows(3, 2)), mg.path("coupler.tip", _rows(3, 2, (1.5, 1.2)))],
+        ["B.point", "C.point", "D.point"], 1,
+    ),
+    "four-bar, a timed point and a pose": lambda: (
+        four_bar(),
+        [
+            mg.path("coupler.tip", [(1.5, 1.2), (1.2, 1.6), (np.nan, np.nan)], at={"A": [0, 0.4, np.nan]}),
+            mg.poses("coupler", [[0] * 3, [np.nan] * 3, [0.3, -0.2, 0.4]]),
+        ],
+        ["B.point", "C.point"], 1,
+    ),
     "four-bar of two dyads, 5 poses": lambda: (
         four_bar(), mg.poses("coupler", _rows(5, 3)), ["A.point", "B.point", "C.point", "D.point"], 12,
     ),

@@ -1,6 +1,8 @@
 """Synthesis: all mechanisms that do what is asked, their number, and that each one does it."""
 
+import io
 import pickle
+import sys
 from typing import Any
 
 import numpy as np
@@ -193,6 +195,38 @@ def test_a_function_up_to_a_factor_is_done_by_larger_and_smaller_mechanisms() ->
     assert np.sort(s.values, axis=0) == pytest.approx(np.sort(wanted, axis=0), abs=1e-8)
 
 
+ANGLES = np.array([0.0, 0.4, 0.8, 1.2])
+MIXED: dict[str, Any] = {
+    "a pose and two points": (
+        lambda pose, tip, _: mg.positions([{}, {"coupler": pose[1]}, {"coupler.tip": tip[2]}, {"coupler.tip": tip[3]}]),
+        ["B.point", "C.point"], 6,
+    ),
+    "function and path": (
+        lambda _, tip, pairs: [mg.function("A", "D", pairs[:3]), mg.path("coupler.tip", tip[:3])],
+        ["B.point", "C.point", "D.point"], 1,
+    ),
+    "a timed point and a pose": (
+        lambda pose, tip, _: [
+            mg.path("coupler.tip", [tip[0], tip[1], [np.nan] * 2], at={"A": [0, 0.4, np.nan]}),
+            mg.poses("coupler", [[0] * 3, [np.nan] * 3, pose[2]]),
+        ],
+        ["B.point", "C.point"], 1,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MIXED)
+def test_a_four_bar_is_found_again_from_tasks_that_mix(name: str) -> None:
+    task, unknown, total = MIXED[name]
+    s = mg.kinematics(four_bar(B=(0.4, 0.9), C=(1.9, 1.6)), {"A": ANGLES})
+    X = s.link("coupler").pose
+    pose = np.column_stack([X[:, :2, 3], np.arctan2(X[:, 1, 0], X[:, 0, 0])])
+    asked = task(pose, s.link("coupler").at("tip").position[:, :2], np.column_stack([ANGLES, s["D"].position]))
+    found = mg.synthesize(four_bar(), asked, unknown)
+    assert (found.total, found.completeness) == (total, "tested")
+    assert np.abs(found.values[:, :4] - (0.4, 0.9, 1.9, 1.6)).max(axis=1).min() < 1e-9
+
+
 def test_a_geared_five_bar_is_found_again_from_its_path() -> None:
     m, angles = geared_five_bar(B=(0.3, 1.0), D=(2.7, 1.2)), np.array([0, -0.2, -0.45])
     tip = mg.kinematics(m, {"A": angles}).link("rod").at("tip").position[:, :2]
@@ -216,6 +250,36 @@ def test_a_start_set_serves_whatever_the_order_of_pairs_links_and_unknowns(name:
         assert start is not None
         assert start.x.shape[1] == total
         assert of.error(of.at(start.member, start.x)).max() < 1e-9
+
+
+def test_the_first_task_of_a_kind_is_told_before_it_takes_its_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the progress that is given, else where somebody looks at a terminal."""
+
+    class Enough(Exception):
+        """What was to be told has been told."""
+
+    class Screen(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+        def write(self, text: str) -> int:
+            written = super().write(text)
+            listen(self.getvalue())
+            return written
+
+    def listen(text: str) -> None:
+        if "further one" in text:
+            raise Enough
+        words.append(text)
+
+    asked = dyad(), mg.poses("body", [(0, 0, 0), (1, 0.5, 0.4)], at={"A": [0, 0.3]}), ["B.point"]
+    for progress in (listen, None):
+        words = list[str]()
+        with monkeypatch.context() as patch:
+            patch.setattr(sys, "stderr", Screen())
+            with pytest.raises(Enough):
+                mg.synthesize(*asked, cache=False, progress=progress)
+        assert "first task of its kind" in "".join(words)
 
 
 def test_of_an_element_only_what_matters_is_sought() -> None:

@@ -664,8 +664,8 @@ def assemblies(mechanism: opt.Named, at: opt.At = None, out: Picture = None, jso
     values = {m.full_name(name): value for name, value in (opt.values_of(m, at) or {}).items()}
     if values.keys() <= at_start.keys():
         values = at_start | values
-    with opt.working(f"assemblies of {m.name}"):
-        found = mg.assemblies(m, values)
+    with opt.working(f"assemblies of {m.name}") as say:
+        found = mg.assemblies(m, values, progress=say)
         figure = found.plot() if out is not None and len(found) else None
     _tell_found("assemblies", found, figure, out, json)
     if not len(found):
@@ -729,8 +729,8 @@ def synthesize(
         opt.refuse("synthesize", "what is asked? The mechanism has no [synthesis] that says it")
     if m.synthesis.sweep:
         opt.refuse("synthesize", "[synthesis] has a sweep, which has no command; call mg.synthesize")
-    with opt.working(f"synthesis of {m.name}"):
-        found = mg.synthesize(m)
+    with opt.working(f"synthesis of {m.name}") as say:
+        found = mg.synthesize(m, progress=say)
         found = found.good if good else found
         found = found if rank is None else found.ranked(rank)
         figure = found.plot() if plot is not None and len(found) else None

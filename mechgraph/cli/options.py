@@ -240,15 +240,15 @@ def show(document: Document, colour: str = "") -> None:
 
 
 @contextmanager
-def working(what: str) -> Iterator[None]:
-    """A spinner with the time passed on stderr, where that is a terminal."""
+def working(what: str) -> Iterator[Callable[[str], None] | None]:
+    """A spinner with the time passed on stderr, where that is a terminal; ``say(text)`` tells what is done."""
     if not is_terminal(sys.stderr):
-        yield
+        yield None
         return
     columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
     with Progress(*columns, console=Console(stderr=True), transient=True) as spinner:
-        spinner.add_task(what)
-        yield
+        task = spinner.add_task(what)
+        yield lambda text: spinner.update(task, description=f"{what}: {text}")
 
 
 @contextmanager

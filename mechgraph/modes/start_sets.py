@@ -53,7 +53,7 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.errors import MechgraphError
+from mechgraph.errors import MechgraphError, counted
 from mechgraph.files import cache_folder, whole_file
 from mechgraph.graph.linkgraph import components_of_edges
 from mechgraph.kinematics.state import Configuration
@@ -536,7 +536,9 @@ class TrackGroup:
             if (N := self.x.shape[1]) >= self.most or self.chance <= missed or self.followed >= MOST_TRACKED:
                 break
             if progress is not None:
-                progress(f"{N} assemblies of a random member, {self.quiet} loops without a further one")
+                progress(
+                    f"{counted(N, 'solution')} of a random member so far, {self.quiet} loops brought no further one"
+                )
             # so many that where none brings a further one they are enough, and no fewer than are followed at the cost of one
             enough = int(np.ceil(np.log(missed / self.chance) / -np.log(N + 1.0)))
             # 96 tracks are followed together at least, of as many loops as it takes: a step of so many costs little more than one of few

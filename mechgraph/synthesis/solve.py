@@ -10,9 +10,11 @@ sum of a combination of the unknowns over all solutions depends rationally.
 
 from __future__ import annotations
 
+import sys
 import zipfile
 from collections.abc import Callable
 from fractions import Fraction
+from functools import partial
 from math import lcm, prod
 from pathlib import Path
 from typing import Any
@@ -247,10 +249,19 @@ def _account(of: TaskClass, known: TaskEnds, run: TrackRun, lost_before: int) ->
 
 
 def start_of(of: TaskClass, rng: np.random.Generator, cache: bool, progress: Progress) -> TaskStart:
-    """The start set of a class: a kept one, or else one that is made, and kept where it is whole."""
+    """The start set of a class: a kept one, or else one that is made, and kept where it is whole.
+
+    That takes so long that somebody who looks at a terminal or a notebook is told of it unasked.
+    """
     known = kept(of) if cache else None
     if known is not None:
         return known
+    if progress is None and sys.stderr is not None and (sys.stderr.isatty() or "ipykernel" in sys.modules):
+        progress = partial(print, "mg.synthesize:", file=sys.stderr, flush=True)
+    if progress is not None:
+        progress(
+            "first task of its kind: all solutions of a random one are worked out, and kept for others; seconds to minutes"
+        )
     made = start_set(of, rng, progress)
     if cache and (made.word == "tested" or made.chance <= MISSED_AGAIN):
         _keep(of, made)

@@ -452,7 +452,7 @@ def synthesize(
     cache : bool
         Keep start solutions in the user's folder.
     progress : callable, optional
-        Called with a line of text now and then.
+        Called with a line of text now and then. Default: a terminal or notebook shows those of the first task of a kind.
 
     Returns
     -------
