@@ -26,7 +26,7 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import ClassVar, assert_never
 
-from mechgraph.errors import visible
+from mechgraph.errors import TellsNames, visible
 from mechgraph.memo import Remembers, dataclass
 from mechgraph.quantities import with_doors, with_memory
 
@@ -697,7 +697,7 @@ def _declared(sign: str) -> str:
     return rf"\DeclareUnicodeCharacter{{{ord(sign):04X}}}{{{meaning}}}"
 
 
-class Shown(Remembers, ABC):
+class Shown(Remembers, TellsNames, ABC):
     """Something that a document tells: ``print(x)`` shows it as text, a notebook as HTML, what a notebook exports as LaTeX.
 
     At a prompt it shows the same text; a class whose document is long or takes time has a line of its own there (``__repr__``).

@@ -48,6 +48,30 @@ def did_you_mean(near: Sequence[str]) -> str:
     return f"did you mean {' or '.join(near)}?" if near else ""
 
 
+class UnknownAttribute(AttributeError):
+    """A name that something has not, told with those that may be meant."""
+
+    def __init__(self, of: object, name: str) -> None:
+        super().__init__()
+        self._of, self._name = of, name
+
+    def __str__(self) -> str:
+        known = [name for name in dir(self._of) if not name.startswith("_")]
+        hint = did_you_mean(near_names(self._name, known, 0.6)[:2])
+        return f"{type(self._of).__name__} has no attribute {self._name!r}{hint and f'; {hint}'}"
+
+
+class TellsNames:
+    """Something that tells names which it has for one that it has not."""
+
+    __slots__ = ()
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            raise UnknownAttribute(self, name)
+
+
 def counted(number: int, name: str) -> str:
     """``1 node of the path``, ``2 nodes of the path``."""
     first, *rest = name.split(" ", 1)

@@ -528,7 +528,7 @@ def _called(function: Callable[..., Any], args: tuple[Any, ...]) -> str:
 
 
 def _told(signature: inspect.Signature) -> str:
-    return ", ".join(name for name in signature.parameters if name != "self")
+    return ", ".join(name for name in signature.parameters if name not in ("self", "cls")) or "no arguments"
 
 
 # --- what annotations say ----------------------------------------------------------------------------------------------------

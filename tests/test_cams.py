@@ -497,3 +497,38 @@ def test_the_discs_of_a_conjugate_cam_keep_their_rollers_apart():
     other = one.conjugate(0.06)
     apart = np.linalg.norm(one.at(u)[0] - other.at(u)[0], axis=0)
     np.testing.assert_allclose(apart, apart[0], rtol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (
+            lambda: mg.least_base_radius(LAW, roller=0.008),
+            "unexpected keyword argument 'roller'; did you mean follower or roller_radius?",
+        ),
+        (lambda: mg.cam_laws(3), "too many positional arguments; it takes no arguments"),
+        (lambda: SHAPES["flat"].cutter_path(raduis=0.01), "Cam.cutter_path"),
+        (lambda: SHAPES["flat"].write("x.dxf", eror=1e-5), "did you mean error?"),
+        (lambda: SHAPES["flat"].facts(), "missing a required argument: 'angle'"),
+        (lambda: LAW.at(), "missing a required argument: 'angle'"),
+        (lambda: mg.CamLaw.read("x.csv", agle="a"), "did you mean angle"),
+    ],
+)
+def test_calls_that_do_not_fit_are_faults(call, words):
+    with pytest.raises(mg.DeclarationError) as error:
+        call()
+    assert words in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("of", "name", "meant"),
+    [
+        (lambda: SHAPES["flat"].facts(1.0), "presure_angle", "pressure_angle"),
+        (lambda: LAW, "seam", "seams"),
+        (lambda: mg.check(mg.load("four-bar")), "mobilty", "mobility"),
+    ],
+)
+def test_names_that_a_result_has_not(of, name, meant):
+    with pytest.raises(AttributeError, match=f"has no attribute '{name}'; did you mean {meant}"):
+        getattr(of(), name)
+    assert getattr(of(), name, None) is None

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mechgraph.errors import DeclarationError
+from mechgraph.errors import DeclarationError, TellsNames
 from mechgraph.memo import dataclass
 from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.gears import Gear, GearRack, involute, tip_radius
 from mechgraph.model.meshes import Bevels, Mesh, Meshing, Parallel, WithRack
 from mechgraph.model.pair import Link, Pair
 from mechgraph.model.response_setup import Stop
-from mechgraph.quantities import door
+from mechgraph.quantities import ByName, door
 
 if TYPE_CHECKING:
     from mechgraph.model.mechanism import Mechanism
@@ -28,7 +28,7 @@ NAN2 = (float("nan"), float("nan"))
 
 
 @dataclass(frozen=True)
-class MeshFacts:
+class MeshFacts(TellsNames):
     """What a mesh amounts to at the declared places, lengths in the units of the mechanism; NaN and empty where it has no such thing.
 
     Attributes
@@ -98,7 +98,8 @@ def mesh_facts(m: Mechanism) -> dict[str, MeshFacts]:
     """
     if not m.has_geometry:
         raise DeclarationError(f"mechanism {m.name!r}", ["has no geometry; meshes have facts at their places"])
-    return {c.name: _facts(m, c) for c in m.couplings if isinstance(c, Meshing) and c.sized}
+    found = ((c.name, _facts(m, c)) for c in m.couplings if isinstance(c, Meshing) and c.sized)
+    return ByName(f"mesh_facts {m.name!r}", "mesh", found)
 
 
 def _facts(m: Mechanism, mesh: Meshing) -> MeshFacts:

@@ -39,7 +39,7 @@ from mechgraph.files import text_of
 from mechgraph.maths.se3 import Array
 from mechgraph.memo import Once, dataclass
 from mechgraph.pairs.curves import ORDERS, derivatives
-from mechgraph.quantities import factor_of, has_quantity, items_of, real_array, wrong
+from mechgraph.quantities import door, factor_of, has_quantity, items_of, real_array, wrong
 
 SEAM_ROUNDING = 1e-9
 """Part of the largest value of a derivative below which a jump at a seam is rounding."""
@@ -568,6 +568,7 @@ class CamLaw(Described, Once, Shown):
         """The exact pieces over the turn."""
         return joined(self.parts)
 
+    @door
     def at(self, angle: Any, orders: int = ORDERS) -> Array:
         """Position, slope, bend and jerk at angles of the cam.
 
@@ -649,6 +650,7 @@ class CamLaw(Described, Once, Shown):
         return Document("Cam law", tuple(blocks))
 
     @classmethod
+    @door
     def read(
         cls,
         source: Any,
@@ -777,6 +779,7 @@ class CamLaws(Mapping[str, LawFactors], Shown):
         return Document("Cam laws from dwell to dwell", (Table(("law", "Cv", "Ca", "Cj"), rows),))
 
 
+@door
 def cam_laws() -> CamLaws:
     """Return the standard cam laws, a mapping of name to factors that prints as a table.
 

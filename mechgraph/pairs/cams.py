@@ -18,13 +18,13 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph.errors import DeclarationError
+from mechgraph.errors import DeclarationError, TellsNames
 from mechgraph.fields import FLAG, NUMBER, POSITIVE, SAMPLES, TABLE, TEXT
 from mechgraph.maths.se3 import Array, cross
 from mechgraph.memo import dataclass
 from mechgraph.pairs.cam_laws import CamLaw, LawPieces
 from mechgraph.pairs.curves import INTERVALS, ORDERS, Centred, Pieces, parted
-from mechgraph.quantities import LENGTH, wrong
+from mechgraph.quantities import LENGTH, door, wrong
 
 FACTORIALS = np.array([math.factorial(k) for k in range(ORDERS + 2)], dtype=float)
 
@@ -69,7 +69,7 @@ def _constant(value: float, like: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class CamFacts:
+class CamFacts(TellsNames):
     """Returned by ``curve.facts(angle)``: arrays ``(...)`` over the angles.
 
     ``pressure_angle``: 0 to pi/2, between the normal and the way of the roller's center (of a flat face: of the place where it touches);
@@ -112,6 +112,7 @@ class OfLaw(Centred):
         size: dict[str, Any] = {} if base_radius is None else {"base_radius": base_radius}
         return cls(angle=motion.t, **size, **rates, **more)
 
+    @door
     def conjugate(self, base_radius: float) -> Self:
         """Return the second disc of a conjugate cam: it stands on the same axis and touches a second roller or face of the same follower
         on the other side, so that both discs together guide the follower without a spring.
@@ -220,6 +221,7 @@ class OfLaw(Centred):
         y = self._depth(u)
         return None if y is None else self._turned_back(u, y)
 
+    @door
     def facts(self, angle: Any) -> CamFacts:
         """Compute pressure angle and radii of curvature at angles of the cam.
 
@@ -647,6 +649,7 @@ def largest(of: Callable[[Array], Array], breaks: Array) -> float:
     return float(of(u).max())
 
 
+@door
 def least_base_radius(
     law: CamLaw,
     follower: str = "roller",

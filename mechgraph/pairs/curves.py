@@ -44,7 +44,7 @@ from mechgraph.fields import (
 from mechgraph.maths.se3 import Array, cross
 from mechgraph.maths.tolerances import COMPLEX_STEP, SHAPES
 from mechgraph.memo import Once, dataclass
-from mechgraph.quantities import LENGTH, shown
+from mechgraph.quantities import LENGTH, door, shown
 
 
 @dataclass(frozen=True)
@@ -230,6 +230,7 @@ class Curve(Described, Once):
         """The curve at a distance towards the normal, which is ``y (3,)`` where it begins, where that is a curve with a name too."""
         return None
 
+    @door
     def cutter_path(self, radius: float) -> Curve:
         """Return the path of the center of a cutter that makes the profile: its equidistant on the outside.
 
@@ -260,6 +261,7 @@ class Curve(Described, Once):
         made: Curve = methods.call("cutter_path", self, radius)
         return made
 
+    @door
     def write(
         self,
         path: Any,
