@@ -532,3 +532,17 @@ def test_names_that_a_result_has_not(of, name, meant):
     with pytest.raises(AttributeError, match=f"has no attribute '{name}'; did you mean {meant}"):
         getattr(of(), name)
     assert getattr(of(), name, None) is None
+
+
+def test_a_curve_with_faults_has_no_facts_and_is_not_written(tmp_path):
+    """Slopes 60 % too large; no law at all."""
+    u = np.linspace(0, 2 * np.pi, 181)
+    wrong = mg.Curve.cam(
+        angle=u, lift=0.01 * (1 - np.cos(u)), slope=0.016 * np.sin(u), bend=0.01 * np.cos(u), base_radius=0.03
+    )
+    none = mg.Curve.cam(lift=[0, 1], base_radius=0.03)
+    for cam, words in ((wrong, "slope: is not the derivative of lift"), (none, "law: is missing")):
+        with pytest.raises(mg.DeclarationError, match=words):
+            cam.facts(1.0)
+        with pytest.raises(mg.DeclarationError, match=words):
+            cam.write(tmp_path / "cam.csv", error=1e-5)

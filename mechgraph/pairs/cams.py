@@ -241,6 +241,7 @@ class OfLaw(Centred):
         >>> mg.Curve.barrel(law=law, radius=0.05).facts(1.0).pressure_angle.round(6)
         np.float64(0.380506)
         """
+        self.sound("facts")
         u = np.asarray(angle, dtype=float)
         u = u - self.ends[1] * np.floor(u / self.ends[1])
         y, k = self._seen(u), self._depth(u)

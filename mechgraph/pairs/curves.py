@@ -27,6 +27,7 @@ import numpy as np
 import scipy
 
 from mechgraph import methods
+from mechgraph.errors import DeclarationError
 from mechgraph.fields import (
     DIRECTION,
     FLAG,
@@ -230,6 +231,11 @@ class Curve(Described, Once):
         """The curve at a distance towards the normal, which is ``y (3,)`` where it begins, where that is a curve with a name too."""
         return None
 
+    def sound(self, what: str) -> None:
+        """Refuse to do something with a curve that has faults (DeclarationError)."""
+        if found := self.once(_faults_of):
+            raise DeclarationError(f"{what} of a curve", found)
+
     @door
     def cutter_path(self, radius: float) -> Curve:
         """Return the path of the center of a cutter that makes the profile: its equidistant on the outside.
@@ -304,6 +310,7 @@ class Curve(Described, Once):
         >>> path.read_text().splitlines()[0]
         'parameter,profile x,profile y,profile z'
         """
+        self.sound("write")
         methods.call("write_curve", self, path, error=error, cutter=cutter, form=form, unit=unit)
 
     @property
@@ -544,6 +551,10 @@ class CurvePlace:
 
 def _dot(a: Array, b: Array) -> Array:
     return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+def _faults_of(curve: Curve) -> list[str]:
+    return curve.faults("")
 
 
 class Travel:
