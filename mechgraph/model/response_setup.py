@@ -147,10 +147,12 @@ class Stop(Described):
         known = [(one.name, point) for one in m.links for point in one.points if name == f"{one.name}.{point}"]
         return known[0] if known and along in ("Tx", "Ty", "Tz") else None
 
-    def faults(self, m: Nameable) -> list[str]:
+    def faults(self, m: Any) -> list[str]:
         """What is wrong with it."""
         fault = None if self.point(m) is not None else m.freedom_fault(self.freedom, single=True)
-        found = [fault] if fault else []
+        points = ", ".join(f"{link.name}.{point}" for link in m.links for point in link.points)
+        also = f"; coordinates Tx, Ty, Tz of points: {points}" if points else ""
+        found = [fault + also] if fault else []
         limits = {name: value for name in ("lower", "upper") if (value := getattr(self, name)) is not None}
         found += [wrong(v, name, "a finite number") for name, v in limits.items() if not is_numeric(v, ())]
         if not limits:

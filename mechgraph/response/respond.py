@@ -795,7 +795,8 @@ def _occurrences(
     """Follow the motion to its end; yields what happens, in the order of time."""
     it, end, t, crowd = course.integration, float(course.times[-1]), course.begin, 0
     chatter = Chatter(course, course.mechanism.loads, end - t)
-    dq, _, first, found = stops.after(t, x, dq)
+    dq, lost, first, found = stops.after(t, x, dq)
+    it.done = it.done + lost
     yield from found
     while t < end:
         met = None
