@@ -63,14 +63,20 @@ def stepped(end: float, step: float) -> tuple[np.ndarray, list[tuple[float, int,
             along = [np.array([-CRANK * s[0], -ROD * s[1], -x[i][1]]) for i in closed]
             A, n_closed, free = np.array(normal + along), len(closed), now
             D, p = A @ np.linalg.solve(M, A.T), np.zeros(2 * len(closed))
-            for _ in range(200):
+            for _ in range(1000):
+                last = p.copy()
                 for i in range(n_closed):
                     j = n_closed + i
                     p[i] = max(0.0, p[i] - (A[i] @ (free + E * u) + D[i] @ p) / D[i, i])
                     p[j] = np.clip(p[j] - (A[j] @ free + D[j] @ p) / D[j, j], -MU * p[i], MU * p[i])
+                if np.abs(p - last).max() < 1e-14:
+                    break
             now = free + np.linalg.solve(M, A.T @ p)
-            strikes += [((n + 1) * step, int(i) + 1, float(p[m])) for m, i in enumerate(closed) if i not in before]
-        before = set(closed.tolist())
+            pressed = {int(i): float(p[m]) for m, i in enumerate(closed) if p[m] > 0.0}
+            strikes += [((n + 1) * step, i + 1, size) for i, size in pressed.items() if i not in before]
+            before = set(pressed)
+        else:
+            before = set()
         q, u = middle + 0.5 * step * now, now
     return np.concatenate([q, u]), strikes
 
@@ -88,7 +94,7 @@ def test_corners_strike_both_walls_as_two_programs_of_time_stepping_say() -> Non
     (coarse, _), (fine, struck) = (stepped(end, step) for step in (4e-6, 2e-6))
     for got, one in zip(strikes[:8], struck, strict=False):
         assert got[1] == one[1]
-        assert got[0] == pytest.approx(one[0], abs=3e-5)
+        assert got[0] == pytest.approx(one[0], abs=4e-5)
     # errors of first order, extrapolated to steps of nothing: eighteen strikes, slides and the other wall are behind
     crank = r["A"].position[-1, 0]
     np.testing.assert_allclose([crank, crank + r["B"].position[-1, 0]], (2 * fine - coarse)[:2], atol=1e-5)
