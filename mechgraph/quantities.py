@@ -169,7 +169,7 @@ def base_factors(old: Mapping[str, str], new: Mapping[str, str]) -> tuple[float,
         for a unit that is not declared, unknown or of another dimension; MissingExtraError without pint.
     """
     try:
-        registry = importlib.import_module("pint").UnitRegistry()
+        registry = importlib.import_module("pint").get_application_registry()  # made once, in half a second
     except ImportError:
         raise MissingExtraError("pint", "units") from None
     faults, out = [], []

@@ -208,7 +208,10 @@ def test_a_table_tips_over() -> None:
     assert s.status.tolist() == ["ok", "lifts off", "ok"]
     assert np.isnan(loads(s)[:, 1]).all()
     assert np.isfinite(loads(s)[:, [0, 2]]).all()
-    assert "lifts off" in str(s)
+    (note,) = s.warnings
+    assert (note.status, note.positions, note.pairs) == ("lifts off", (1,), ("f0", "f1", "f2", "f3"))
+    assert "f0, f1, f2, f3 only push and cannot bear the loads" in str(note)
+    assert "closed='form'" in " ".join(str(s).split())
 
 
 def test_feet_lift_beside_what_stays_unknown() -> None:

@@ -666,3 +666,64 @@ def test_efforts_at_rest_are_told_to_be_without_friction() -> None:
     told = [str(note) for note in mg.solve(m, {"A": mg.Motion([0.0, 0.1], velocity=[0.0, 1.0])}).warnings]
     assert any("no direction at 1 of 2 positions" in text and "velocity=" in text for text in told)
     assert not mg.solve(m, {"A": mg.Motion(0.0, velocity=1.0)}).warnings
+
+
+@pytest.mark.parametrize(
+    ("height", "mu", "three"),
+    [
+        (0.5, 2.1, True),
+        (5.0, 0.3, True),
+        *(pytest.param(*case, False, marks=pytest.mark.slow) for case in ((0.5, 0.3), (5.0, 0.3), (0.5, 2.1))),
+    ],
+)
+def test_a_table_at_rest_slides_or_tips_first(height: float, mu: float, three: bool) -> None:
+    """Drawn along x at a height: it slides at mu W, or tips about the line of its outer feet at W e / height; on three feet or on four."""
+    at = [(1, 1), (-1, 1), (-1, -1), (1, -1)] if not three else [(1, 1), (-1, 0), (1, -1)]
+    plate = [
+        mg.Pair(f"f{i}", "Sp", "ground", "plate", point=(x, y, 0), axis=Z, closed="force", stiffness={"Fz": 1e6})
+        for i, (x, y) in enumerate(at)
+    ]
+    guide = mg.Pair("G", "Fr", "ground", "plate", point=(0, 0, height), axis=Z)
+    loads = [mg.Wrench("plate", force=(0, 0, -W), point=(0.1, 0.2, 0)), *(mg.Friction(p.name, mu=mu) for p in plate)]
+    m = mg.Mechanism("plate", pairs=[*plate, guide], drives=["G.Tx", "G.Ty", "G.Rz"], loads=loads)
+    s = mg.solve(m, dict.fromkeys(("G.Tx", "G.Ty", "G.Rz"), 0.0), redundant="nan" if three else "elastic")
+    low, high = s["G"].effort_range[0]
+    # on three feet the line from foot (-1, 0) to (1, 1) or (1, -1) bounds the stand too
+    back = 1.1 if not three else 0.1 + 1.0 - 2 * 0.2
+    assert (low, high) == pytest.approx((-min(mu, back / height) * W, min(mu, 0.9 / height) * W), rel=1e-8)
+    assert s.self_locking
+
+
+def test_what_has_no_value_is_told_with_pairs_and_remedy() -> None:
+    """Friction on reactions that are not unique, in motion and at rest; feet that tip; what is flagged; in ``s.warnings`` and in print."""
+    pins = [mg.Pair(k, "R", "frame", "shaft", point=(0, 0, z), axis=Z) for k, z in (("A", 0.0), ("B", 0.3), ("C", 0.5))]
+    dry = [mg.Friction(k, mu=MU, radius=RADIUS) for k in "ABC"]
+    pull = mg.Wrench("shaft", force=(W, 0, 0), point=(0, 0, 0.2))
+    m = mg.Mechanism("shaft", pairs=pins, drives=["A"], loads=[pull, *dry])
+    s = mg.solve(m, {"A": mg.Motion([0.0, 0.1], velocity=[1.0, 0.0])})
+    (note,) = s.warnings
+    assert (note.status, note.positions, note.pairs) == ("friction not determined", (0, 1), ("A", "B", "C"))
+    for words in ("A, B, C", "not unique", "redundant='elastic' with stiffness=", "2 of 2 positions", "A.Rz ="):
+        assert words in str(note)
+    assert "redundant='elastic'" in " ".join(str(s).split())
+    with pytest.raises(mg.DeclarationError, match="its status is 'friction not determined'"):
+        assert mg.solve(m, {"A": 0.1}).self_locking
+    at = [(1, 1), (-1, 0), (1, -1)]
+    feet = [
+        mg.Pair(f"f{i}", "Sp", "frame", "plate", point=(x, y, 0), axis=Z, closed="force") for i, (x, y) in enumerate(at)
+    ]
+    slide = mg.Pair("G", "Fr", "frame", "plate", point=(0, 0, 0), axis=Z)
+    loads = [mg.Wrench("plate", force=(0, 0, -W), point=(2.0, 0, 0)), *(mg.Friction(p.name, mu=MU) for p in feet)]
+    table = mg.Mechanism("table", pairs=[*feet, slide], drives=["G.Tx", "G.Ty", "G.Rz"], loads=loads)
+    with pytest.warns(mg.MechgraphWarning, match="lifts off"):
+        s = mg.solve(table, dict.fromkeys(("G.Tx", "G.Ty", "G.Rz"), 0.0))
+    assert np.isnan(s["G"].effort_range[0]).all()
+    assert "would have to pull there even without friction" in str(s.warnings[-1])
+    with pytest.raises(mg.DeclarationError, match="no known ends of what holds it"):
+        assert s.self_locking
+    out = mg.solve(mg.load("rcsr"), {"O1": np.deg2rad(np.arange(150.0, 220.0))}, on_reach="flag")
+    assert [note.status for note in out.warnings] == ["out of reach"]
+    assert "another start" in str(out.warnings[0])
+    (jam,) = (note for note in mg.solve(collar(0.3), {"D": mg.Motion(0.0, velocity=1.0)}, on_reach="flag").warnings)
+    assert (jam.status, jam.pairs) == ("jams", ("A",))
+    assert "longer guides" in str(jam)

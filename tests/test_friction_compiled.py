@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from test_friction_everywhere import CASES, MU, collar, power, shaft
+from test_machines_as_built import COEFFICIENTS, collar, shaft
 
 import mechgraph as mg
 
@@ -84,18 +84,10 @@ def test_as_numpy_solves_it(name: str, many: bool) -> None:
 
 
 @pytest.mark.usefixtures("compiled")
-@pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize("rate", [1.0, -1.0])
-def test_machines_with_closed_forms(name: str, rate: float) -> None:
-    """Those that ``test_friction_everywhere`` compares with formulas."""
-    m = CASES[name](MU)
-    assert power(m, rate, engine="compiled") == pytest.approx(power(m, rate, engine="dense"), rel=1e-12)
-
-
 @pytest.mark.usefixtures("compiled")
 def test_what_the_kernel_leaves_open_numpy_says() -> None:
     """Positions at rest, in motion and in the other sense in one call; a collar that jams has its factor."""
-    m = shaft(MU, ((0, -100.0), (0.1, 0, 0)), static=0.3)
+    m = shaft(COEFFICIENTS[0], ((0, -100.0), (0.1, 0, 0)), static=0.3)
     given = {"A": mg.Motion([0.0, 0.1, 0.2], velocity=[0.0, 1.0, -1.0])}
     one, other = (mg.solve(m, given, engine=e) for e in ("dense", "compiled"))
     same(one, other)

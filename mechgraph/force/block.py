@@ -98,8 +98,10 @@ def forces_of_block(
     elif dry:
         dq = moving_rates(rates.dq, rates.ddq)
         solve = FrictionProblem(here, task, f, first, lines, (found, flank), dry)
-        ranges, holds_alone = solve.at_rest(dq, given), solve.holds(dq, given)
+        (ranges, why, growth), holds_alone = solve.at_rest(dq, given), solve.holds(dq, given)
         found, rubs, flank = solve.forces(dq)
+        verge = (why > 0) & (rubs.outcome == 0)
+        rubs.why[verge], rubs.growth[:, verge] = why[verge], growth[:, verge]
         held, holds, hold_terms = held_still(here, task, f, applied + inertia, given + rubs.efforts, site.largest)
         loads = loads if held is None else applied + inertia + held
         given = given + rubs.efforts

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from enum import IntEnum
 from itertools import product
 from typing import Any
 
@@ -35,6 +36,19 @@ from mechgraph.pairs.contact_types import pressing
 
 OUTCOMES = ("ok", "jams", "no finite force", "friction not determined")
 """What becomes of a position, by number."""
+
+
+class Why(IntEnum):
+    """Why friction is not determined: reactions that are not unique, several sets of normal forces, places that do not settle, feet that
+    would pull or be pressed without bound, teeth that press on neither flank.
+    """
+
+    KNOWN = 0
+    NOT_UNIQUE = 1
+    SEVERAL = 2
+    UNSETTLED = 3
+    FEET = 4
+    FLANKS = 5
 
 
 @dataclass(frozen=True)
@@ -418,6 +432,7 @@ class Rubbed:
 
     Of these, the efforts of ``teeth (F, T)``, what is ``beside (6, P, T)`` them, and their wrenches on gears b ``rubbing (6, n, T)``: they
     pass the pairs by. How the normal forces grow where the solution ends ``growth (m, T)``, ``speeds (m, T)`` of sliding and ``names``.
+    Of what is not determined ``why (T,)``, and ``growth`` is that of the places that it concerns.
     """
 
     efforts: Array
@@ -431,6 +446,7 @@ class Rubbed:
     growth: Array
     speeds: Array
     names: tuple[str, ...]
+    why: Array
 
     def with_grip(self, here: Configuration, grip: Grip, sizes: Array) -> Rubbed:
         """With forces of sizes ``(d, T)`` that keep bodies from sliding beside it."""
@@ -478,6 +494,7 @@ def rubbed(here: Configuration, places: Sequence[Place], base: Array, unit: dict
     over = np.linalg.det(np.eye(len(a)) - np.moveaxis(C, -1, 0)) <= 0.0 if signed else np.zeros(T, dtype=bool)
     n, V, outcome, factor, growth = _normals(a, B, np.where(over, 0.0, C), starts)
     outcome = np.where(over, np.where((V[starts[signed]] > 0.0).any(axis=0), 2, 3), outcome)
+    why = np.where(outcome == 3, Why.SEVERAL, Why.KNOWN)
     n[signed] = V[starts[signed]]
     for t, place in enumerate(places):
         loose = np.einsum("dct,cst->dst", place.A, stress[:, place.reads])
@@ -487,13 +504,14 @@ def rubbed(here: Configuration, places: Sequence[Place], base: Array, unit: dict
             )
             largest = np.abs(base).max(axis=(0, 1), initial=0.0)
             unknown = (size > STRESSES.unique) & (along > STRESSES.unique * size * largest)
-            outcome = np.where((outcome == 0) & unknown, OUTCOMES.index("friction not determined"), outcome)
+            unknown &= (outcome == 0) | (why == Why.NOT_UNIQUE)
+            outcome[unknown], why[unknown], growth[t, unknown] = 3, Why.NOT_UNIQUE, 1.0
     n, V = np.where(outcome > 0, np.nan, n) + preload, np.where(outcome > 0, np.nan, V)
     P, F = len(here.system.m.pairs), here.system.n_freedoms
     speeds, names = np.array([place.speed for place in places]), tuple(place.of for place in places)
     zeros = (np.zeros(shape) for shape in ((F, T), (6, P, T), (F, T), (6, P, T), (6, len(here.system.m.couplings), T)))
     sums = dict(zip(_SUMS, zeros, strict=True))
-    out = Rubbed(normals=n, outcome=outcome, factor=factor, growth=growth, speeds=speeds, names=names, **sums)
+    out = Rubbed(normals=n, outcome=outcome, factor=factor, growth=growth, speeds=speeds, names=names, why=why, **sums)
     for t, place in enumerate(places):
         mine, teeth = V[starts[t] : starts[t + 1]], place.between_teeth(P)
         for parts, size in zip(split[t], (n[t : t + 1], mine), strict=True):
@@ -632,15 +650,17 @@ def _normals(a: Array, B: Array, C: Array, starts: Index) -> tuple[Array, Array,
 
 def _newton(a: Array, B: Array, C: Array, starts: Index, k: float, n: Array) -> tuple[Array, bool]:
     """Newton's method on ``n - |V(n)|`` with friction times k, and whether it ends."""
-    inverse = np.linalg.inv(np.eye(len(a)) - k * C)
-    scale = max(float(np.abs(a).max(initial=0.0)), 1e-300)
-    for _ in range(60):
-        V = inverse @ (a + k * B @ n)
+    linear = np.asarray(np.linalg.solve(np.eye(len(a)) - k * C, np.column_stack([a, k * B])), dtype=float)
+    free, per, scale = linear[:, 0], linear[:, 1:], max(float(np.abs(a).max(initial=0.0)), 1e-300)
+    eye = np.eye(len(n))
+    # near a solution it doubles its digits: what does not end soon is far from one
+    for _ in range(20):
+        V = free + per @ n
         size = np.add.reduceat(V * V, starts[:-1]) ** 0.5
         off = n - size
         if np.abs(off).max(initial=0.0) <= 1e-14 * max(scale, float(size.max(initial=0.0))):
             return size, True
-        n = n - np.linalg.lstsq(np.eye(len(n)) - _slope(V, size, k * inverse @ B, starts), off)[0]
+        n = n - np.linalg.lstsq(eye - _slope(V, size, per, starts), off)[0]
         if not np.isfinite(n).all() or np.abs(n).max() > 1e12 * scale:
             return n, False
     return n, bool(np.abs(off).max() <= 1e-11 * max(scale, float(size.max(initial=0.0))))
@@ -666,12 +686,13 @@ def _grown(a: Array, B: Array, C: Array, starts: Index) -> tuple[Array, int, flo
         if met and near and (new >= 0).all() and _rises(a, B, C, starts, ahead, new):
             k, n, step = ahead, new, min(2 * step, 1 / 16)
             if k == 1.0:
-                return n, 3 if _others(a, B, C, starts, n) else 0, np.nan, 0.0 * n
+                several = _others(a, B, C, starts, n)
+                return n, 3 if several else 0, np.nan, np.full_like(n, several)
         else:
             step /= 2
         if step < 1e-9 or n.max() > 1e8 * scale:  # far below what tells friction from friction
             return _ended(a, B, C, starts, k, n)
-    return n, 3, np.nan, 0.0 * n
+    return n, 3, np.nan, np.ones_like(n)
 
 
 def _rises(a: Array, B: Array, C: Array, starts: Index, k: float, n: Array) -> bool:

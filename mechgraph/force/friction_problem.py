@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from mechgraph.force.friction import OUTCOMES, Rubbed, moving_rates, places_of, rests, rubbed
+from mechgraph.force.friction import OUTCOMES, Rubbed, Why, moving_rates, places_of, rests, rubbed
 from mechgraph.force.reactions import (
     METHODS,
     ForceProblem,
@@ -58,7 +58,8 @@ def rubbed_in_motion(
 
 class FrictionProblem:
     """Reactions with friction beside those without it, ``smooth``, for any directions of motion, from total ``wrenches`` on the first
-    flanks of teeth. ``yields``: the inertia wrenches with which links yield to efforts; where it is left out the motion is given.
+    flanks of teeth. ``yields``: the inertia wrenches with which links yield to efforts; where it is left out the motion is given. ``part``
+    of the friction, one a position or of all, is taken.
     """
 
     def __init__(
@@ -73,6 +74,7 @@ class FrictionProblem:
         yields: Callable[[Array], Array] | None = None,
     ) -> None:
         self.yields = yields
+        self.part: Array | float = 1.0
         self.here, self.task, self.f, self.wrenches, self.lines, self.dry = here, task, f, wrenches, lines, dry
         self.found, self.flank = self.smooth = smooth
         # which components have lifted off, of those that only push under a split by stiffness
@@ -131,11 +133,12 @@ class FrictionProblem:
         wrenches = relieved(on_settled_flanks(here, wrenches, lines), lines, flank) if lines else wrenches
         return least_forces(here, wrenches, self.f, self.task, lines, flank, known, self.lifted)
 
-    def forces(self, dq: Array, at_rest: bool = False) -> tuple[FreeForces, Rubbed, Array]:
+    def forces(self, dq: Array, at_rest: bool = False, onward: bool = False) -> tuple[FreeForces, Rubbed, Array]:
         """Forces with the friction of a motion, that friction, and the flanks ``(n, T)`` on which teeth then touch: friction may turn the
-        force between them round, or lift what only pushes.
+        force between them round, or lift what only pushes; ``onward`` from what had lifted off before.
         """
-        self._put_on(*self.smooth, None if self.lifted is None else np.zeros_like(self.lifted))
+        if not onward:
+            self._put_on(*self.smooth, None if self.lifted is None else np.zeros_like(self.lifted))
         # how often flanks and what has lifted off are changed
         for _ in range(5 if self.lifted is None else 5 + 2 * len(self.lifted)):
             found, rubs = self._on_flanks(dq, at_rest)
@@ -143,14 +146,15 @@ class FrictionProblem:
             if not (turned | moved).any():
                 break
             self._put_on(None, np.where(turned, found.multipliers, self.flank), lifted)
-        if self.push is not None:
-            self._try_sets(dq, at_rest)
-            found, rubs = self._on_flanks(dq, at_rest)
+        if self.push is not None and not at_rest:  # at rest a part of the friction leads there, see _tipping
+            self._try_sets(dq)
+            found, rubs = self._on_flanks(dq)
             turned, moved = self._turned(found, rubs), self._lifts(found)[1]
-        found = _undetermined(found, rubs, turned | moved)
+        found = _undetermined(found, rubs, moved, Why.FEET, (True,) * len(rubs.names))
+        found = _undetermined(found, rubs, turned, Why.FLANKS, (True,) * len(rubs.names))
         # forces that grow without bound between feet held in place may let them lift before: then it tips, and does not jam
-        grows = (rubs.outcome > 0) & (self.push is not None)
-        rubs.outcome[grows], rubs.factor[grows] = OUTCOMES.index("friction not determined"), np.nan
+        grows = np.isin(rubs.outcome, (1, 2)) & (self.push is not None)
+        rubs.outcome[grows], rubs.factor[grows], rubs.why[grows] = 3, np.nan, Why.FEET
         return found, rubs, self.flank
 
     def _turned(self, found: FreeForces, rubs: Rubbed) -> Mask:
@@ -172,7 +176,7 @@ class FrictionProblem:
         sinks = _worst(np.where(assumed, gaps, 0.0), np.abs(gaps)) & ~pulls.any(axis=0)
         return (assumed | pulls) & ~sinks, np.asarray((pulls | sinks).any(axis=0))
 
-    def _try_sets(self, dq: Array, at_rest: bool) -> None:
+    def _try_sets(self, dq: Array) -> None:
         """Put on another set of what has lifted off where forces were not found and some set, of few, stands: each lifted foot changes the
         friction of the others, so that one at a time does not always lead there.
         """
@@ -180,7 +184,7 @@ class FrictionProblem:
             return
 
         def fails() -> Mask:
-            found, rubs = self._on_flanks(dq, at_rest)
+            found, rubs = self._on_flanks(dq)
             unborne = False if found.unborne is None else found.unborne
             return (rubs.outcome > 0) | self._lifts(found)[1] | self._turned(found, rubs) | unborne
 
@@ -204,7 +208,7 @@ class FrictionProblem:
             self.found = self._least(self.wrenches) if found is None else found
             self._answer_units()
 
-    def _on_flanks(self, dq: Array, at_rest: bool) -> tuple[FreeForces, Rubbed]:
+    def _on_flanks(self, dq: Array, at_rest: bool = False) -> tuple[FreeForces, Rubbed]:
         """Forces with the friction of a motion with rates ``dq (F, T)``, and what that is; NaN where it has no solution, or none alone."""
         found, of = self.found, {column: self._read(one) for column, one in self.unit.items()}
         base, stress = self._read(vars(found)), self._read({"reactions": found.stress.wrenches, **vars(found.stress)})
@@ -213,6 +217,8 @@ class FrictionProblem:
         # sides of balls and centers of pressure settle in a few rounds; what does not is not determined
         for _ in range(50):
             places = places_of(self.here, dq, reactions, self.dry, at_rest, (self.lines, self.flank))
+            if np.any(self.part != 1.0):
+                places = [replace(place, D=self.part * place.D, K=self.part * place.K) for place in places]
             rubs = rubbed(self.here, places, base, of, unknown)
             sums = {
                 name: getattr(found, name) + sum(one[name] * rubs.efforts[c] for c, one in self.unit.items())
@@ -224,36 +230,80 @@ class FrictionProblem:
             size = np.abs(reactions).max(axis=(0, 1))
             if not (any(place.follows for place in places) and (moved > STRESSES.rounding * size).any()):
                 break
-        doubtful = (moved > MOTIONS.still * size) & any(place.follows for place in places)
-        found = replace(found, **sums)
-        return _undetermined(found, rubs, doubtful), rubs
+        follows = [place.follows for place in places]
+        doubtful = (moved > MOTIONS.still * size) & any(follows)
+        return _undetermined(replace(found, **sums), rubs, doubtful, Why.UNSETTLED, follows), rubs
 
     def _read(self, forces: Mapping[str, Array]) -> Array:
         """The wrenches that normal forces are read from: reactions, and behind them forces between teeth."""
         return np.concatenate([forces["reactions"], self.lines.on_gears(forces["multipliers"], self.flank)], axis=1)
 
-    def at_rest(self, dq: Array, given: Array) -> Array:
-        """Efforts of drives ``(F, 2, T)`` on the verge of motion to - and to +, the others held; infinite where it jams, NaN in motion, and
-        where what only pushes would have to pull on the verge, or be pressed without bound: it tips or lifts before that.
+    def at_rest(self, dq: Array, given: Array) -> tuple[Array, Array, Array]:
+        """Efforts of drives ``(F, 2, T)`` on the verge of motion to - and to +, the others held; infinite where it jams, NaN in motion and
+        where friction is not determined there: ``why (T,)``, with the ``growth (m, T)`` of the places, as in ``Rubbed``.
+
+        Where what only pushes would pull on the verge, or be pressed without bound, it tips or lifts before: at the effort beside which
+        the greatest part of the friction lets it stand.
         """
-        out = np.full((len(dq), 2, self.here.T), np.nan)
-        rest = ~dq.any(axis=0)
+        out, rest = np.full((len(dq), 2, self.here.T), np.nan), ~dq.any(axis=0)
+        why, growth = np.zeros(self.here.T, dtype=int), np.zeros((1, self.here.T))
         if not rest.any():
-            return out
-        m, moved, push = self.here.system.m, self.f.sensitivity(), seats_of(self.here.system).push
-        tips = any(m.pairs[k].closed == "force" for load in self.dry for k in pairs_of(m, load))
-        for j, column in enumerate(self.task.driven):
-            for side, sense in enumerate((-1.0, 1.0)):
-                found, rubs, _ = self.forces(sense * moving_rates(moved[:, j]), at_rest=True)
-                effort = (found.efforts - given - rubs.efforts - found.coupled)[column]
-                jams = (rubs.outcome == 1) | (rubs.outcome == 2)
-                effort = np.where(jams, np.nan if tips else sense * np.inf, effort)
-                if push.any():
-                    values = component_values(PairFrames(self.here), found.reactions)
-                    pulls = (values[push] < -STRESSES.rounding * np.abs(values).max(axis=0)).any(axis=0)
-                    effort = np.where(pulls, np.nan, effort)
-                out[column, side, rest] = effort[rest]
-        return out
+            return out, why, growth
+        moved, push = self.f.sensitivity(), seats_of(self.here.system).push
+        for (j, column), (side, sense) in product(enumerate(self.task.driven), enumerate((-1.0, 1.0))):
+            rates = sense * moving_rates(moved[:, j])
+            found, rubs, _ = self.forces(rates, at_rest=True)
+            effort = np.where(np.isin(rubs.outcome, (1, 2)), sense * np.inf, self._efforts(found, rubs, given)[column])
+            stands = self._presses(found, rubs) >= -STRESSES.rounding
+            tips = rest & push.any() & ~stands & np.isin(rubs.why, (Why.KNOWN, Why.FEET))
+            if tips.any():
+                effort = np.where(tips, self._tipping(rates, tips, given)[column], effort)
+            open_ = rest & (rubs.outcome == 3) & ~tips
+            why, growth = np.where(open_, rubs.why, why), np.where(open_, rubs.growth, growth)
+            out[column, side, rest] = effort[rest]
+        return out, why, growth
+
+    def _efforts(self, found: FreeForces, rubs: Rubbed, given: Array) -> Array:
+        """Efforts ``(F, T)`` of drives alone."""
+        return np.asarray(found.efforts - given - rubs.efforts - found.coupled)
+
+    def _presses(self, found: FreeForces, rubs: Rubbed) -> Array:
+        """The least force ``(T,)`` of what only pushes beside the largest, below zero where it would pull; NaN where none are found."""
+        values = component_values(PairFrames(self.here), found.reactions)
+        bears = seats_of(self.here.system).push[:, None] & ~(False if self.lifted is None else self.lifted)
+        least = np.where(bears, values, np.inf).min(axis=0, initial=np.inf) / np.abs(values).max(
+            axis=0, initial=STRESSES.rounding
+        )
+        lost = (rubs.outcome > 0) | (False if found.unborne is None else found.unborne)
+        return np.where(lost, np.nan, np.minimum(least, 1.0))
+
+    def _tipping(self, dq: Array, at: Mask, given: Array) -> Array:
+        """Efforts ``(F, T)`` of drives beside the greatest part of the friction with which it stands, at positions ``at``; NaN where it
+        does not stand without. What has lifted off changes on the way; between changes the part is sought by regula falsi.
+        """
+        best, part = np.full_like(self.smooth[0].efforts, np.nan), np.zeros(self.here.T)
+        for change in range(2 + 2 * int(seats_of(self.here.system).push.sum())):
+            self.part = part
+            found, rubs, _ = self.forces(dq, at_rest=True, onward=change > 0)
+            presses = self._presses(found, rubs)
+            at = at & (presses >= -STRESSES.rounding)
+            if not at.any():
+                break
+            best = np.where(at, self._efforts(found, rubs, given), best)
+            low, high, ends = part, np.ones(self.here.T), [presses, np.full(self.here.T, np.nan)]
+            while (at & (high - low > STRESSES.rounding) & (ends[0] > STRESSES.rounding)).any():
+                share = np.where(np.isnan(ends[1]), 0.5, ends[0] / (ends[0] - np.nan_to_num(ends[1])))
+                self.part = middle = low + (high - low) * share
+                found, rubs = self._on_flanks(dq, at_rest=True)
+                presses, moves = self._presses(found, rubs), self._lifts(found)[1] | self._turned(found, rubs)
+                good = (presses >= -STRESSES.rounding) & ~moves
+                best = np.where(at & good, self._efforts(found, rubs, given), best)
+                low, high = np.where(good, middle, low), np.where(good, high, middle)
+                # an end that stays counts half (Illinois)
+                ends = [np.where(good, presses, 0.5 * ends[0]), np.where(good, 0.5 * ends[1], np.minimum(presses, 0.0))]
+            part = np.minimum(low + STRESSES.unique, 1.0)
+        self.part = 1.0
+        return best
 
     def holds(self, dq: Array, given: Array) -> Array:
         """Whether friction holds it at rest with all drives off, where there are several ``(T,)``: see ``friction.rests``."""
@@ -288,9 +338,13 @@ def _worst(values: Array, sizes: Array) -> Mask:
     return np.asarray(least & (values < -STRESSES.rounding * sizes.max(axis=0)))
 
 
-def _undetermined(found: FreeForces, rubs: Rubbed, places: Mask) -> FreeForces:
-    """The same with no value where friction has no solution, or is not determined, as at some more ``places``."""
-    rubs.outcome[places & (rubs.outcome == 0)] = OUTCOMES.index("friction not determined")
+def _undetermined(found: FreeForces, rubs: Rubbed, places: Mask, why: Why, of: Sequence[bool]) -> FreeForces:
+    """The same with no value where friction has no solution, or is not determined, as at some more ``places``, by the rubbing places
+    ``of`` which it is.
+    """
+    more = places & (rubs.outcome == 0)
+    rubs.outcome[more], rubs.why[more] = OUTCOMES.index("friction not determined"), why
+    rubs.growth[:, more] = np.array(of, dtype=float)[:, None]
     for values in (rubs.efforts, rubs.taken, rubs.normals, rubs.teeth, rubs.beside, rubs.rubbing):
         values[..., places] = np.nan
     places = rubs.outcome > 0

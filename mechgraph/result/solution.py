@@ -36,6 +36,7 @@ from mechgraph.result.contacts import (
     place_of_contact,
 )
 from mechgraph.result.film import FilmResult
+from mechgraph.result.notes import NotSolved, Remark, angle_remarks, friction_notes, not_solved
 from mechgraph.result.summary import solution_data, summary
 from mechgraph.result.trajectory import Trajectory
 from mechgraph.result.values import (
@@ -57,11 +58,8 @@ from mechgraph.result.views import (
     CouplingResult,
     LinkResult,
     PairResult,
-    Remark,
-    angle_remarks,
     couplings_of,
     forces_of_couplings,
-    friction_notes,
     geometry_of_couplings,
     losses,
     misfits_left_out,
@@ -639,24 +637,25 @@ class Solution(Shown):
         DeclarationError
             A position in motion, or without forces or ends: only what rests can stay. Of several drives, neither found nor proved.
         """
-        rest, places = np.ones(self.batch, dtype=bool), [self.whole.freedom(name) for name in self.actuated]
+        places = [self.whole.freedom(name) for name in self.actuated]
         pairs = [(self[self.whole.pairs[k].name], j) for k, j in places]
-        ends = [np.moveaxis(pair.effort_range[..., j, :], -1, 0) for pair, j in pairs]
-        alone = self._values.holds_alone if len(pairs) > 1 else rest
-        for (pair, j), (low, high) in zip(pairs, ends, strict=True):
-            doubt = np.isnan(low) | np.isnan(high) | (pair.velocity[..., j] != 0)
-            if (doubt | np.isnan(alone)).any():
-                place = self.place(int(np.argmax(doubt | np.isnan(alone))))
-                why = (
-                    f"self_locking: {place} is in motion, or has no forces or no known ends of its range; solve at rest, "
-                    "with positions alone as motions"
-                    if doubt.any()
-                    else f"self_locking: at {place} no friction is found that holds all drives at once, nor proved not to be there; "
-                    "it is close, ask with one drive"
-                )
-                raise DeclarationError(f"solution of {self.mechanism.name!r}", [why])
-            rest &= (low < high) & (low <= 0) & (high >= 0)
-        return rest if len(pairs) == 1 else np.asarray(alone > 0)
+        low, high = (np.array([pair.effort_range[..., j, end] for pair, j in pairs]) for end in (0, 1))
+        moves = np.array([pair.velocity[..., j] != 0 for pair, j in pairs]).any(axis=0)
+        alone = self._values.holds_alone if len(pairs) > 1 else np.ones(self.batch)
+        doubts = (
+            (moves, "is in motion; only what rests can stay: solve with positions alone as motions"),
+            (self.status != OK, "has no forces, since its status is {!r}; s.warnings says why, and what gives it some"),
+            (np.isnan(low + high).any(axis=0), "has no known ends of what holds it; s.warnings says why, and what gives them"),
+            (np.isnan(alone), "is close: no friction is found that holds all drives at once, nor proved not to be there; ask with one "
+             "drive"),
+        )  # fmt: skip
+        for doubt, why in doubts:
+            if doubt.any():
+                first = int(np.argmax(doubt))
+                told = f"self_locking: {self.place(first)} {why.format(str(self.status.reshape(-1)[first]))}"
+                raise DeclarationError(f"solution of {self.mechanism.name!r}", [told])
+        held = ((low < high) & (low <= 0) & (high >= 0)).all(axis=0)
+        return np.asarray(held if len(pairs) == 1 else alone > 0)
 
     def efficiency(self, out: str | Iterable[str], into: str | Iterable[str] | None = None) -> Array:
         """Return ``-power of out / power of into``, ``(...)``.
@@ -776,13 +775,15 @@ class Solution(Shown):
         )
 
     @property
-    def warnings(self) -> tuple[Doubt | PassedCrossing | Inaccurate | Remark, ...]:
-        """What makes reactions doubtful (``doubts``); crossings of branches that were passed, with place, miss and the other branches;
+    def warnings(self) -> tuple[Doubt | PassedCrossing | Inaccurate | Remark | NotSolved, ...]:
+        """Positions that are not solved, why, and what would solve them; what makes reactions doubtful (``doubts``); crossings of branches
+        that were passed, with place, miss and the other branches;
         rates and forces that rounding spoils (see ``checks.accuracy``); friction at rest, moments that rub nothing, friction circles
         that differ from the whole force by more than 5 %, belts that slip; angles that look like degrees.
         """
         worst = [Inaccurate(*one) for one in _worst(self.checks.accuracy, PATH.inaccurate)]
-        return (*self.doubts, *self._values.passed, *worst, *friction_notes(self._values), *angle_remarks(self._values))
+        v = self._values
+        return (*not_solved(v), *self.doubts, *v.passed, *worst, *friction_notes(v), *angle_remarks(v))
 
     def document(self, asked: bool = False) -> Document:
         """Return what ``print`` shows as a document.

@@ -17,6 +17,7 @@ from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import FORCE, POWER, PRESSURE, force_hint, unit_of
 from mechgraph.result.contacts import LiftOff, Overlap, contacts_of, lift_offs, overlaps
+from mechgraph.result.notes import friction_notes, not_solved
 from mechgraph.result.trajectory import Trajectory
 from mechgraph.result.values import (
     OK,
@@ -33,7 +34,6 @@ from mechgraph.result.values import (
 from mechgraph.result.views import (
     UNASKED,
     forces_of_couplings,
-    friction_notes,
     losses,
     misfits_left_out,
 )
@@ -439,6 +439,7 @@ class _SummaryText(PositionLabels):
         if items:
             yield Heading("Not solved", 2)
             yield Bullets(_shortened(items))
+            yield from (Paragraph(f"{note.status}: {note.why}.") for note in not_solved(self.values))
 
     def _meant(self) -> str:
         """With what tolerance the geometry is meant."""

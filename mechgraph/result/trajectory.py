@@ -78,7 +78,7 @@ KEPT = (
     "locked", "of_misfit", "range", "holds_alone",
 )  # fmt: skip
 """Fields of ``BlockForces`` that are kept for every position."""
-KEPT_OF_FRICTION = ("normals", "factor", "teeth", "rubbing", "growth", "speeds")
+KEPT_OF_FRICTION = ("normals", "factor", "teeth", "rubbing", "growth", "speeds", "why")
 """Fields of ``Rubbed`` that are kept for every position; efforts and what pairs take up without those of teeth."""
 
 
@@ -153,18 +153,15 @@ class Trajectory:
         if forces is None:
             return
         self.has_forces = True
-        self._keep("points", places, motion.here.pair_points)
-        for name in KEPT:
-            values = getattr(forces, name)
-            if values is not None:
-                self._keep(name, places, values)
+        found = {"points": motion.here.pair_points, **{name: getattr(forces, name) for name in KEPT}}
         self.largest = np.maximum(self.largest, forces.largest)
         if (rubs := forces.rubs) is not None:
             self.rubbing = rubs.names
-            self._keep("friction", places, rubs.efforts - rubs.teeth)
-            self._keep("taken", places, rubs.taken - rubs.beside)
-            for name in KEPT_OF_FRICTION:
-                self._keep(name, places, getattr(rubs, name))
+            found |= {"friction": rubs.efforts - rubs.teeth, "taken": rubs.taken - rubs.beside}
+            found |= {name: getattr(rubs, name) for name in KEPT_OF_FRICTION}
+        for name, values in found.items():
+            if values is not None:
+                self._keep(name, places, values)
 
     def estimate(self, places: Index, error: Array) -> None:
         """Note an estimated relative error of rates and forces ``(n,)``; the greatest stays."""
@@ -304,8 +301,7 @@ class Trajectory:
         return np.where(self._system.is_length, self._L, 1.0)[:, None]
 
     def _columns(self, pair: int) -> slice:
-        first = self._system.first_column
-        return slice(int(first[pair]), int(first[pair + 1]))
+        return slice(*map(int, self._system.first_column[pair : pair + 2]))
 
     # --- motion ----------
 
@@ -593,11 +589,19 @@ class Trajectory:
         return self._out(self._kept.get("holds_alone", np.zeros(self._count))[None])[..., 0]
 
     def friction_factor(self, place: int) -> tuple[float, tuple[str, ...]]:
-        """By how much friction would have to fall at a flat position that jams, and the names of what jams."""
-        growth = self._kept["growth"][:, place]
-        # parts of the largest: what grows with it, and what is loaded beside it
-        jammed = [name for name, size in zip(self.rubbing, growth, strict=True) if size > MOTIONS.nearby * growth.max()]
-        return float(self._kept["factor"][place]), tuple(dict.fromkeys(jammed))
+        """By how much friction would have to fall at a flat position that jams, and the names of what jams, or is not determined.
+
+        Parts of the largest tell what grows with it from what is loaded beside it.
+        """
+        growth = self._kept["growth"][:, place] if "growth" in self._kept else np.ones(len(self.rubbing))
+        most = MOTIONS.nearby * growth.max(initial=0.0)
+        jammed = dict.fromkeys(name for name, size in zip(self.rubbing, growth, strict=True) if size > most)
+        return float(self._kept.get("factor", np.full(self._count, np.nan))[place]), tuple(jammed)
+
+    @property
+    def why_open(self) -> Array:
+        """Why friction, or the ends between which it holds, are not determined ``(T,)``, by the number of ``force.friction.Why``."""
+        return np.nan_to_num(self._kept.get("why", np.zeros(self._count))).astype(int)
 
     def effort_range(self, pair: int) -> Array:
         """Least and greatest effort of drives at rest, ``(..., f, 2)``; the effort itself in motion and where nothing rubs."""

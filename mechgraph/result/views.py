@@ -12,16 +12,14 @@ from mechgraph.document import Block, Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import vector_fault
 from mechgraph.maths.se3 import Array
-from mechgraph.maths.tolerances import MOTIONS
-from mechgraph.memo import dataclass
 from mechgraph.model.belts import BeltCourse, BeltDrive
-from mechgraph.model.friction import WAYS, Friction, coupling_of
+from mechgraph.model.friction import Friction
 from mechgraph.model.gear_facts import behind_of
 from mechgraph.model.meshes import Mesh
 from mechgraph.model.pair import Pair
 from mechgraph.model.short_forms import Belt
 from mechgraph.pairs.pair_type import PairType
-from mechgraph.quantities import FORCE, LENGTH, MOMENT, POWER, ByName, angle_hint, is_numeric, unit_of
+from mechgraph.quantities import FORCE, LENGTH, POWER, ByName, is_numeric, unit_of
 from mechgraph.result.trajectory import Trajectory
 from mechgraph.result.values import Fact, MaterialPoint, MisfitsLeftOut, PositionLabels, bracket, coupling_unit, ranges
 
@@ -454,91 +452,6 @@ def losses(values: Trajectory) -> dict[str, Array]:
     """Power lost in what rubs, by name, ``(...)``."""
     dry = {i: load.of for i, load in enumerate(values.loads) if isinstance(load, Friction)}
     return {name: -values.load(i).power for i, name in dry.items() if name in values.rubbing}
-
-
-@dataclass(frozen=True)
-class Remark:
-    """What is to be known of a pair, belt or freedom ``name``, in a sentence."""
-
-    name: str
-    text: str
-
-    def __str__(self) -> str:
-        return self.text
-
-
-def angle_remarks(values: Trajectory) -> Iterator[Remark]:
-    """Turns that are driven, without times, through whole numbers beyond two turns: radians hardly are, degrees are."""
-    names, m = values.whole.freedom_names(), values.whole
-    for name in values.prescribed if values.t is None else ():
-        at = values.coordinates_at(np.arange(values.status().size))[names.index(name)]
-        told = angle_hint(float(max(at, key=abs, default=0.0))) if m.turns(name) and (at == np.round(at)).all() else ""
-        if told:
-            yield Remark(name, f"{name}: {told}; for degrees write np.deg2rad(...)")
-
-
-def friction_notes(values: Trajectory) -> Iterator[Remark]:
-    """Positions at rest, moments that rub nothing, coefficients at which the circle and the whole force differ, belts that slip."""
-    m = values.whole
-    if values.rubbing and values.has_forces:
-        # what sticks in a motion under loads has its friction: there efforts have no ends
-        known = [(values.effort_range(k), PairResult(values, k).effort) for k in range(len(m.pairs))]
-        between = [(ends[..., 0] < ends[..., 1]) | (np.isnan(ends).any(-1) & ~np.isnan(at)) for ends, at in known]
-        held = np.concatenate(between, axis=-1).any(axis=-1)
-        if rests := int(held.sum()):
-            text = f"friction has no direction at {rests} of {held.size} positions, where nothing moves: efforts there are those "
-            text += "without it. Give velocity= for a motion; s[...].effort_range has the ends between which it holds"
-            yield Remark(values.rubbing[0], text)
-    for load in (load for load in values.loads if isinstance(load, Friction) and values.has_forces):
-        if load.of in m.pair_index:
-            yield from _notes_of_pair(values, load.with_numbers(values.number))
-        elif "wrap" in (belt := coupling_of(m, load)).rubs:
-            whole = isinstance(belt, BeltDrive)
-            of = BeltResult(values, load.of) if whole else CouplingResult(values, m.couplings.index(belt))
-            least = np.nanmin(
-                [*of.slip_margin.values()] if isinstance(of, BeltResult) else of.slip_margin, initial=np.inf
-            )
-            if least < 0:
-                why = f"belt {load.of} slips (slip_margin down to {least:.3g}): its strands differ by more than e^(mu wrap)"
-                if not whole and not np.any(load.preload):
-                    why += "; an mg.Belt has no tension in its slack strand, give it by preload="
-                yield Remark(load.of, why)
-
-
-def _notes_of_pair(values: Trajectory, load: Friction) -> Iterator[Remark]:
-    where, result = f"friction of {load.of}: ", PairResult(values, values.whole.pair_index[load.of])
-    row = values.whole.pair(load.of).type
-    more = 100 * float(np.max(np.hypot(1.0, load.coefficient_at_rest)) - 1)
-    if load.model == "circle" and load.radius is not None and not row.takes_pitch and more > 5:
-        yield Remark(
-            load.of, f"{where}model='total' gives couples {more:.2g} % larger than the circle; say which is meant"
-        )
-    takes = {name for way in WAYS if way.of(row) for name in way.takes}
-    couples = {c.name: np.nan_to_num(result.components[c.name]) for c in row.reactions or () if c.is_couple}
-    # the axis is in the plane of a planar mechanism, and the couple across it
-    about = None if values.whole.planar else couples.pop("Mz", None)
-    across = np.linalg.norm(np.stack([*couples.values(), np.zeros(values.batch)]), axis=0)
-    if load.on == "b" and couples:  # about marker B, where the couple along the axis is the same
-        along = np.zeros(values.batch) if about is None else about
-        if row.takes_pitch:
-            along = values.whole.pair(load.of).pitch_per_radian * np.nan_to_num(result.components["Fz"])
-        across = np.sqrt(np.abs((np.nan_to_num(result.moment) ** 2).sum(axis=-1) - along**2))
-    if load.radius is None and load.thrust_radius is not None:
-        radial = np.hypot(*(np.nan_to_num(result.components.get(name, 0.0)) for name in ("Fx", "Fy")))
-        if (radial > MOTIONS.idle * np.nan_to_num(result.magnitude)).any():
-            most = f"{radial.max():.4g} {unit_of(values.mechanism.units, FORCE)}".rstrip()
-            yield Remark(
-                load.of, f"{where}a radial force of up to {most} rubs nothing; give radius=, that of the journal"
-            )
-    # a bearing as long as its diameter bears it by more than its force; of a guide any moment that is no rounding
-    arm = 1e-6 * values.radius if load.radius is None else load.radius
-    for name, how, moment in (("length", "across", across), ("width", "about", about)):
-        if moment is None or name not in takes or getattr(load, name) is not None:
-            continue
-        if (np.abs(moment) > arm * np.nan_to_num(result.magnitude)).any():
-            most = f"{np.abs(moment).max():.4g} {unit_of(values.mechanism.units, MOMENT)}".rstrip()
-            why = f"{where}a moment of up to {most} {how} the axis rubs nothing; give {name}=, the distance at which it is borne"
-            yield Remark(load.of, why)
 
 
 def friction_of(values: Trajectory, name: str) -> Friction:
