@@ -554,6 +554,18 @@ def test_faults_and_files(tmp_path) -> None:
         given = {"of": "A", "mu": 0.1, "radius": 0.01, **more}
         with pytest.raises(mg.DeclarationError, match=words):
             m.replace(loads=[mg.Friction(given.pop("of"), **given)])
+    with pytest.raises(mg.DeclarationError) as all_of_them:
+        m.replace(
+            loads=[mg.Friction("A", mu=0.3, static=0.1, radius=-1.0, width=0.1), mg.Friction("Q", mu=0.3, static=0.1)]
+        )
+    for words in (
+        "static = 0.1: expected mu = 0.3 or more",
+        "radius = -1.0",
+        "width: has no meaning",
+        "unknown pair 'Q'",
+    ):
+        assert words in str(all_of_them.value)
+    assert str(all_of_them.value).count("expected mu = 0.3 or more") == 2
     heavy = m.replace(links=[mg.Link("frame"), mg.Link("nut", 1.0, (0, 0, 0), np.eye(3))], drives=[])
     with pytest.raises(mg.MechgraphError, match="pass loads= without it here"):
         mg.equilibrium(heavy)

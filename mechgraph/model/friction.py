@@ -164,7 +164,7 @@ class Friction(Load):
 
     def faults(self, names: Any) -> list[str]:
         """What is wrong with this load."""
-        found = super().faults(names)
+        found = [*super().faults(names), *(self.where + fault for fault in self._of_numbers())]
         pair: Any = next((p for p in names.pairs if p.name == self.of), None)
         coupling = coupling_of(names, self)
         if pair is None and coupling is None:
@@ -177,15 +177,19 @@ class Friction(Load):
         if len(own) > 1 and own[0] is not self:
             more.append("of: is declared before; a pair or coupling takes one mg.Friction")
         own_faults = self._of_pair(pair) if coupling is None else self._of_coupling(coupling)
-        numbers = () if found else (*self._of_numbers(), *(self._of_thread(pair) if coupling is None else ()))
-        return found + [self.where + fault for fault in (*more, *own_faults, *numbers)]
+        thread = () if found or coupling is not None else self._of_thread(pair)
+        return found + [self.where + fault for fault in (*more, *own_faults, *thread)]
 
     def _of_numbers(self) -> Iterator[str]:
         if self.mu is None and self.efficiency is None:
             yield "mu: is missing; give the coefficient of friction"
-        if self.static is not None and self.static < self._mu:
-            yield wrong(self.static, "static", f"mu = {self._mu:g} or more")
-        if self.efficiency is not None and self.efficiency > 1.0:
+        # what is no number, or below zero, is a fault of its own
+        mu, static, part = (
+            of if isinstance(of, int | float) and of >= 0 else np.nan for of in (self._mu, self.static, self.efficiency)
+        )
+        if static < mu:
+            yield wrong(self.static, "static", f"mu = {mu:g} or more")
+        if part > 1.0:
             yield wrong(self.efficiency, "efficiency", "a number above 0 and at most 1")
         if self.efficiency is not None and self.mu is not None:
             yield "mu, efficiency: both are given; give one of them"
