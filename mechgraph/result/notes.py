@@ -38,8 +38,7 @@ WHY_NOT = {
 """Why positions have no values, and what gives them some, by status."""
 OPEN = {
     Why.KNOWN: "several states of it agree with the motion",
-    Why.NOT_UNIQUE: "it follows reactions that are not unique. Pass redundant='elastic' with stiffness= of these pairs (or "
-    "'minimum_norm'), or take a redundant constraint away",
+    Why.NOT_UNIQUE: "it follows reactions that are not unique. ",
     Why.SEVERAL: "more than one set of normal forces agrees with it. Less friction would leave one",
     Why.UNSETTLED: "the places at which bodies touch do not settle beside it. Less friction would let them",
     Why.FEET: "pairs that only push would pull, or be pressed without bound; they may lift before. Less friction, feet set wider, or a "
@@ -78,8 +77,21 @@ def not_solved(values: Trajectory) -> Iterator[NotSolved]:
             at = np.flatnonzero((status == name) & (why == reason))
             pairs = _pairs_of(values, Status(name), at)
             text = WHY_NOT[Status(name)].format(", ".join(pairs) or "the pairs that rub")
-            text += OPEN[Why(reason)] if Status(name) is Status.FRICTION_OPEN else ""
+            text += _open(values, reason) if Status(name) is Status.FRICTION_OPEN else ""
             yield NotSolved(name, tuple(at.tolist()), pairs, text, _where(values, at))
+
+
+def _open(values: Trajectory, reason: int) -> str:
+    """Why friction is not determined, and what would determine it."""
+    if reason != Why.NOT_UNIQUE:
+        return OPEN[Why(reason)]
+    if values.split_by_stiffness:
+        return (
+            OPEN[Why.NOT_UNIQUE]
+            + "Give stiffness= to the components that are still rigid, or take a redundant constraint away"
+        )
+    split = "Pass redundant='elastic' with stiffness= of these pairs (or 'minimum_norm'), or take a redundant constraint away"
+    return OPEN[Why.NOT_UNIQUE] + split
 
 
 def _pairs_of(values: Trajectory, status: Status, at: Index) -> tuple[str, ...]:
@@ -137,7 +149,7 @@ def friction_notes(values: Trajectory) -> Iterator[Remark]:
         for reason in dict.fromkeys(values.why_open[unknown.reshape(-1)].tolist()):
             places = np.flatnonzero(unknown.reshape(-1) & (values.why_open == reason))
             pairs = _pairs_of(values, Status.FRICTION_OPEN, places)
-            why = f"friction of {', '.join(pairs)}: {OPEN[Why(reason)]}" if reason else PULLS
+            why = f"friction of {', '.join(pairs)}: {_open(values, reason)}" if reason else PULLS
             text = f"the efforts between which it holds at rest are not known {_where(values, places)}: {why}"
             yield Remark(pairs[0] if pairs else values.rubbing[0], text)
     for load in (load for load in values.loads if isinstance(load, Friction) and values.has_forces):

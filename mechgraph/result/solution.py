@@ -622,6 +622,11 @@ class Solution(Shown):
         return losses(self._values)
 
     @property
+    def split_by_stiffness(self) -> bool:
+        """Whether redundant reactions are split by the stiffness of the pairs (``redundant="elastic"``)."""
+        return self._values.split_by_stiffness
+
+    @property
     def jams(self) -> dict[int, Jam]:
         """What jams, by the flat index of every position that does (status ``'jams'`` or ``'no finite force'``)."""
         stuck = np.flatnonzero(np.isin(self.status, OUTCOMES[1:3]))

@@ -308,14 +308,15 @@ def _faults(m: Mechanism, solution: Any, study: Any) -> list[str]:
 
 
 def _content(m: Mechanism, report: DeterminacyReport, s: Solution | None, study: Study | None) -> dict[str, Any]:
-    side, word = _judged(report)
+    told = tuple(map(str, s.warnings)) if s is not None and s.has_forces else ()
+    side, word = _judged(report, s, bool(told))
     data = view_data(report, s)
     drawn = data is not None
     remarks = [report.rounding.text] if report.rounding is not None else []
     remarks += [TOO_LARGE] if report.geometry is not None and not drawn else []
     return {
         "name": m.name or "mechanism", "about": m.description, "side": side, "word": word, "verdict": report.verdict,
-        "remarks": [*remarks, *([report.note] if report.note else []), *map(str, s.warnings if s is not None and s.has_forces else ())],
+        "remarks": [*remarks, *([report.note] if report.note else []), *told],
         "numbers": list(_numbers(report, s)),
         "brief": _html(Document("", tuple(b for b in report.document().blocks if isinstance(b, Bullets)))),
         "report": _html(Document("", report.document(full=True).blocks)),
@@ -356,14 +357,17 @@ def _equations(m: Mechanism) -> Document:
     return Document("", f.document(components=len(f.unknowns) <= 300).blocks)
 
 
-def _judged(r: DeterminacyReport) -> tuple[str, str]:
-    """A color and a word for the verdict, the word for those who do not see the color."""
+def _judged(r: DeterminacyReport, s: Solution | None, told: bool) -> tuple[str, str]:
+    """A color and a word for the verdict, the word for those who do not see the color; ``told``: whether the solution warns."""
     if not r.mechanism.has_geometry:
         return "fair", "Topology only"
     if r.mobility is None or r.undriven or r.contradicting_drives:
         return "bad", "No solution"
-    if r.near or any(p.load_bearing for p in r.passive) or not (r.determinate or r.own_forces_unique):
+    if told or r.near or any(p.load_bearing for p in r.passive):
         return "fair", "See warnings"
+    if not (r.determinate or r.own_forces_unique):
+        by_stiffness = s is not None and s.split_by_stiffness
+        return "fair", "Split by stiffness" if by_stiffness else "Not all reactions are unique"
     return "good", "All is determined" if r.determinate else f"All that a {r.kind.name} model has is unique"
 
 
