@@ -78,6 +78,7 @@ from mechgraph.response.motion_equations import (
 )
 from mechgraph.response.resting import Rests, read_stops, with_contacts
 from mechgraph.response.rough import friction_faults
+from mechgraph.result.notes import NotSolved
 from mechgraph.result.solution import Solution
 from mechgraph.result.summary import SolutionData, solution_data, summary
 from mechgraph.result.trajectory import Trajectory
@@ -784,7 +785,8 @@ def _followed(
         out = course.outputs(last)
     assert out is not None
     out.stopped, out.events = why, tuple(happened)
-    for warning in out.warnings:
+    # what has no value is NaN in its status, as in solve, and stands in the summary
+    for warning in (one for one in out.warnings if not isinstance(one, NotSolved)):
         warnings.warn(f"mechanism {course.mechanism.name!r}: {warning}", MechgraphWarning, stacklevel=4)
     return out
 
