@@ -1,5 +1,6 @@
 """Odd and wrong inputs at random (``fuzz``): an answer or an error of ours, within ten seconds. ``--attack N``: N seeds more of each."""
 
+import inspect
 from pathlib import Path
 
 import pytest
@@ -36,6 +37,13 @@ def test_every_public_callable_is_attacked(folder: Path) -> None:
     """Each is there under its own name."""
     public = {*functions(), *(f"{cls.__name__}.{name}" for cls in results() for name in methods(cls))}
     assert {name.split()[0] for name, *_ in every_door(folder)} == public
+
+
+def test_every_public_function_looks_at_its_arguments() -> None:
+    """By one check, made from its signature; classes look at their values themselves."""
+    assert [
+        name for name, one in functions().items() if inspect.isfunction(one) and not hasattr(one, "__wrapped__")
+    ] == []
 
 
 @pytest.mark.slow

@@ -164,7 +164,10 @@ class Friction(Load):
 
     def faults(self, names: Any) -> list[str]:
         """What is wrong with this load."""
-        found = [*super().faults(names), *(self.where + fault for fault in self._of_numbers())]
+        misread = super().faults(names)
+        found = [*misread, *(self.where + fault for fault in self._of_numbers())]
+        if not isinstance(self.of, str):
+            return found
         pair: Any = next((p for p in names.pairs if p.name == self.of), None)
         coupling = coupling_of(names, self)
         if pair is None and coupling is None:
@@ -176,7 +179,7 @@ class Friction(Load):
         own = [load for load in names.loads if isinstance(load, Friction) and load.of == self.of]
         if len(own) > 1 and own[0] is not self:
             more.append("of: is declared before; a pair or coupling takes one mg.Friction")
-        own_faults = self._of_pair(pair) if coupling is None else self._of_coupling(coupling)
+        own_faults = () if misread else self._of_pair(pair) if coupling is None else self._of_coupling(coupling)
         thread = () if found or coupling is not None else self._of_thread(pair)
         return found + [self.where + fault for fault in (*more, *own_faults, *thread)]
 

@@ -359,7 +359,7 @@ class Mechanism(DeclaredParts, Shown):
     def _finish(self, start: Any, faults: list[str]) -> None:
         """Raise all faults at once, those of ``start`` too; keep start values by full freedom names."""
         flat: dict[str, float] = {}
-        if _are_pairs(self.pairs):
+        if _are_pairs(self.pairs) and all(isinstance(link, Link) for link in self.links):
             flat, start_faults = flat_start(self, start if isinstance(start, Mapping) else {})
             faults += start_faults
         if faults:

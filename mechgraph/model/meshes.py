@@ -242,7 +242,10 @@ class Mesh(Meshing):
         where = f"coupling {shown(self.name)}: "
         known = m.once(gears_by_name)
         found = self.value_faults("")
-        found += [f"{side}: {unknown('gear', q, known)}" for side in "ab" if (q := getattr(self, side)) not in known]
+        names = {side: getattr(self, side) for side in "ab"}
+        found += [
+            f"{side}: {unknown('gear', q, known)}" for side, q in names.items() if isinstance(q, str) and q not in known
+        ]
         if not found:
             one, two = self.pair_of(m)
             if one.link == two.link:

@@ -396,10 +396,10 @@ class Smooth:
         """Call the function with the array, or value by value where it takes no arrays."""
         try:
             return self.function(t.copy() if t.ndim else float(t))
-        except (TypeError, ValueError):
+        except Exception as error:  # what a user's function raises may be anything
             if t.ndim == 0:
-                raise
-        single = [self.function(float(value)) for value in t.ravel()]
+                raise LawFault(f"it fails at t = {float(t):g}: {type(error).__name__}: {error}") from None
+        single = [self._called(np.asarray(value)) for value in t.ravel()]
         try:
             if single and isinstance(single[0], tuple):
                 return tuple(np.reshape(column, t.shape) for column in zip(*single, strict=True))

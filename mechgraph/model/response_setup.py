@@ -143,7 +143,7 @@ class Stop(Described):
 
     def point(self, m: Any) -> tuple[str, str] | None:
         """Link and name of the point of which it limits a coordinate, ``"rod.tip.Tx"``; None where it limits a freedom."""
-        name, _, along = str(self.freedom).rpartition(".")
+        name, _, along = self.freedom.rpartition(".") if isinstance(self.freedom, str) else ("", "", "")
         known = [(one.name, point) for one in m.links for point in one.points if name == f"{one.name}.{point}"]
         return known[0] if known and along in ("Tx", "Ty", "Tz") else None
 

@@ -591,7 +591,9 @@ class CamLaw(Described, Once, Shown):
         >>> law.at(1.5).round(6) + 0
         array([ 0.5     ,  0.625   ,  0.      , -1.111111])
         """
-        u = np.asarray(angle)
+        u = angle if isinstance(angle, np.ndarray) and np.iscomplexobj(angle) else real_array(angle)
+        if u is None:
+            raise DeclarationError("CamLaw.at", [wrong(angle, "angle", "real numbers")])
         return self.pieces.at(u - self.turn * np.floor(u.real / self.turn), orders)
 
     @cached_property

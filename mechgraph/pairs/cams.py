@@ -558,7 +558,7 @@ class Groove(OfLaw):
 
     def faults(self, where: str) -> list[str]:
         """A law or size that makes no groove."""
-        found = super().faults(where)
+        found = super().faults(where) or self.law_faults(where, 1.0)
         if found:
             return found
         if self.frame != "minimizing" or self.guide is not None:
@@ -568,7 +568,7 @@ class Groove(OfLaw):
             found.append(
                 f"{where}law.turn = {self.ends[1]:.6g}: a groove comes back after whole turns; let the law fill a multiple of 2 pi"
             )
-        return found + self.law_faults(where, 1.0)
+        return found
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

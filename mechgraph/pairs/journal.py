@@ -72,7 +72,7 @@ class Journal(Described):
 
     def __post_init__(self) -> None:
         self.read_numbers()
-        if self.clearance >= self.radius:
+        if not self.value_faults("") and self.clearance >= self.radius:
             raise DeclarationError(
                 "journal", [wrong(self.clearance, "clearance", f"less than the radius, {self.radius:g}")]
             )

@@ -571,6 +571,7 @@ def polar_force(s: Solution, pair: str, *, on: Literal["a", "b"] = "a", ax: Axes
     return ax
 
 
+@door
 def film_orbit(s: Solution, pair: str, journal: Journal | FilmResult | None = None, *, ax: Axes = None) -> Any:
     """Draw the orbit of a journal in its clearance circle, with the place and direction of the least film.
 
@@ -630,6 +631,7 @@ def film_orbit(s: Solution, pair: str, journal: Journal | FilmResult | None = No
     return ax
 
 
+@door
 def friction_losses(s: Solution, *, ax: Axes = None) -> Any:
     """Draw the power that friction takes in every pair: a bar for the mean over the positions, a dot for the greatest.
 
