@@ -430,7 +430,8 @@ def animate(
     writable(path)
     found = scene(s, forces=forces, centers=centers)
     chosen = _chosen(found, frames)
-    if faults := trace_faults(found, traces):
+    slow = 0.01  # frames a second: formats hold the time of a picture in whole milliseconds, of 32 bits
+    if faults := trace_faults(found, traces) + ([] if fps >= slow else [wrong(fps, "fps", f"{slow:g} or more")]):
         raise DeclarationError(f"animation of {found.mechanism.name!r}", faults)
     film = _Film(found, course_of(s, found, traces), chosen, traces, labels, view, size)
 
