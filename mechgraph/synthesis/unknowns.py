@@ -25,6 +25,7 @@ from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import declared
 from mechgraph.modes.family import span
+from mechgraph.quantities import wrong
 from mechgraph.variants.numbers import (
     MARKER,
     SIDES,
@@ -65,7 +66,8 @@ class Unknowns:
     ) -> None:
         self.m, self.whole, self.factors = m, whole, tuple(factors)
         self.fields: dict[str, AnyField] = {}
-        for name in given:
+        faults += [wrong(name, "unknown", "a name") for name in given if not isinstance(name, str)]
+        for name in (name for name in given if isinstance(name, str)):
             for one in self._expanded(name):
                 found = find_field(m, one)
                 if isinstance(found, str):
