@@ -142,6 +142,29 @@ LADDER: dict[str, Callable[[], Rung]] = {
         ],
         ["B.point", "C.point"], 1,
     ),
+    "RCCC, turns and slides at 3 positions": lambda: (
+        spatial(
+            "RCCC", ("R", (0, 0, 0), (0, 0, 1)), ("C", (0.3, 0.2, 0.1), (-0.7, 0.2, 1)), ("C", (1.2, 0.6, 0.4), (-0.3, 0.4, 1)),
+            ("C", (1.5, 0, 0), (0.5, 1, 0.6)),
+        ),
+        [mg.function("O", f"R.{part}", [[0, 0], [0.4, turn], [0.9, 2 * turn]]) for part, turn in (("Rz", 0.2), ("Tz", 0.1))],
+        ["Q"], 1,
+    ),
+    "RSSR-SC, 3 poses": lambda: (
+        mg.Mechanism(
+            "RSSR-SC",
+            pairs=[
+                mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=(0, 0.2, 1)),
+                mg.Pair("B", "S", "crank", "coupler", point=(1, 0, 0)),
+                mg.Pair("C", "S", "coupler", "rocker", point=(2, 1, 0.5)),
+                mg.Pair("D", "R", "frame", "rocker", point=(2, 0, 0), axis=(0.1, 0, 1)),
+                mg.Pair("E", "S", "coupler", "slider", point=(0.5, 1.5, 0.8)),
+                mg.Pair("F", "C", "frame", "slider", point=(0, 2, 0), axis=(1, 0.3, 0.2)),
+            ],
+            drives=["A"],
+        ),
+        mg.poses("coupler", turned(3, 0.3)), ["A", "D", "F.point"], 1,
+    ),
     "four-bar of two dyads, 5 poses": lambda: (
         four_bar(), mg.poses("coupler", _rows(5, 3)), ["A.point", "B.point", "C.point", "D.point"], 12,
     ),
