@@ -333,6 +333,45 @@ def table() -> mg.Solution:
     return mg.solve(m, dict.fromkeys(drives, np.zeros(1)), redundant="elastic")
 
 
+def woodpecker() -> mg.Solution:
+    """The woodpecker toy, with the numbers of Glocker's thesis (1995): its sleeve grips the pole and slips, its beak strikes."""
+    pole, half, pivot, far, beak = 2.5e-3, 5.8e-3, 0.01, 0.015, (4.9e-3, 0.02)
+    start, line = {"M": -0.05, "S": -0.1}, mg.Curve.line(point=(pole, 0, 0), direction=(0, -1, 0))
+    links = [
+        mg.Link("pole"),
+        mg.Link("slider"),
+        mg.Link("sleeve", 3e-4, (0, 0), 5e-9),
+        mg.Link("bird", 4.5e-3, (pivot + far, 0), 7e-7),
+    ]
+    pairs = [
+        mg.Pair("G", "P", "pole", "slider", point=(0, 0), axis=(0, 1)),
+        mg.Pair("M", "R", "slider", "sleeve", point=(0, 0)),
+        mg.Pair("S", "R", "sleeve", "bird", point=(pivot, 0)),
+    ]
+    # where the sleeve and the beak stand beside the pole as the motion begins
+    m = mg.Mechanism("woodpecker", links, pairs, planar=True, units=SI)
+    begun = mg.kinematics(m.replace(drives=["G", "M", "S"]), {"G": 0.0, **start})
+    touching = {
+        "beak": ("bird", (*beak, 0)),
+        "below": ("sleeve", (3.1e-3, -half, 0)),
+        "above": ("sleeve", (3.1e-3, half, 0)),
+    }
+    loads: list[Any] = [mg.Gravity((0, -9.81)), mg.Spring(freedom="S", stiffness=5.6e-3)]
+    for name, (link, at) in touching.items():
+        across = (begun.link(link).pose @ [*at, 1.0])[0]
+        on = {"on_a": mg.Marker((pole, at[1], 0), (0, 0, 1), (0, -1, 0)), "on_b": mg.Marker(at, (0, 0, 1), (0, -1, 0))}
+        bounce = 0.5 if name == "beak" else 0.0
+        pairs.append(
+            mg.Pair(name, "Ps", "pole", link, **on, closed="force", curve=line, restitution=bounce, gap=across - pole)
+        )
+        loads.append(mg.Friction(name, mu=0.3))
+    about = "Woodpecker toy: friction holds the sleeve on the pole and lets it go, and the beak strikes"
+    m = m.replace(pairs=pairs, loads=loads, description=about)
+    return mg.respond(
+        m, np.linspace(0.0, 0.2, 81), start=start, rates={"G": 0.0, "M": 0.0, "S": -7.4583}, rtol=1e-4, atol=1e-6
+    )
+
+
 ENTRIES = [
     Entry("Four-bar", library("four-bar"), "../tutorials/crank-rocker.md"),
     Entry("Slider-crank", library("slider-crank"), "../tutorials/slider-crank.md"),
@@ -359,6 +398,7 @@ ENTRIES = [
     Entry("Screw jack with friction", jack, "../how-to/friction.md"),
     Entry("Con-rod bearing of an engine", bearing, "../how-to/oil-film.md"),
     Entry("Table on four feet", table, "../how-to/misfits.md"),
+    Entry("Woodpecker toy", woodpecker, "../how-to/simulate.md"),
     Entry("Planetary train", example("14", "planetary", turn("S", 10.0, 1260.0), 1), "../how-to/gears.md"),
     Entry("Excavator", dig, "../tutorials/excavator.md"),
     Entry("Five-rod suspension", ride),
