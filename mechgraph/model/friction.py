@@ -164,8 +164,7 @@ class Friction(Load):
 
     def faults(self, names: Any) -> list[str]:
         """What is wrong with this load."""
-        misread = super().faults(names)
-        found = [*misread, *(self.where + fault for fault in self._of_numbers())]
+        found = [*super().faults(names), *(self.where + fault for fault in self._of_numbers())]
         if not isinstance(self.of, str):
             return found
         pair: Any = next((p for p in names.pairs if p.name == self.of), None)
@@ -179,7 +178,7 @@ class Friction(Load):
         own = [load for load in names.loads if isinstance(load, Friction) and load.of == self.of]
         if len(own) > 1 and own[0] is not self:
             more.append("of: is declared before; a pair or coupling takes one mg.Friction")
-        own_faults = () if misread else self._of_pair(pair) if coupling is None else self._of_coupling(coupling)
+        own_faults = self._of_pair(pair) if coupling is None else self._of_coupling(coupling)
         thread = () if found or coupling is not None else self._of_thread(pair)
         return found + [self.where + fault for fault in (*more, *own_faults, *thread)]
 
@@ -224,9 +223,11 @@ class Friction(Load):
         alone = self.thrust_radius is not None and self.length is None and row.f == 1
         if self.radius is None and not alone and any(way.needs for way in ways):
             yield f"radius: type {row.symbol} turns; give the radius at which it rubs"
-        if self.width == 0.0:
+        # what is no number is a fault of its own
+        width, viscous = (of if isinstance(of, int | float) else None for of in (self.width, self.viscous))
+        if width == 0.0:
             yield wrong(self.width, "width", "a number other than 0, or leave it out")
-        if self.viscous and len({f.turns for f in row.freedoms}) > 1:
+        if viscous and len({f.turns for f in row.freedoms}) > 1:
             yield f"viscous: type {row.symbol} turns and slides, in two units; give mg.Spring(freedom=, damping=) instead"
 
     def _of_thread(self, pair: Any) -> Iterator[str]:

@@ -266,7 +266,7 @@ def notes(programs: Programs, results: dict[str, list[dict[str, Result]]], power
     missing = "; ".join(f"{name} ({why})" for name, why in programs.items() if isinstance(why, str))
     run += f" Not there: {missing}." if missing else ""
     parts = [" ".join(in_short(programs, results)), f"{run} {MEANING}", LIMITS]
-    return "\n\n".join(textwrap.fill(part, WIDTH) for part in parts if part)
+    return "\n\n".join(textwrap.fill(part, WIDTH, break_on_hyphens=False) for part in parts if part)
 
 
 def main() -> None:

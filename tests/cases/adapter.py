@@ -95,7 +95,9 @@ def solve(m: mg.Mechanism, engine: str, motion: Mapping[str, Any], forces: bool 
     call = mg.solve if forces else mg.kinematics
     s = call(m, motions(motion), engine=engine, on_reach="flag", **more)
     moved, acting = ("position", "velocity", "acceleration"), ("reaction", "effort", "applied_effort")
-    out: Data = {"status": np.ravel(s.status).tolist(), "warnings": len(s.warnings)}
+    # those that say a status in words count with it
+    told = [one for one in s.warnings if getattr(one, "status", None) not in s.status]
+    out: Data = {"status": np.ravel(s.status).tolist(), "warnings": len(told)}
     for quantity in (*moved, *acting) if forces else moved:
         out[quantity] = {p.name: plain(getattr(s[p.name], quantity)) for p in m.pairs}
     if forces:
