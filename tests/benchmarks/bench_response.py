@@ -242,7 +242,9 @@ def main() -> None:
     run = f"One core of {os.cpu_count()} ({processor()}), {versions}."
     run += f" Not there: {', '.join(missing)}." if missing else ""
     parts = [told(lines), f"{run} {MEANING}"]
-    text = "\n\n".join([table(names, lines, grown), *(textwrap.fill(part, WIDTH, break_on_hyphens=False) for part in parts)])
+    text = "\n\n".join(
+        [table(names, lines, grown), *(textwrap.fill(part, WIDTH, break_on_hyphens=False) for part in parts)]
+    )
     print(text)
     if "--write" in sys.argv:
         if missing:
