@@ -189,6 +189,24 @@ def test_in_a_bowl_a_ball_rolls_and_a_point_slides(radius):
     assert np.abs(r.energy.balance).max() < 1e-8
 
 
+def test_a_ball_that_rolls_in_a_bowl_off_its_meridian_is_in_balance():
+    """Friction does on the freedoms what the force does that its center needs, and turns the ball: ``J a = -R n x F``."""
+    R, rho, M, out = 0.05, 0.45, 1.0, np.array([0.6, 0.0, -0.8])
+    J = 0.4 * M * R**2
+    shell = mg.Surface.sphere(center=(0, 0, 0), radius=rho, axis=(0, 1, 0))
+    links = [mg.Link("frame"), mg.Link("ball", M, tuple(rho * out), inertia=J * np.eye(3))]
+    touch = mg.Pair(
+        "K", "Sp", "frame", "ball", point=tuple(rho * out), axis=tuple(-out), surface=shell, radius=R, closed="force"
+    )
+    m = mg.Mechanism("bowl", links, [touch], loads=[mg.Gravity((0, 0, -G)), mg.Friction("K", mu=0.8)])
+    r = mg.respond(m, [0.0, 0.05, 0.1], rates={"K.Tu": 0.0, "K.Tv": 1.0})
+    assert names(r) == ["K sticks"]
+    assert r.checks.equilibrium.max() < 1e-12
+    n = -r.link("ball").center / rho
+    F = M * (r.link("ball").center_acceleration + np.array([0.0, 0.0, G]))
+    np.testing.assert_allclose(J * r.link("ball").angular_acceleration, -R * np.cross(n, F), atol=1e-10)
+
+
 def ladder(mu, foot=0.5, **more):
     """A rod of 2 m and 3 kg between floor y = 0 and wall x = 0, which only push, its foot this far from the wall."""
     top = np.sqrt(4 - foot**2)

@@ -147,7 +147,7 @@ class RestPlace:
     def forces(self, closed: ClosedChart, v: Array) -> tuple[Array, Array]:
         """Generalized forces ``(n, T)`` and masses ``(n, n, T)`` at closed states with rates ``v (n, T)``, the drives at rest."""
         columns, loads = Columns(closed.here, closed.f, self.n), self.task.loads
-        velocities, _, inertia, _ = columns.bound((columns.Z * v).sum(axis=1))
+        velocities, _, inertia = columns.bound((columns.Z * v).sum(axis=1))
         wrenches, efforts = applied(closed.here, (*loads.stored, *loads.rest), velocities, np.zeros(closed.here.T))
         return columns.force(wrenches + inertia, efforts), columns.mass
 

@@ -504,9 +504,9 @@ class Columns:
         parts = [float(np.abs(by_wrenches * one).max(initial=0.0)) for one in wrenches]
         return max([*parts, *(float(np.abs(by_efforts * one).max(initial=0.0)) for one in efforts)], default=0.0)
 
-    def bound(self, dq: Array, ddq: Array | None = None) -> tuple[Velocities, Array, Array, Array]:
+    def bound(self, dq: Array, ddq: Array | None = None) -> tuple[Velocities, Array, Array]:
         """At rates ``dq (F, T)``, the independent ones constant, or as what rolls has it: velocities, accelerations ``ddq`` of all
-        freedoms, the inertia, and the forces ``(m, T)`` of what rolls.
+        freedoms, and the inertia, which the forces of what rolls take up with all others.
         """
         here, velocities = self.here, Velocities(self.here, dq)
         free = self.f.solve(-here.closure_bias(velocities.bias, velocities.V)[:, None])[:, 0]
@@ -515,9 +515,9 @@ class Columns:
             A = here.accelerations_with(ddq, velocities.bias)
             ddq = ddq + self.rest.still_at_rest(self.f, dq, velocities.V, velocities.bias, A)
         still, rolling = np.zeros((self.Z.shape[1], here.T)), self.rolling
-        own, forces = self.rolled(still, 0.0 if rolling is None else rolling.accelerations(velocities, ddq))
+        own = self.rolled(still, 0.0 if rolling is None else rolling.accelerations(velocities, ddq))[0]
         ddq = ddq if rolling is None else ddq + (self.Z * own).sum(axis=1)
-        return velocities, ddq, _inertia(here, velocities.V, here.accelerations_with(ddq, velocities.bias)), forces
+        return velocities, ddq, _inertia(here, velocities.V, here.accelerations_with(ddq, velocities.bias))
 
 
 def applied(
@@ -549,7 +549,7 @@ def moved(closed: ClosedChart, v: Array, p: Array, loads: Loads, t: Array) -> Mo
     columns = Columns(here, closed.f, len(v) + (0 if held is None else len(held.places)), held, loads.rolls)
     Z, Zp = columns.Z, columns.Zp
     dq = (Z * columns.rolled(v)[0]).sum(axis=1) + (Zp * p[0]).sum(axis=1)
-    velocities, ddq, inertia, forces = columns.bound(dq, (Zp * p[1]).sum(axis=1))
+    velocities, ddq, inertia = columns.bound(dq, (Zp * p[1]).sum(axis=1))
     V, rough = velocities.V, loads.ways is not None
     (stored, by_stored), (rest, by_rest) = (
         applied(here, some, velocities, t, rough) for some in (loads.stored, loads.rest)
@@ -559,8 +559,7 @@ def moved(closed: ClosedChart, v: Array, p: Array, loads: Loads, t: Array) -> Mo
     left = np.abs(unopposed).max(initial=0.0)
     if left and left > RESPONSE.unopposed * columns.largest((stored, rest, inertia), (by_stored, by_rest)):
         raise Stopped(NO_INERTIA)
-    a, more_forces = columns.rolled(a)
-    forces = forces + more_forces
+    a, forces = columns.rolled(a)
     left_over, rubs = wrenches + columns.inertia_of(a) + columns.on_links(forces), None
     if rough and loads.dry:
         problem = ForceProblem(here, left_over, efforts, np.zeros(0, dtype=np.intp), closed.f)
