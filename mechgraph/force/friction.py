@@ -451,10 +451,8 @@ class Rubbed:
     def with_grip(self, here: Configuration, grip: Grip, sizes: Array) -> Rubbed:
         """With forces of sizes ``(d, T)`` that keep bodies from sliding beside it."""
         g = None if grip.load.of in here.system.m.pair_index else _coupling(here, grip.load)
-        wrench, out = (
-            np.einsum("cdt,dt->ct", grip.W, sizes),
-            replace(self, **{n: getattr(self, n).copy() for n in _SUMS}),
-        )
+        wrench = np.einsum("cdt,dt->ct", grip.W, sizes)
+        out = replace(self, **{name: getattr(self, name).copy() for name in _SUMS})
         out._pass(_passed_on(here, grip.way, wrench[:, None]), np.ones((1, here.T)), g is not None)
         if g is not None:
             out.rubbing[:, g] += wrench

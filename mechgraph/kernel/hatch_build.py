@@ -33,9 +33,8 @@ class KernelBuildHook(BuildHookInterface[Any]):
         for command in compiler["compilers"]():
             try:
                 library = place / f"kernel-{compiler['key']()}{compiler['suffix'](target)}"
-                if (
-                    not library.is_file()
-                ):  # beside the source it may lie from another environment; its name holds the key of all that made it
+                # it may lie beside the source from another environment; its name holds the key of all that made it
+                if not library.is_file():
                     compiler["compile_library"](command, library, target)
             except (OSError, subprocess.SubprocessError) as error:
                 self.app.display_warning(f"the kernel is not compiled: {compiler['refusal'](command, error)}")

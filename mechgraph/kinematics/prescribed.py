@@ -559,5 +559,6 @@ class DriverMotion:
         if (kind, batch) not in self._values:
             T = prod(batch)
             rows = [np.broadcast_to(getattr(motion, kind), batch).reshape(T) for motion in self.motions.values()]
-            self._values[kind, batch] = np.array(rows).reshape(len(rows), T)
+            self._values[kind, batch] = found = np.array(rows).reshape(len(rows), T)
+            found.setflags(write=False)
         return self._values[kind, batch]
