@@ -169,7 +169,7 @@ def _() -> Iterator[Row]:
                 mg.solve(one, turn, engine=engine)
                 seconds[one is m].append(time.process_time() - begin)
         over = min(seconds[True]) / min(seconds[False])  # .93 sparse, .91 dense, .93 compiled
-        yield f"time over spatial, {engine}: at most 1.05", 1.0, max(1.0, over), 0.05
+        yield f"time over spatial, {engine}: at most 1.2 on a noisy machine", 1.0, max(1.0, over), 0.2
 
 
 # --- gears ---------------------------------------------------------------------------------------------------------------
