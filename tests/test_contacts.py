@@ -5,11 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import scipy
 from program import invoke
 
 import mechgraph as mg
-from mechgraph.pairs.contact_types import pressed, pressed_along_line
 
 ALPHA, WEIGHT, SPEED, G = np.deg2rad(25.0), 12.0, 0.3, 9.81
 STEEL = mg.Hertz(moduli=(210e9, 210e9))
@@ -199,36 +197,6 @@ def test_pressure_along_a_line(off: float, factor: float, part: float) -> None:
 
 def test_a_roller_that_tips_over_has_no_pressure() -> None:
     assert np.isnan(roller(0.012).contact("B").hertz.pressure)
-
-
-@pytest.mark.parametrize("ratio", [1.0, 1.3, 4.0, 60.0, 2000.0])
-def test_ellipse_of_pressure_by_its_integrals(ratio: float) -> None:
-    """The curvatures that an ellipsoid of pressure makes, as integrals (Johnson 1985, eq. 3.64), are those that were asked for."""
-    modulus, one, F = 115e9, 50.0, 250.0
-    p = pressed(np.array(F), (np.array(one), np.array(ratio * one)), modulus)
-    a, b, p0 = (float(v) for v in (p.along, p.across, p.pressure))
-    assert 2 * np.pi * a * b * p0 / 3 == pytest.approx(F, rel=1e-12)
-
-    def curvature(of: float, other: float) -> float:
-        # w = of^2 tan^2(t) takes the roots out of the integral
-        value, _ = scipy.integrate.quad(
-            lambda t: np.cos(t) ** 2 / np.sqrt(other**2 * np.cos(t) ** 2 + of**2 * np.sin(t) ** 2), 0, np.pi / 2
-        )
-        return float(p0 * a * b / modulus * value / of**2 * 2)
-
-    assert curvature(a, b) == pytest.approx(one, rel=1e-7)
-    assert curvature(b, a) == pytest.approx(ratio * one, rel=1e-7)
-
-
-def test_crossed_cylinders_and_a_line() -> None:
-    p = pressed(
-        np.array([0.0, 100.0, -1.0]), (np.array(100.0), np.array(100.0)), 115e9
-    )  # as a ball of 10 mm on a plane
-    assert p.pressure[0] == 0.0
-    assert p.pressure[1] == pytest.approx((6 * 100 * 115e9**2 / (np.pi**3 * 0.01**2)) ** (1 / 3))
-    assert np.isnan(p.pressure[2])
-    line = pressed_along_line(np.array(100.0), np.array(0.0), 0.02, np.array(100.0), 115e9)
-    assert line.pressure == pytest.approx(2 * (100 / 0.02) / (np.pi * line.across))
 
 
 def test_table_file_and_command_line(tmp_path: Path) -> None:

@@ -8,9 +8,6 @@ import pytest
 import scipy
 
 import mechgraph as mg
-from mechgraph.model import meshes as kinds
-from mechgraph.model.gear_facts import without_play
-from mechgraph.model.gears import LinePlaces
 
 X, Y, Z = np.eye(3)
 RAD = np.deg2rad
@@ -182,58 +179,7 @@ def test_marks_of_teeth_that_stand_in_gaps():
     stage(spur(mark=(X, (-np.cos(half), np.sin(half), 0.0))))
 
 
-# --- relation and force ----------------------------------------------------------------------------------------------------
-
-
-def place(point, axis, mark):
-    return LinePlaces(*(np.asarray(v, dtype=float)[:, None, None] for v in (point, axis, mark)))
-
-
-def moved(p, w, v, h):
-    """A place on a body after a small motion ``h``: turned by w about the origin, displaced by v."""
-    angle = np.linalg.norm(w) * h
-    k = np.asarray(w) / np.linalg.norm(w)
-    K = np.array([[0, -k[2], k[1]], [k[2], 0, -k[0]], [-k[1], k[0], 0]])
-    R = np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
-    turned = lambda x: (R @ x[:, 0, 0])[:, None, None]
-    return LinePlaces(turned(p.point) + h * np.asarray(v)[:, None, None], turned(p.axis), turned(p.mark))
-
-
-@pytest.mark.parametrize("forward", [True, False])
-@pytest.mark.parametrize("inner", ["none", "a", "b", "rack", "rack first"])
-def test_the_gradient_of_the_relation_is_the_line_of_action(inner, forward):
-    """Any motion of both gears in the plane and along their axes: d phi = n . (v_b - v_a) at the pitch point."""
-    rng = np.random.default_rng(5)
-    teeth, helix = ((60, 20) if inner == "a" else (20, 60)), 0.3
-    one = mg.Gear("a", "a", teeth[0], (0, 0, 0), Z, module=2.0, helix_angle=helix, internal=inner == "a")
-    if "rack" in inner:
-        two = mg.GearRack("b", "b", (0, 0, 0), X, Y, module=2.0, helix_angle=-helix)
-        met = kinds.WithRack, [one, two], [place((1, 2, 0.3), Z, X), place((4, 2 - 22.0, 0.1), X, Y)]
-        order = slice(None, None, -1 if "first" in inner else 1)
-        made = met[0](*met[1][order], *met[2][order])
-    else:
-        two = mg.Gear(
-            "b",
-            "b",
-            teeth[1],
-            (0, 0, 0),
-            Z,
-            module=2.0,
-            helix_angle=helix if inner != "none" else -helix,
-            internal=inner == "b",
-        )
-        d = abs(one.base_radius + two.base_radius) / np.cos(0.45)
-        made = kinds.Parallel(one, two, place((1, 2, 0.3), Z, X), place((1 + 0.6 * d, 2 + 0.8 * d, 1), -Z, Y))
-    relation, numbers = made.flanks(forward)[0], np.array(made.numbers)[:, None, None]
-    line = relation(made.a, made.b, numbers)
-    P, n = line.point[:, 0, 0], line.along[:, 0, 0]
-    assert np.linalg.norm(n) == pytest.approx(1.0, abs=1e-14)
-    for _ in range(4):
-        (wa, va), (wb, vb) = ((Z * rng.normal(), rng.normal(size=3)) for _ in range(2))
-        h = 1e-5
-        ends = [relation(moved(made.a, wa, va, s * h), moved(made.b, wb, vb, s * h), numbers).value for s in (1, -1)]
-        rate = (ends[0] - ends[1])[0, 0] / (2 * h)
-        assert rate == pytest.approx(n @ (vb + np.cross(wb, P) - va - np.cross(wa, P)), abs=1e-6)
+# --- force ----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("torque", [-3.0, 3.0])
@@ -555,7 +501,6 @@ def test_flanks_that_press_on_a_moving_center_are_a_mesh_without_backlash(torque
         np.testing.assert_allclose(getattr(one, what), getattr(other, what), rtol=1e-6, atol=1e-9)
     assert list(mg.over_time(loose).couplings) == list(mg.over_time(tight).couplings)
     np.testing.assert_allclose(loose["A"].force, tight["A"].force, rtol=1e-6, atol=1e-9)
-    assert "m.backward" not in {c.name for c in without_play(loose.mechanism).couplings}
 
 
 # --- planets -----------------------------------------------------------------------------------------------------------------

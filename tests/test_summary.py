@@ -8,8 +8,6 @@ from lattices import ladder
 from program import invoke
 
 import mechgraph as mg
-from mechgraph.result import summary as summaries
-from mechgraph.result.summary import Greatest, efforts, reactions
 
 Z = (0.0, 0.0, 1.0)
 TURN = {"A": mg.Motion(np.deg2rad(np.arange(0, 360, 5.0)), 10.0, 0.0)}
@@ -40,14 +38,15 @@ def test_python_says_what_the_command_line_says(name: str, redundant: str) -> No
 
 def test_extremes_are_those_of_the_arrays() -> None:
     s = mg.solve(mg.load("7r"), {"O1": mg.Motion(np.deg2rad(np.arange(0, 360, 5.0)), 10.0)})
-    found, (own, _) = reactions(s._values), efforts(s._values)
-    for k, pair in enumerate(s.mechanism.pairs):
-        sizes = [np.linalg.norm(v, axis=1) for v in (s[pair.name].force, s[pair.name].moment)]
-        np.testing.assert_allclose([found.force.best[k], found.moment.best[k]], [v.max() for v in sizes], rtol=1e-14)
-        assert [found.force.at[k], found.moment.at[k]] == [v.argmax() for v in sizes]
-    effort = s["O1"].effort[:, 0]
-    assert (-own.low.best[0], own.high.best[0]) == (effort.min(), effort.max())
-    assert (own.low.at[0], own.high.at[0]) == (effort.argmin(), effort.argmax())
+    told = s.to_dict()
+    for row in told["reactions"]:
+        for what in ("force", "moment"):
+            sizes, greatest = np.linalg.norm(getattr(s[row["pair"]], what), axis=1), row[what]["greatest"]
+            assert greatest["value"] == pytest.approx(sizes.max(), rel=1e-14)
+            assert greatest["position"] == sizes.argmax()
+    effort, (row,) = s["O1"].effort[:, 0], told["efforts"]
+    assert [row["least"][k] for k in ("value", "position")] == [effort.min(), effort.argmin()]
+    assert [row["greatest"][k] for k in ("value", "position")] == [effort.max(), effort.argmax()]
 
 
 def test_extremes_do_not_depend_on_the_blocks(four_bar: mg.Mechanism, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -56,12 +55,21 @@ def test_extremes_do_not_depend_on_the_blocks(four_bar: mg.Mechanism, monkeypatc
     assert mg.solve(four_bar, TURN).summary() == whole
 
 
-def test_the_first_of_equal_values_is_named() -> None:
-    found = Greatest(2)
-    found.look(np.array([[1.0, 5.0, np.nan], [np.nan, np.nan, np.nan]]), np.array([0, 1, 2]))
-    found.look(np.array([[5.0 * (1 + 1e-12), 2.0], [-1.0, -1.0]]), np.array([3, 4]))
-    assert found.at.tolist() == [1, 3]
-    assert found.best.tolist() == [5.0, -1.0]
+def test_the_first_of_equal_values_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An arm that turns steadily pulls with m w^2 r wherever it stands, but for rounding; also where positions lie in different blocks."""
+    monkeypatch.setattr("mechgraph.result.trajectory.TOGETHER", 1)
+    arm = mg.Mechanism(
+        "arm",
+        [mg.Link("frame"), mg.Link("arm", 2.0, (0.3, 0.1, 0))],
+        [mg.Pair("A", "R", "frame", "arm", point=(0, 0, 0), axis=Z)],
+        ["A"],
+    )
+    s = mg.solve(arm, {"A": mg.Motion(np.linspace(0.1, 2.9, 40), 3.0, 0.0)})
+    sizes = np.linalg.norm(s["A"].force, axis=1)
+    assert len(set(sizes.tolist())) > 1
+    greatest = s.to_dict()["reactions"][0]["force"]["greatest"]
+    assert greatest["position"] == 0
+    assert greatest["value"] == pytest.approx(18 * np.hypot(0.3, 0.1), rel=1e-12)
 
 
 @pytest.mark.daily(5)
@@ -114,9 +122,9 @@ def test_couplings_and_tolerances_are_told() -> None:
 def test_printing_looks_for_nothing_expensive(four_bar: mg.Mechanism, monkeypatch: pytest.MonkeyPatch) -> None:
     s = mg.solve(four_bar, TURN)
     whole = s.summary()
-    monkeypatch.setattr(summaries, "UNASKED", 100)
-    monkeypatch.setattr(summaries, "reactions", lambda _: pytest.fail("the reactions were looked for"))
-    monkeypatch.setattr(summaries, "efforts", lambda _: pytest.fail("the efforts were looked for"))
+    monkeypatch.setattr("mechgraph.result.summary.UNASKED", 100)
+    monkeypatch.setattr("mechgraph.result.summary.reactions", lambda _: pytest.fail("the reactions were looked for"))
+    monkeypatch.setattr("mechgraph.result.summary.efforts", lambda _: pytest.fail("the efforts were looked for"))
     text = " ".join(str(s).split())
     assert "(4 pairs at 72 positions) were not computed; s.summary() computes them, in about 3 s" in text
     assert "Solved 72 of 72 positions." in text
