@@ -96,13 +96,15 @@ def axes_of(axis: Any, second: Any) -> Array:
     return np.column_stack([x, np.cross(z, x), z])
 
 
-def vector_fault(value: Any, what: str, *, direction: bool = False) -> str | None:
-    """The fault of a vector of three numbers, or None; a direction must not be zero."""
-    if not is_numeric(value, (3,)):
-        return wrong(value, what, "three finite numbers (two where planar=True)")
-    if direction and not math.hypot(*value) > 1e-12:
+def vector_fault(value: Any, what: str) -> str | None:
+    """The fault of a vector of three numbers, or None."""
+    return None if is_numeric(value, (3,)) else wrong(value, what, THREE)
+
+
+def _direction_fault(value: Any, what: str, minimum: float | None) -> str | None:
+    if is_numeric(value, (3,)) and not math.hypot(*value) > 1e-12:
         return f"{what} = {value!r}: has length 0; give a direction, e.g. (0, 0, 1)"
-    return None
+    return vector_fault(value, what)
 
 
 def cosine(one: Sequence[float], other: Sequence[float]) -> float:
@@ -111,7 +113,7 @@ def cosine(one: Sequence[float], other: Sequence[float]) -> float:
     return along / (math.hypot(*one) * math.hypot(*other))
 
 
-def number_fault(value: Any, what: str, *, minimum: float | None = None) -> str | None:
+def number_fault(value: Any, what: str, minimum: float | None = None) -> str | None:
     """The fault of one number, or None."""
     if not is_numeric(value, ()):
         return wrong(value, what, "a finite number")
@@ -144,6 +146,7 @@ def same_fields(a: Any, b: Any) -> bool:
 
 
 XYZ = "xyz"
+THREE = "three finite numbers (two where planar=True)"
 Schema = Mapping[str, Any]
 STANDS_AS = {str: "a text", bool: "true or false", dict: "a table"}
 """How the types of values are called in messages."""
@@ -156,9 +159,10 @@ class FieldKind:
     """A kind of value.
 
     ``words`` name it in tables, ``schema`` is its JSON Schema, ``stands_as`` the type of a value in a file where a reader can tell
-    (None: the constructor tells); ``shape`` that of a number, vector or tensor (None for all else); ``fault(value, what, minimum)``
-    says what is wrong with a value; ``moved(value, pose)`` is the value after a rigid motion ``(3, 4)`` of the whole mechanism; ``names``
-    are those of the components where they are not x, y, z; ``entry`` is the kind of one entry of a list.
+    (None: the constructor tells); ``shape`` that of a number, vector or tensor (None for all else); ``wanted`` says what a value must be
+    (empty: anything) and ``fits(value, shape)`` whether it is that, by default finite numbers of the shape; ``fault(value, what, minimum)``
+    stands for both where a value can be wrong in several ways; ``moved(value, pose)`` is the value after a rigid motion ``(3, 4)`` of the
+    whole mechanism; ``names`` are those of the components where they are not x, y, z; ``entry`` is the kind of one entry of a list.
     """
 
     words: str
@@ -166,6 +170,8 @@ class FieldKind:
     stands_as: type | None = None
     shape: tuple[int, ...] | None = None
     numeric: bool = False
+    wanted: str = ""
+    fits: Callable[[Any, Any], bool] = is_numeric
     fault: Callable[[Any, str, float | None], str | None] | None = None
     moved: Callable[[Any, Array], Any] | None = None
     names: tuple[str, ...] = ()
@@ -250,7 +256,10 @@ class FieldFormat:
                 what,
                 f"an angle below {self.below:.4g} rad ({value:g} degrees are {math.radians(value):.7g} rad)",
             )
-        return None if self.kind.fault is None else self.kind.fault(value, what, self.minimum)
+        if self.kind.fault is not None:
+            return self.kind.fault(value, what, self.minimum)
+        fits = not self.kind.wanted or self.kind.fits(value, self.kind.shape)
+        return None if fits else wrong(value, what, self.kind.wanted)
 
 
 class _Signature:
@@ -445,69 +454,53 @@ def _turned_tensor(value: Any, pose: Array) -> Any:
     return plain((A + A.T) / 2)
 
 
-def _series_fault(width: int) -> Callable[[Any, str, float | None], str | None]:
-    """The check of a number or vector that may be an array over positions or a callable."""
-    wanted = "a finite number" if width == 1 else f"{width} finite numbers (one less where planar=True)"
-
-    def fault(value: Any, what: str, minimum: float | None) -> str | None:
-        if callable(value):
-            return None
-        array = real_array(value)
-        if array is not None and np.isfinite(array).all() and (width == 1 or array.shape[-1:] == (width,)):
-            return None
-        return wrong(value, what, f"{wanted}, an array of them over positions, or a callable (pose, twist, t)")
-
-    return fault
-
-
-def _samples_fault(value: Any, what: str, minimum: float | None) -> str | None:
+def _is_series(value: Any, shape: tuple[int, ...]) -> bool:
     array = real_array(value)
-    good = array is not None and is_numeric(array, array.shape)
-    return None if good else wrong(value, what, "finite numbers")
+    known = array is not None and array.shape[array.ndim - len(shape) :] == shape
+    return callable(value) or (known and bool(np.isfinite(array).all()))
 
 
-def _rising_fault(value: Any, what: str, minimum: float | None) -> str | None:
+def _are_finite(value: Any, shape: Any) -> bool:
     array = real_array(value)
-    rises = (
-        array is not None
-        and array.ndim <= 1
-        and is_numeric(array, array.shape)
-        and (np.diff(np.ravel(array)) > 0).all()
-    )
-    return None if rises else wrong(value, what, "finite numbers that rise")
+    return array is not None and is_numeric(array, array.shape)
 
 
-def _tensor_fault(value: Any, what: str, minimum: float | None) -> str | None:
-    return None if is_numeric(value, (3, 3)) else wrong(value, what, "a 3 x 3 tensor of finite numbers")
+def _rise(value: Any, shape: Any) -> bool:
+    return _are_finite(value, shape) and np.ndim(value) <= 1 and bool((np.diff(np.ravel(value)) > 0).all())
 
 
-def _positive_fault(
-    shape: tuple[int, ...], words: str, whole: bool = False
-) -> Callable[[Any, str, float | None], str | None]:
-    def fault(value: Any, what: str, minimum: float | None) -> str | None:
-        good = is_numeric(value, shape) and np.min(value) > 0 and not (whole and np.any(np.mod(value, 1)))
-        return None if good else wrong(value, what, f"{words} above 0")
-
-    return fault
+def _are_positive(value: Any, shape: tuple[int, ...]) -> bool:
+    return is_numeric(value, shape) and np.min(value) > 0
 
 
-def _whole_fault(value: Any, what: str, minimum: float | None) -> str | None:
-    good = isinstance(value, int | np.integer) and not isinstance(value, bool) and value >= 0
-    return None if good else wrong(value, what, "a whole number, 0 or more")
+def _are_whole(value: Any, shape: tuple[int, ...]) -> bool:
+    return _are_positive(value, shape) and not np.any(np.mod(value, 1))
 
 
-def _two_fault(value: Any, what: str, minimum: float | None) -> str | None:
-    return None if is_numeric(value, (2,)) else wrong(value, what, "two finite numbers")
+def _is_count(value: Any, shape: Any) -> bool:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool) and value >= 0
 
 
-def _vector_fault(value: Any, what: str, minimum: float | None) -> str | None:
-    return vector_fault(value, what)
+def _is_named_point(value: Any, shape: tuple[int, ...]) -> bool:
+    return isinstance(value, str) or is_numeric(value, shape)
 
 
-def _named_point_fault(value: Any, what: str, minimum: float | None) -> str | None:
-    if isinstance(value, str) or is_numeric(value, (3,)):
-        return None
-    return wrong(value, what, "three finite numbers (two where planar=True), or the name of a point of the link")
+def _are_names(value: Any, shape: Any) -> bool:
+    return isinstance(value, list | tuple) and all(isinstance(name, str) and name for name in value)
+
+
+def _is_interval(value: Any, shape: tuple[int, ...]) -> bool:
+    return is_numeric(value, shape) and value[0] < value[1]
+
+
+def are_rows(width: int, value: Any, shape: Any) -> bool:
+    """Whether a value is rows of so many finite numbers each."""
+    array = real_array(value)
+    return array is not None and array.ndim == 2 and is_numeric(array, (len(array), width))
+
+
+def _is_function(value: Any, shape: Any) -> bool:
+    return callable(value)
 
 
 def _points_fault(value: Any, what: str, minimum: float | None) -> str | None:
@@ -522,31 +515,12 @@ def _points_fault(value: Any, what: str, minimum: float | None) -> str | None:
     return None
 
 
-def _names_fault(value: Any, what: str, minimum: float | None) -> str | None:
-    good = isinstance(value, list | tuple) and all(isinstance(name, str) and name for name in value)
-    return None if good else wrong(value, what, "a list of names")
-
-
-def _interval_fault(value: Any, what: str, minimum: float | None) -> str | None:
-    return (
-        None
-        if is_numeric(value, (2,)) and value[0] < value[1]
-        else wrong(value, what, "two finite numbers, the second above the first")
-    )
-
-
-def _point_list_fault(value: Any, what: str, minimum: float | None) -> str | None:
-    array = real_array(value)
-    good = array is not None and array.ndim == 2 and array.shape[1] == 3 and is_numeric(value, array.shape)
-    return None if good else wrong(value, what, "points of three finite numbers each")
+def _moved_function(function: Any, pose: Array) -> MovedShape:
+    return MovedShape(function, plain(pose))
 
 
 def _moved_points(value: Any, pose: Array) -> Any:
     return plain(np.asarray(value) @ pose[:, :3].T + pose[:, 3])
-
-
-def _function_fault(value: Any, what: str, minimum: float | None) -> str | None:
-    return None if callable(value) else wrong(value, what, "a function")
 
 
 BESIDE = 0.5 * (3.0 - np.sqrt(5.0))
@@ -659,81 +633,58 @@ TEXT = FieldKind("text", {"type": "string"}, str)
 LINK_NAME = FieldKind("text", {"type": "string"}, str)
 FREEDOM_NAME = FieldKind("text", {"type": "string"}, str)
 FLAG = FieldKind("true/false", {"type": "boolean"}, bool)
-INTEGER = FieldKind("integer", {"type": "integer", "minimum": 0}, fault=_whole_fault)
-NUMBER = FieldKind(
-    "number", {"type": "number"}, None, (), True, lambda value, what, least: number_fault(value, what, minimum=least)
-)
-POINT = FieldKind("3 numbers", _VECTOR, None, (3,), True, _vector_fault, _moved_point)
-NAMED_POINT = FieldKind(
-    "3 numbers or a name",
-    {"anyOf": [_VECTOR, {"type": "string", "minLength": 1}]},
-    None,
-    (3,),
-    True,
-    _named_point_fault,
-    _moved_point,
-)
-POINTS = FieldKind(
-    "table of 3 numbers",
-    {"type": "object", "additionalProperties": _VECTOR},
-    None,
-    None,
-    True,
-    _points_fault,
-    _moved_point,
-)
-VECTOR = FieldKind("3 numbers", _VECTOR, None, (3,), True, _vector_fault, _turned)
-DIRECTION = FieldKind(
-    "3 numbers", _VECTOR, None, (3,), True, lambda value, what, _: vector_fault(value, what, direction=True), _turned
-)
-TENSOR = FieldKind(
-    "3 × 3",
-    {"anyOf": [{"type": "array", "items": _VECTOR, "minItems": 3, "maxItems": 3}, {"type": "number"}]},
-    None,
-    (3, 3),
-    True,
-    _tensor_fault,
-    _turned_tensor,
-)
+INTEGER = FieldKind("integer", {"type": "integer", "minimum": 0}, wanted="a whole number, 0 or more", fits=_is_count)
+NUMBER = FieldKind("number", {"type": "number"}, None, (), True, fault=number_fault)
+POINT = FieldKind("3 numbers", _VECTOR, None, (3,), True, THREE, moved=_moved_point)
+_NAMED: Schema = {"anyOf": [_VECTOR, {"type": "string", "minLength": 1}]}
+_OR_NAME = f"{THREE}, or the name of a point of the link"
+NAMED_POINT = FieldKind("3 numbers or a name", _NAMED, None, (3,), True, _OR_NAME, _is_named_point, moved=_moved_point)
+_NAMED_VECTORS: Schema = {"type": "object", "additionalProperties": _VECTOR}
+POINTS = FieldKind("table of 3 numbers", _NAMED_VECTORS, numeric=True, fault=_points_fault, moved=_moved_point)
+VECTOR = FieldKind("3 numbers", _VECTOR, None, (3,), True, THREE, moved=_turned)
+DIRECTION = FieldKind("3 numbers", _VECTOR, None, (3,), True, fault=_direction_fault, moved=_turned)
+_TENSOR: Schema = {"anyOf": [{"type": "array", "items": _VECTOR, "minItems": 3, "maxItems": 3}, {"type": "number"}]}
+TENSOR = FieldKind("3 × 3", _TENSOR, None, (3, 3), True, "a 3 x 3 tensor of finite numbers", moved=_turned_tensor)
 SIX = FieldKind("6 numbers", {"$ref": "#/$defs/six"})
-SERIES = FieldKind("number(s)", {"$ref": "#/$defs/series"}, None, (), True, _series_fault(1))
-VECTOR_SERIES = FieldKind(
-    "3 numbers (series)", {"$ref": "#/$defs/vector_series"}, None, (3,), True, _series_fault(3), _turned
-)
-SAMPLES = FieldKind("n numbers", {"$ref": "#/$defs/series"}, None, None, True, _samples_fault, entry=NUMBER)
+_SERIES, _VECTORS = {"$ref": "#/$defs/series"}, {"$ref": "#/$defs/vector_series"}
+_OR_SERIES = "an array of them over positions, or a callable (pose, twist, t)"
+_THREE_OR_SERIES = f"3 finite numbers (one less where planar=True), {_OR_SERIES}"
+SERIES = FieldKind("number(s)", _SERIES, None, (), True, f"a finite number, {_OR_SERIES}", _is_series)
+VECTOR_SERIES = FieldKind("3 numbers (series)", _VECTORS, None, (3,), True, _THREE_OR_SERIES, _is_series, moved=_turned)
+SAMPLES = FieldKind("n numbers", _SERIES, numeric=True, wanted="finite numbers", fits=_are_finite, entry=NUMBER)
 _ABOVE_0: Schema = {"type": "number", "exclusiveMinimum": 0}
 _AB, _ENDS = ("a", "b"), ("begin", "end")
 _TWO: Schema = {"type": "array", "minItems": 2, "maxItems": 2}
-POSITIVE = FieldKind("number > 0", _ABOVE_0, None, (), True, _positive_fault((), "a finite number"))
-TWO = FieldKind("2 numbers", {**_TWO, "items": {"type": "number"}}, None, (2,), True, _two_fault, names=_AB)
+_TWO_NUMBERS: Schema = {**_TWO, "items": {"type": "number"}}
+_TWO_WHOLE: Schema = {**_TWO, "items": {"type": "integer", "exclusiveMinimum": 0}}
+_TWO_RISING = "two finite numbers, the second above the first"
+POSITIVE = FieldKind("number > 0", _ABOVE_0, None, (), True, "a finite number above 0", _are_positive)
+TWO = FieldKind("2 numbers", _TWO_NUMBERS, None, (2,), True, "two finite numbers", names=_AB)
 TWO_POSITIVE = FieldKind(
     "2 numbers > 0",
     {**_TWO, "items": _ABOVE_0},
     None,
     (2,),
     True,
-    _positive_fault((2,), "two finite numbers"),
+    "two finite numbers above 0",
+    _are_positive,
     names=_AB,
 )
 TWO_WHOLE = FieldKind(
-    "2 integers > 0",
-    {**_TWO, "items": {"type": "integer", "exclusiveMinimum": 0}},
-    None,
-    (2,),
-    True,
-    _positive_fault((2,), "two whole numbers", whole=True),
-    names=_AB,
+    "2 integers > 0", _TWO_WHOLE, None, (2,), True, "two whole numbers above 0", _are_whole, names=_AB
 )
-INTERVAL = FieldKind("2 numbers", {**_TWO, "items": {"type": "number"}}, None, (2,), True, _interval_fault, names=_ENDS)
+INTERVAL = FieldKind("2 numbers", _TWO_NUMBERS, None, (2,), True, _TWO_RISING, _is_interval, names=_ENDS)
+_LIST: Schema = {"type": "array", "items": _VECTOR}
+_POINTS = "points of three finite numbers each"
 POINT_LIST = FieldKind(
-    "n × 3", {"type": "array", "items": _VECTOR}, None, None, True, _point_list_fault, _moved_points, entry=POINT
+    "n × 3", _LIST, None, None, True, _POINTS, partial(are_rows, 3), moved=_moved_points, entry=POINT
 )
-FUNCTION = FieldKind(
-    "function", {"not": {}}, None, None, False, _function_fault, lambda f, pose: MovedShape(f, plain(pose))
-)
-BREAKS = FieldKind("rising numbers", {"not": {}}, None, None, True, _rising_fault)
+FUNCTION = FieldKind("function", {"not": {}}, wanted="a function", fits=_is_function, moved=_moved_function)
+BREAKS = FieldKind("rising numbers", {"not": {}}, numeric=True, wanted="finite numbers that rise", fits=_rise)
 """Where a function is not smooth; files hold no functions."""
-NAMES = FieldKind("names", {"type": "array", "items": {"type": "string", "minLength": 1}}, fault=_names_fault)
+
+_TEXTS: Schema = {"type": "array", "items": {"type": "string", "minLength": 1}}
+NAMES = FieldKind("names", _TEXTS, wanted="a list of names", fits=_are_names)
 NUMBERS = FieldKind("n numbers", {"type": "array", "items": {"type": "number"}})
 FACTS = FieldKind("table", {"type": "object"}, dict)
 COEFFICIENTS = FieldKind(

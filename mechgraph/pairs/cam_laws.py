@@ -15,8 +15,8 @@ from __future__ import annotations
 import math
 import os
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cached_property
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, Self
 
@@ -34,6 +34,7 @@ from mechgraph.fields import (
     TEXT,
     Described,
     FieldKind,
+    are_rows,
 )
 from mechgraph.files import text_of
 from mechgraph.maths.se3 import Array
@@ -186,26 +187,21 @@ def rise_of(name: str) -> LawPieces:
     return of_polynomial(RISES[name]) if name in RISES else of_scca(*SCCA[name])
 
 
-def _rows_fault(width: int, words: str) -> Callable[[Any, str, float | None], str | None]:
-    def fault(value: Any, what: str, minimum: float | None) -> str | None:
-        array = real_array(value)
-        good = array is not None and array.ndim == 2 and array.shape[1] == width and bool(np.isfinite(array).all())
-        return None if good else wrong(value, what, words)
-
-    return fault
-
-
 _NUMBERS = {"type": "array", "items": {"type": "number"}}
 CONDITIONS = FieldKind(
     "n × 3",
     {"type": "array", "items": {**_NUMBERS, "minItems": 3, "maxItems": 3}},
-    fault=_rows_fault(3, "a table (angle, order of the derivative) -> value, or rows of these three numbers"),
+    wanted="a table (angle, order of the derivative) -> value, or rows of these three numbers",
+    fits=partial(are_rows, 3),
 )
+"""Conditions of a motion law, each an angle, the order of the derivative there, and its value."""
 POINTS_OF_LAW = FieldKind(
     "n × 2",
     {"type": "array", "items": {**_NUMBERS, "minItems": 2, "maxItems": 2}},
-    fault=_rows_fault(2, "(angles, values), or rows of an angle and a value"),
+    wanted="(angles, values), or rows of an angle and a value",
+    fits=partial(are_rows, 2),
 )
+"""Samples of a motion law."""
 
 
 @dataclass(frozen=True)
