@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, field, fields
 from functools import lru_cache, partial
+from operator import methodcaller
 from types import MappingProxyType
 from typing import Any, ClassVar, Self
 
@@ -200,7 +201,8 @@ class FieldFormat:
     """One field: its kind, its meaning in a sentence, and its dimension (``slide`` and ``turn`` differ where a freedom decides).
 
     ``degrees``: may be given in degrees under its name with ``_deg`` added; ``minimum``: smallest number; ``below``: what the size of
-    an angle stays below; ``choices``: the texts allowed; ``of``: of the name of a point, the field that names its link; ``normal``: of a
+    an angle stays below; ``choices``: the texts allowed; ``of``: of the name of a point, the field that names its link; ``across``: of a
+    direction, the one across which it is where it is left out; ``normal``: of a
     vector, whether in a plane it stands on that (a moment); ``key``: its name in files where it is another; ``table``:
     the table of the file that it holds; ``single``: of the name of a freedom, whether it must not be part of a rotation; ``default``:
     in words, where the value does not say it; ``held_in``: the array of ``Declared`` that holds the number, and the factor, where the
@@ -216,6 +218,7 @@ class FieldFormat:
     below: float | None = None
     choices: tuple[str, ...] = ()
     of: str = ""
+    across: str = ""
     normal: bool = False
     key: str = ""
     table: str = ""
@@ -278,12 +281,14 @@ class Formatted:
     """What the fields hold, by their names."""
     _own: ClassVar[Mapping[str, FieldFormat]] = {}
     _numeric: ClassVar[tuple[str, ...]] = ()
+    _lists: ClassVar[tuple[str, ...]] = ()
+    _across: ClassVar[tuple[tuple[str, str], ...]] = ()
     _defaults: ClassVar[tuple[Any, ...]] = ()
 
     def __init_subclass__(cls) -> None:
         if cls.__repr__ is Formatted.__repr__:
             cls.__repr__ = Formatted.__repr__  # type: ignore[method-assign]  # dataclass leaves alone what stands in the class itself
-        for name, make in (("_own", _own), ("formats", _formats), ("_numeric", _numeric), ("_defaults", _defaults)):
+        for name, make in WORKED_OUT.items():
             setattr(cls, name, class_cached(make, name, cls))
         if words := cls.__doc__:
             cls.__doc__ = class_cached(partial(_described, words), "__doc__", cls)  # type: ignore[assignment]
@@ -314,11 +319,25 @@ def _numeric(cls: type[Formatted]) -> tuple[str, ...]:
     return tuple(name for name, about in cls.formats.items() if about.kind.numeric)
 
 
+def _lists(cls: type[Formatted]) -> tuple[str, ...]:
+    return tuple(name for name, about in cls.formats.items() if about.kind in (NAMES, TABLES))
+
+
+def _across(cls: type[Formatted]) -> tuple[tuple[str, str], ...]:
+    return tuple((name, about.across) for name, about in cls.formats.items() if about.across)
+
+
 def _defaults(cls: type[Formatted]) -> tuple[Any, ...]:
     given = (getattr(cls, name, NEEDED) for name in cls.formats)
     return tuple(
         (NEEDED if one.default is MISSING else one.default) if isinstance(one, Field) else one for one in given
     )
+
+
+WORKED_OUT: dict[str, Callable[[type[Formatted]], Any]] = {
+    "_own": _own, "formats": _formats, "_numeric": _numeric, "_lists": _lists, "_across": _across, "_defaults": _defaults,
+}  # fmt: skip
+"""What a class with fields knows of them, worked out where it is first asked for."""
 
 
 def _described(text: str, cls: type[Formatted]) -> str:
@@ -344,12 +363,31 @@ def is_default(cls: type, name: str, value: Any) -> bool:
 class Described(Formatted):
     """A declared thing whose numbers are read, checked, moved and converted by what its fields hold."""
 
+    def __post_init__(self) -> None:
+        self.read_numbers()
+        self.fill_directions()
+
+    def __eq__(self, other: object) -> bool:
+        return same_fields(self, other)
+
+    def __hash__(self) -> int:
+        return hash(type(self).__name__)
+
     def read_numbers(self) -> None:
-        """Turn what the numeric fields hold into floats and tuples of floats; to be called where the fields are set."""
+        """Turn what the numeric fields hold into floats and tuples of floats, and lists into tuples; where the fields are set."""
         for name in self._numeric:
             value = getattr(self, name)
             if value is not None and type(value) is not float:
                 object.__setattr__(self, name, on_each(plain, value))
+        for name in self._lists:
+            if isinstance(value := getattr(self, name), list):
+                object.__setattr__(self, name, tuple(value))
+
+    def fill_directions(self) -> None:
+        """Set the directions across others that are left out."""
+        for name, axis in self._across:
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, filled_second(getattr(self, axis)))
 
     def value_faults(self, where: str) -> list[str]:
         """What is wrong with the values alone; None is no fault where the field may be left out."""
@@ -364,49 +402,73 @@ class Described(Formatted):
         """A copy with fields changed."""
         return type(self)(**{**{name: getattr(self, name) for name in self.formats}, **changes})
 
-    def moved(self, pose: Array) -> Self:
-        """The same after a rigid motion ``(3, 4)`` of the whole mechanism; itself where nothing in it has a place or direction."""
+    def changed(self, change: Callable[[str, FieldFormat, Any], Any], inner: Callable[[Any], Any]) -> Self:
+        """With ``change(name, about, value)`` in place of every value, ``inner(value)`` of what is described itself.
+
+        Where all values stay, it is the same object.
+        """
         changes = {}
         for name, about in self.formats.items():
             value = getattr(self, name)
-            if isinstance(value, Described):
-                changes[name] = value.moved(pose)
-            elif value is not None and about.kind.moved is not None:
-                changes[name] = about.kind.moved(value, pose)
+            made = inner(value) if isinstance(value, Described) else change(name, about, value)
+            if made is not value:
+                changes[name] = made
         return self.replace(**changes) if changes else self
+
+    def moved(self, pose: Array) -> Self:
+        """The same after a rigid motion ``(3, 4)`` of the whole mechanism; itself where nothing in it has a place or direction."""
+
+        def change(name: str, about: FieldFormat, value: Any) -> Any:
+            return value if value is None or about.kind.moved is None else about.kind.moved(value, pose)
+
+        return self.changed(change, methodcaller("moved", pose))
 
     def without_quantities(self, units: Mapping[str, str], turns: bool = False) -> Self:
         """The same with quantities of pint as plain numbers in these units; those that do not fit stay, and are faults.
 
         ``turns``: whether the freedom that it names is a turn.
         """
-        changes = {}
-        for name, about in self.formats.items():
-            value = getattr(self, name)
-            if isinstance(value, Described):
-                changes[name] = value.without_quantities(units, turns)
-            elif about.kind.numeric and has_quantity(value):
-                changes[name] = without_units(value, about.turn if turns else about.slide, units)
-        return self.replace(**changes) if changes else self
+
+        def change(name: str, about: FieldFormat, value: Any) -> Any:
+            known = not about.kind.numeric or not has_quantity(value)
+            return value if known else without_units(value, about.turn if turns else about.slide, units)
+
+        return self.changed(change, methodcaller("without_quantities", units, turns))
 
     def in_units(self, base: tuple[float, float, float], turns: bool = False) -> Self:
         """The same with every number times ``prod_i base_i^dimension_i``; ``turns``: whether the freedom that it names is a turn.
 
         ``base (3,)`` are the factors of lengths, masses and times. A callable is refused (DeclarationError).
         """
-        changes = {}
-        for name, about in self.formats.items():
-            value = getattr(self, name)
-            if isinstance(value, Described):
-                changes[name] = value.in_units(base, turns)
-            elif callable(value):
+
+        def change(name: str, about: FieldFormat, value: Any) -> Any:
+            if callable(value):
                 what = f"{name} of a {type(self).__name__}"
                 raise DeclarationError("to_units", [f"{what} is a callable; convert it yourself, or sample it first"])
-            elif value is not None and about.kind.numeric:
-                factor = factor_of(about.turn if turns else about.slide, base)
-                if factor != 1.0 and not isinstance(value, str):
-                    changes[name] = on_each(partial(_times, factor), value)
-        return self.replace(**changes) if changes else self
+            if value is None or isinstance(value, str) or not about.kind.numeric:
+                return value
+            factor = factor_of(about.turn if turns else about.slide, base)
+            return value if factor == 1.0 else on_each(partial(_times, factor), value)
+
+        return self.changed(change, methodcaller("in_units", base, turns))
+
+    def numbers_turn(self, turns: Callable[[Any], bool]) -> bool:
+        """Whether its numbers are those of a turn; ``turns(freedom)`` says so of a freedom."""
+        return turns(getattr(self, "freedom", None))
+
+    def in_own_units(self, units: Mapping[str, str], turns: Callable[[Any], bool]) -> Self:
+        """``without_quantities`` in a mechanism with these units."""
+        return self.without_quantities(units, self.numbers_turn(turns))
+
+    def converted(self, base: tuple[float, float, float], turns: Callable[[Any], bool]) -> Self:
+        """``in_units`` in a mechanism of which the units change."""
+        return self.in_units(base, self.numbers_turn(turns))
+
+
+def remade(item: Any) -> tuple[Any, tuple[Any, ...]]:
+    """By its fields alone, as ``__reduce__``: what is worked out stays behind, and tables that are read-only do not pickle."""
+    given = {f.name: getattr(item, f.name) for f in fields(item)}
+    return partial(type(item), **{name: dict(v) if isinstance(v, Mapping) else v for name, v in given.items()}), ()
 
 
 def on_each(change: Callable[[Any], Any], value: Any) -> Any:
@@ -696,6 +758,12 @@ TABLE = FieldKind("table", {})
 TABLES = FieldKind("tables", {})
 OTHER = FieldKind("", {})
 """A kind whose schema the field itself gives, in ``rules``."""
+
+
+def across(meaning: str) -> FieldFormat:
+    """A second direction beside ``axis``."""
+    return DIRECTION(meaning, across="axis", default="global axis least aligned with `axis`")
+
 
 POSITION = {"dimension": LENGTH, "turn": PURE, "degrees": True}
 """Of a field that holds a coordinate: an angle or a length, as the freedom is."""

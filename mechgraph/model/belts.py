@@ -176,14 +176,6 @@ class BeltDrive(LineCoupling):
         """The belt."""
         return self.belt
 
-    def __post_init__(self) -> None:
-        self.read_numbers()
-        for name in ("over", "backs"):
-            if isinstance(value := getattr(self, name), list):
-                object.__setattr__(self, name, tuple(value))
-        object.__setattr__(self, "terms", ())
-        object.__setattr__(self, "constant", None)
-
     @property
     def rubs(self) -> tuple[str, ...]:  # type: ignore[override]
         """See ``BaseCoupling``: teeth do not slip."""
@@ -449,14 +441,6 @@ class BeltDrive(LineCoupling):
         """See ``LineCoupling``: the angle between the axes, and how far beside each other the pulleys move."""
         lean, _ = super().strayed(a, b, a0, b0)
         return lean, np.abs(dot(b.point - a.point, a.axis) - dot(b0.point - a0.point, a0.axis))
-
-    def in_own_units(self, units: Mapping[str, str], turns: Sequence[bool]) -> Self:
-        """See ``BaseCoupling``."""
-        return self.without_quantities(units)
-
-    def converted(self, base: tuple[float, float, float], turns: Sequence[bool]) -> Self:
-        """See ``BaseCoupling``."""
-        return self.in_units(base)
 
     def course_of(self, m: Any, poses: Sequence[Array]) -> BeltCourse:
         """The belt where the links of its pulleys have the poses ``(3 or 4, 4, T)``, in the user's units."""

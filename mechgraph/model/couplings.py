@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -96,14 +96,6 @@ class BaseCoupling(Described, ABC):
         """The same with other coefficients, and another constant where it has one."""
         return self
 
-    @abstractmethod
-    def in_own_units(self, units: Mapping[str, str], turns: Sequence[bool]) -> Self:
-        """The same with quantities of pint as plain numbers in these units; ``turns`` says which freedoms are angles."""
-
-    @abstractmethod
-    def converted(self, base: tuple[float, float, float], turns: Sequence[bool]) -> Self:
-        """The same relation in other units, lengths, masses and times times ``base``; ``turns`` says which freedoms are angles."""
-
 
 @dataclass(frozen=True, init=False)
 class Coupling(BaseCoupling):
@@ -189,24 +181,23 @@ class Coupling(BaseCoupling):
             found.append(number_fault(self.constant, where + "constant"))
         return list(dict.fromkeys(fault for fault in found if fault))
 
-    def in_own_units(self, units: Mapping[str, str], turns: Sequence[bool]) -> Self:
+    def in_own_units(self, units: Mapping[str, str], turns: Callable[[Any], bool]) -> Self:
         """The same with quantities of pint as plain numbers in these units; ``turns`` says which freedoms are angles."""
         if not _is_terms(self.terms):
             return self
-        slides = not any(turns)
+        slides = not any(map(turns, self.freedoms))
         terms = [
-            (name, plain(without_units(c, PURE if slides or turn else (-1, 0, 0), units)))
-            for (name, c), turn in zip(self.terms, turns, strict=True)
+            (name, plain(without_units(c, PURE if slides or turns(name) else (-1, 0, 0), units)))
+            for name, c in self.terms
         ]
         return self.replace(terms=terms, constant=without_units(self.constant, LENGTH if slides else PURE, units))
 
-    def converted(self, base: tuple[float, float, float], turns: Sequence[bool]) -> Self:
+    def converted(self, base: tuple[float, float, float], turns: Callable[[Any], bool]) -> Self:
         """The same relation in other units; ``turns`` says which freedoms are angles (the rule stands above)."""
         length = base[0]
-        if not any(turns):
+        if not any(map(turns, self.freedoms)):
             return self.replace(constant=None if self.constant is None else self.constant * length)
-        pairs = zip(self.terms, turns, strict=True)
-        return self.replace(terms=[(name, c if turn else c / length) for (name, c), turn in pairs])
+        return self.replace(terms=[(name, c if turns(name) else c / length) for name, c in self.terms])
 
 
 def _read_terms(given: Any) -> Any:

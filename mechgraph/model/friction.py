@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from copy import copy
 from dataclasses import field
-from typing import Annotated, Any, ClassVar, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -142,15 +142,7 @@ class Friction(Load):
             return np.broadcast_to(rest if at_rest else mu, speed.shape)
         return np.asarray(mu + (rest - mu) * np.exp(-np.square(speed / self.stribeck)))
 
-    def in_own_units(self, units: Mapping[str, str], turns: Callable[[Any], bool]) -> Self:
-        """See ``Load``."""
-        return self.without_quantities(units, self._turns(turns))
-
-    def converted(self, base: tuple[float, float, float], turns: Callable[[Any], bool]) -> Self:
-        """See ``Load``."""
-        return self.in_units(base, self._turns(turns))
-
-    def _turns(self, turns: Callable[[Any], bool]) -> bool:
+    def numbers_turn(self, turns: Callable[[Any], bool]) -> bool:
         """Whether its pair turns."""
         return any(turns(name) for name in (self.of, *(f"{self.of}.R{axis}" for axis in "xyz")))
 

@@ -118,6 +118,8 @@ class LineCoupling(BaseCoupling):
     linear: bool = False
     turning: tuple[bool, bool] = (True, True)
     play: str = ""
+    terms = ()
+    constant = None
     is_force = True
 
     @property
@@ -286,9 +288,6 @@ class _OnLink(Described):
         link: str
         point: Any
         axis: Any
-
-    def __post_init__(self) -> None:
-        self.read_numbers()
 
     @cached_property
     def place(self) -> LinkPlace:

@@ -33,7 +33,6 @@ from mechgraph.fields import (
     VECTOR,
     VECTOR_SERIES,
     Described,
-    same_fields,
 )
 from mechgraph.maths.se3 import Array, rotate
 from mechgraph.memo import dataclass
@@ -124,15 +123,6 @@ class Load(Described, ABC):
     subject: ClassVar[str]
     """How messages call it; fields in braces."""
 
-    def __post_init__(self) -> None:
-        self.read_numbers()
-
-    def __eq__(self, other: object) -> bool:
-        return same_fields(self, other)
-
-    def __hash__(self) -> int:
-        return hash(type(self).__name__)
-
     @abstractmethod
     def act(self, site: LoadSite) -> None:
         """Add the load's forces, couples and efforts at the positions of ``site``."""
@@ -214,14 +204,6 @@ class Load(Described, ABC):
         named = (getattr(self, name) for name, about in self.formats.items() if about.kind is FREEDOM_NAME)
         return tuple(name for name in named if name is not None)
 
-    def in_own_units(self, units: Mapping[str, str], turns: Callable[[Any], bool]) -> Self:
-        """The same with quantities of pint as plain numbers in these units; ``turns`` says which freedoms are angles."""
-        return self.without_quantities(units, turns(self.in_freedom))
-
-    def converted(self, base: tuple[float, float, float], turns: Callable[[Any], bool]) -> Self:
-        """The same in other units: every number times a factor; ``turns`` says which freedoms are angles."""
-        return self.in_units(base, turns(self.in_freedom))
-
     @property
     def takes_coordinate(self) -> bool:
         """Whether it depends on the coordinate of its freedom, which then has to be a single one."""
@@ -279,9 +261,6 @@ class ForceTable(Described):
         Literal["error", "hold"],
         TEXT('beyond the ends an `"error"`, or the value there (`"hold"`)', choices=("error", "hold")),
     ] = "error"
-
-    def __post_init__(self) -> None:
-        self.read_numbers()
 
     def faults(self, where: str) -> list[str]:
         """What is wrong with the table."""

@@ -189,6 +189,10 @@ def _vector(value: Any, axes: str) -> str:
     return "" if value is None else f"({', '.join(f'{x + 0.0:.4g}' for x in value[: len(axes)])})"
 
 
+DESCRIBED = ("links", "pairs", "drives", "loads", "gears", "couplings")
+"""What a mechanism holds of things with numbers of their own."""
+
+
 @dataclass(frozen=True, eq=False)
 class Mechanism(DeclaredParts, Shown):
     """Declare a mechanism: a graph with links as nodes and kinematic pairs as edges.
@@ -320,23 +324,9 @@ class Mechanism(DeclaredParts, Shown):
         """Turn quantities of pint into plain numbers, where units are declared; whether there may have been any."""
         if not self.units or not _are_pairs(self.pairs):
             return False
-        new: dict[str, list[Any]] = {
-            "links": [item.without_quantities(self.units) for item in self.links if isinstance(item, Link)],
-            "pairs": [item.without_quantities(self.units) for item in self.pairs if isinstance(item, Pair)],
-            "drives": [
-                item.without_quantities(self.units, self.turns(item.freedom))
-                for item in self.drives
-                if isinstance(item, Drive)
-            ],
-            "loads": [item.in_own_units(self.units, self.turns) for item in self.loads if isinstance(item, Load)],
-            "gears": [item.without_quantities(self.units) for item in self.gears if isinstance(item, Described)],
-            "couplings": [
-                item.in_own_units(self.units, [self.turns(name) for name in item.freedoms])
-                for item in self.couplings
-                if isinstance(item, BaseCoupling)
-            ],
-        }
-        self._set(**{key: tuple(items) for key, items in new.items() if len(items) == len(getattr(self, key))})
+        for key in DESCRIBED:
+            if all(isinstance(item, Described) for item in getattr(self, key)):
+                self._set(**{key: tuple(item.in_own_units(self.units, self.turns) for item in getattr(self, key))})
         return True
 
     def _take_plane(self) -> None:
@@ -614,12 +604,7 @@ class Mechanism(DeclaredParts, Shown):
             raise DeclarationError("to_units", [f"mechanism {self.name!r}: {what}"])
         base, turns = base_factors(self.units, units), self.turns
         return self.replace(
-            links=[link.in_units(base) for link in self.links],
-            pairs=[pair.in_units(base) for pair in self.pairs],
-            gears=[g.in_units(base) for g in self.gears],
-            couplings=[c.converted(base, [turns(name) for name in c.freedoms]) for c in self.couplings],
-            drives=[drive.in_units(base, turns(drive.freedom)) for drive in self.drives],
-            loads=[load.converted(base, turns) for load in self.loads],
+            **{name: [item.converted(base, turns) for item in getattr(self, name)] for name in DESCRIBED},
             start={name: value if turns(name) else value * base[0] for name, value in self.start.items()},
             response=None if self.response is None else self.response.converted(base, turns),
             units={**self.units, **units},

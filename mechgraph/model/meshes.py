@@ -64,11 +64,6 @@ class Meshing(LineCoupling):
     play: str = ""
     backlash: float = 0.0
 
-    def __post_init__(self) -> None:
-        self.read_numbers()
-        for name, value in (("terms", ()), ("constant", None), ("steps", ())):
-            object.__setattr__(self, name, value)
-
     @abstractmethod
     def _met(self, m: Any) -> Meeting:
         """Both gears where they meet in a mechanism without faults."""
@@ -160,14 +155,6 @@ class Meshing(LineCoupling):
             places.append((dot(p.axis, q.axis), apart, dot(foot_a - p.point, p.axis), dot(foot_b - q.point, q.axis)))
         lean, *found = [now - then for now, then, held in zip(*places, (True, True, *self.held), strict=True) if held]
         return np.abs(lean), np.abs(found).max(axis=0)
-
-    def in_own_units(self, units: Any, turns: Any) -> Self:
-        """See ``BaseCoupling``."""
-        return self.without_quantities(units)
-
-    def converted(self, base: tuple[float, float, float], turns: Any) -> Self:
-        """See ``BaseCoupling``."""
-        return self.in_units(base)
 
 
 def about_ends(

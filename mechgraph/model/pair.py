@@ -23,9 +23,10 @@ from mechgraph.fields import (
     TENSOR,
     TEXT,
     Described,
+    across,
     axes_of,
     cosine,
-    filled_second,
+    remade,
 )
 from mechgraph.fields import TABLE as NESTED
 from mechgraph.fields import second_direction as second_direction
@@ -113,13 +114,11 @@ class Link(Described):
     ] = field(default=None, hash=False)
 
     def __post_init__(self) -> None:
-        self.read_numbers()
+        super().__post_init__()
         if self.points is None:
             object.__setattr__(self, "points", NO_POINTS)
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        given = {name: getattr(self, name) for name in self.formats}
-        return partial(type(self), **given | {"points": dict(self.points)}), ()
+    __reduce__ = remade
 
     def point(self, name: str) -> tuple[float, float, float]:
         """The point of that name, in the link's frame."""
@@ -199,9 +198,6 @@ class SeatNumbers(Described):
     Mx: float | None = None
     My: float | None = None
     Mz: float | None = None
-
-    def __post_init__(self) -> None:
-        self.read_numbers()
 
     @property
     def by_component(self) -> dict[str, float]:
@@ -300,12 +296,7 @@ class Marker(Described):
         0.0,
         1.0,
     )
-    second: Annotated[Any, DIRECTION("x: second direction", default="global axis least aligned with `axis`")] = None
-
-    def __post_init__(self) -> None:
-        self.read_numbers()
-        if self.second is None:
-            object.__setattr__(self, "second", filled_second(self.axis))
+    second: Annotated[Any, across("x: second direction")] = None
 
     def faults(self, where: str, most: float) -> list[str]:
         """What is wrong with this marker; ``most`` is the largest cosine that its axis and second direction may have."""
@@ -409,13 +400,7 @@ class Pair(Described):
             "axis, plane normal or groove direction (z of the marker), global, any length", default="z for S and W"
         ),
     ] = None
-    second: Annotated[
-        Any,
-        DIRECTION(
-            "x of the marker; must be perpendicular to `axis` for U, Sc, Cp",
-            default="global axis least aligned with `axis`",
-        ),
-    ] = None
+    second: Annotated[Any, across("x of the marker; must be perpendicular to `axis` for U, Sc, Cp")] = None
     pitch: Annotated[
         float | None, NUMBER("advance per radian of H, right-hand positive", LENGTH, default="exactly one")
     ] = None
@@ -485,8 +470,7 @@ class Pair(Described):
                 self._place(contact)
         if self.axis is None and self.point is not None and isinstance(self.type, PairType) and not self.type.directed:
             put("axis", (0.0, 0.0, 1.0))
-        if self.second is None:
-            put("second", filled_second(self.axis))
+        self.fill_directions()
 
     def _on_its_shape(self) -> PlacedRow | None:
         """The row with the curves or the surface that are given; None where they have faults."""

@@ -22,7 +22,7 @@ from mechgraph.fields import (
     TEXT,
     Described,
     plain,
-    same_fields,
+    remade,
 )
 from mechgraph.maths.se3 import Array
 from mechgraph.memo import dataclass
@@ -220,26 +220,14 @@ class ResponseSetup(Described):
             value = getattr(self, name)
             kept = {} if value is None else value
             object.__setattr__(self, name, MappingProxyType(dict(kept)) if isinstance(kept, Mapping) else kept)
-        motions = self.motions
-        if isinstance(motions, Mapping):
-            motions = tuple(Drive(name, motion) for name, motion in motions.items())
-        object.__setattr__(self, "motions", motions)
+        if isinstance(self.motions, Mapping):
+            object.__setattr__(self, "motions", tuple(Drive(name, motion) for name, motion in self.motions.items()))
         for name, kind in (("motions", Drive), ("events", Event), ("stops", Stop)):
             value = getattr(self, name)
             if isinstance(value, kind):
                 object.__setattr__(self, name, (value,))
-            elif isinstance(value, list):
-                object.__setattr__(self, name, tuple(value))
 
-    def __eq__(self, other: object) -> bool:
-        return same_fields(self, other)
-
-    def __hash__(self) -> int:
-        return hash((self.rtol, self.atol, self.method))
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        given = {name: getattr(self, name) for name in self.formats}
-        return _rebuilt, (given | {"start": dict(self.start), "rates": dict(self.rates)},)
+    __reduce__ = remade
 
     @property
     def times(self) -> Array:
@@ -366,7 +354,3 @@ def _motion_faults(m: Nameable, one: Drive) -> list[str]:
         if callable(one.motion)
         else [wrong(one.motion, f"motion of {one.freedom!r}", "a Motion with t, or a function of t")]
     )
-
-
-def _rebuilt(given: dict[str, Any]) -> ResponseSetup:
-    return ResponseSetup(**given)

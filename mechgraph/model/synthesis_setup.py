@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 
-from mechgraph.fields import FACTS, INTEGER, NAMES, OTHER, TABLES, TEXT, Described, Schema, plain, same_fields
+from mechgraph.fields import FACTS, INTEGER, NAMES, OTHER, TABLES, TEXT, Described, Schema, plain, remade
 from mechgraph.memo import dataclass
 from mechgraph.quantities import is_numeric, items_of, real_array, wrong
 
@@ -97,12 +97,6 @@ class SynthesisTask(Described):
                 tuple({k: plain(v) for k, v in row.items()} if isinstance(row, Mapping) else row for row in self.rows),
             )
 
-    def __eq__(self, other: object) -> bool:
-        return same_fields(self, other)
-
-    def __hash__(self) -> int:
-        return hash((self.kind, self.input, self.output, self.point, self.link))
-
     @staticmethod
     def of(task: Any) -> Any:
         """A task of ``mg.function``, ``mg.path``, ``mg.poses``, ``mg.positions`` in this form; anything else as it is."""
@@ -175,28 +169,19 @@ class SynthesisSetup(Described):
     starts: Annotated[int, INTEGER("from how many dimensions fits begin")] = 64
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         tasks = self.tasks if isinstance(self.tasks, list | tuple) else (self.tasks,)
         object.__setattr__(self, "tasks", tuple(map(SynthesisTask.of, tasks)))
         for name in ("unknown", "require"):
-            value = getattr(self, name)
-            object.__setattr__(
-                self, name, tuple(value) if isinstance(value, list) else (value,) if isinstance(value, str) else value
-            )
+            if isinstance(value := getattr(self, name), str):
+                object.__setattr__(self, name, (value,))
         for name, ends in (("bounds", True), ("conditions", True), ("sweep", False), ("over", False)):
             value = getattr(self, name)
             if value is None or isinstance(value, Mapping):
                 read = _two_ends if ends else plain
                 object.__setattr__(self, name, MappingProxyType({k: read(v) for k, v in (value or {}).items()}))
 
-    def __eq__(self, other: object) -> bool:
-        return same_fields(self, other)
-
-    def __hash__(self) -> int:
-        return hash((self.unknown, self.fit, self.starts))
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        given = {name: getattr(self, name) for name in self.formats}
-        return _rebuilt, ({k: dict(v) if isinstance(v, Mapping) else v for k, v in given.items()},)
+    __reduce__ = remade
 
     def faults(self) -> list[str]:
         """What is wrong with it by itself, one line each; names are looked up where it is asked."""
@@ -238,7 +223,3 @@ def _two_ends(value: Any) -> Any:
 def _is_interval(value: Any) -> bool:
     fits = isinstance(value, tuple) and len(value) == 2
     return fits and all(is_numeric(v, ()) or v in (-np.inf, np.inf) for v in value) and value[0] <= value[1]
-
-
-def _rebuilt(given: dict[str, Any]) -> SynthesisSetup:
-    return SynthesisSetup(**given)

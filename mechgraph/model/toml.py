@@ -403,7 +403,7 @@ def _data(item: Described, path: str, where: str) -> dict[str, Any]:
     out = {}
     for key, about in item.formats.items():
         value = getattr(item, key)
-        filled = key == "second" and value == filled_second(getattr(item, "axis", value))
+        filled = about.across and value == filled_second(getattr(item, about.across))
         if (
             value is not None
             and not filled

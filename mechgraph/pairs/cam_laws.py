@@ -469,8 +469,6 @@ class CamLaw(Described, Once, Shown):
 
     def __post_init__(self) -> None:
         self.read_numbers()
-        if isinstance(self.segments, list):
-            object.__setattr__(self, "segments", tuple(self.segments))
         if self._waits:
             return
         if found := self._all_faults():

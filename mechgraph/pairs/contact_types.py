@@ -581,9 +581,6 @@ class Hertz(Described):
     ] = None
     length: Annotated[float | None, POSITIVE("of the line along which a cylinder touches", LENGTH)] = None
 
-    def __post_init__(self) -> None:
-        self.read_numbers()
-
     def value_faults(self, where: str) -> list[str]:
         """See ``Described``."""
         found = super().value_faults(where)

@@ -19,9 +19,8 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import fields
-from functools import cached_property, partial
-from typing import Annotated, Any, ClassVar, Literal, cast
+from functools import cached_property
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 import scipy
@@ -37,9 +36,10 @@ from mechgraph.fields import (
     POSITIVE,
     TEXT,
     Described,
+    across,
     axes_of,
     cosine,
-    filled_second,
+    remade,
     second_direction,
 )
 from mechgraph.maths.se3 import Array, cross
@@ -158,12 +158,7 @@ class Curve(Described, Once):
         Any, DIRECTION("direction near which a guided frame keeps its third axis", default="that of the curve")
     ] = None
 
-    def __post_init__(self) -> None:
-        self.read_numbers()
-
-    def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
-        """What is declared alone: all else is found again."""
-        return remade_from(self)
+    __reduce__ = remade
 
     @abstractmethod
     def at(self, u: Array) -> Array:
@@ -328,11 +323,6 @@ class Curve(Described, Once):
         return self.value_faults(where)
 
 
-def remade_from(shape: Any) -> tuple[Any, tuple[Any, ...]]:
-    """How a shape is copied and pickled: from its fields alone."""
-    return partial(cast(Any, type(shape)), **{f.name: getattr(shape, f.name) for f in fields(shape)}), ()
-
-
 def turned(R: Array, v: Array) -> Array:
     """Products ``R v`` of a matrix ``(3, 3)`` and vectors ``(3, ...)``."""
     return (R @ v.reshape(3, -1)).reshape(v.shape)
@@ -376,14 +366,7 @@ class Centred(Curve):
 
     center: Annotated[Any, POINT("center", LENGTH, default="0")] = ORIGIN
     axis: Annotated[Any, DIRECTION("normal of the plane, or axis", default="z")] = (0.0, 0.0, 1.0)
-    second: Annotated[
-        Any, DIRECTION("where the parameter is zero", default="global axis least aligned with `axis`")
-    ] = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.second is None:
-            object.__setattr__(self, "second", filled_second(self.axis))
+    second: Annotated[Any, across("where the parameter is zero")] = None
 
     def faults(self, where: str) -> list[str]:
         """What is wrong with what is declared, one line each."""

@@ -24,16 +24,17 @@ from mechgraph.fields import (
     POINT_LIST,
     POSITIVE,
     Described,
+    across,
     asked,
     axes_of,
     between,
-    filled_second,
+    remade,
     slope_faults,
 )
 from mechgraph.fields import TABLE as NESTED
 from mechgraph.maths.se3 import Array, cross
 from mechgraph.memo import dataclass
-from mechgraph.pairs.curves import ORIGIN, Circle, Curve, Line, far_from, parallel_faults, remade_from
+from mechgraph.pairs.curves import ORIGIN, Circle, Curve, Line, far_from, parallel_faults
 from mechgraph.quantities import LENGTH, PURE, shown, wrong
 
 NO_ENDS = (-np.inf, np.inf)
@@ -65,12 +66,7 @@ class Surface(Described):
     patch: ClassVar[Any]
     function: ClassVar[Any]
 
-    def __post_init__(self) -> None:
-        self.read_numbers()
-
-    def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
-        """What is declared alone: all else is found again."""
-        return remade_from(self)
+    __reduce__ = remade
 
     @abstractmethod
     def at(self, u: Array, v: Array) -> Array:
@@ -179,14 +175,7 @@ class AboutAxis(Surface):
         ORIGIN
     )
     axis: Annotated[Any, DIRECTION("axis, or normal of the plane", default="z")] = (0.0, 0.0, 1.0)
-    second: Annotated[
-        Any, DIRECTION("along u of a plane; where u is zero", default="global axis least aligned with `axis`")
-    ] = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.second is None:
-            object.__setattr__(self, "second", filled_second(self.axis))
+    second: Annotated[Any, across("along u of a plane; where u is zero")] = None
 
     def faults(self, where: str) -> list[str]:
         """What is wrong with what is declared, one line each."""
