@@ -33,13 +33,12 @@ from mechgraph.model import parts
 from mechgraph.model.belts import BeltDrive
 from mechgraph.model.couplings import Coupling
 from mechgraph.model.friction import Friction
-from mechgraph.model.gears import BevelGear, Gear, GearRack, Pulley, Worm, WormWheel
+from mechgraph.model.gears import BevelGear, Gear, GearRack, Pulley, Worm, WormWheel, planet_places
 from mechgraph.model.loads import Damper, Effort, ForceLaw, ForceTable, Gravity, Spring, TorsionSpring, Wrench
 from mechgraph.model.mechanism import Mechanism, chain
 from mechgraph.model.meshes import Mesh
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Misfit, Pair, Stiffness
-from mechgraph.model.planets import planet_places
 from mechgraph.model.response_setup import Event, ResponseSetup, Stop
 from mechgraph.model.short_forms import Belt, BevelGears, Rack, SpurGears, WormGear
 from mechgraph.model.synthesis_setup import SynthesisSetup

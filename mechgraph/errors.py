@@ -331,15 +331,6 @@ class FrictionError(PathError):
         super().__init__(message, value, solution)
         self.kind, self.factor, self.places = kind, factor, places
 
-    def __reduce__(self) -> Any:
-        return _remade_friction, (str(self), self.value, self.solution, self.kind, self.factor, self.places)
-
-
-def _remade_friction(
-    message: str, value: dict[str, float], solution: Any, kind: str, factor: float, places: tuple[str, ...]
-) -> FrictionError:
-    return FrictionError(message, value, solution, kind=kind, factor=factor, places=places)
-
 
 class DeadPointError(PathError):
     """The drivers do not determine the motion at this position (dead point or change point).

@@ -15,7 +15,7 @@ from dataclasses import MISSING, Field, field, fields
 from functools import lru_cache, partial
 from operator import methodcaller
 from types import MappingProxyType
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,6 +144,33 @@ def same(a: Any, b: Any) -> bool:
 def same_fields(a: Any, b: Any) -> bool:
     """Field by field equality of two dataclasses of one type, arrays included."""
     return type(a) is type(b) and all(same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a) if f.compare)
+
+
+class Nameable(Protocol):
+    """Links and freedoms of a mechanism, by name."""
+
+    @property
+    def link_index(self) -> Mapping[str, int]:
+        """Place of every link, by name."""
+
+    @property
+    def planar(self) -> bool:
+        """Whether it is a planar one."""
+
+    def freedom_fault(self, name: Any, *, single: bool) -> str | None:
+        """Why ``name`` is no freedom (with ``single``: no single freedom), or None."""
+
+    def massive_links(self) -> tuple[str, ...]:
+        """Links that have mass."""
+
+    def link(self, name: str) -> Any:
+        """The link of that name."""
+
+    def ends_of(self, freedom: str) -> tuple[str, str]:
+        """Links a and b of the pair of a freedom."""
+
+    def full_name(self, name: str) -> str:
+        """The full spelling ``"B.Tz"`` of a freedom."""
 
 
 XYZ = "xyz"
@@ -468,7 +495,8 @@ class Described(Formatted):
 def remade(item: Any) -> tuple[Any, tuple[Any, ...]]:
     """By its fields alone, as ``__reduce__``: what is worked out stays behind, and tables that are read-only do not pickle."""
     given = {f.name: getattr(item, f.name) for f in fields(item)}
-    return partial(type(item), **{name: dict(v) if isinstance(v, Mapping) else v for name, v in given.items()}), ()
+    make: Any = type(item)
+    return partial(make, **{name: dict(v) if isinstance(v, Mapping) else v for name, v in given.items()}), ()
 
 
 def on_each(change: Callable[[Any], Any], value: Any) -> Any:
@@ -518,8 +546,9 @@ def _turned_tensor(value: Any, pose: Array) -> Any:
 
 def _is_series(value: Any, shape: tuple[int, ...]) -> bool:
     array = real_array(value)
-    known = array is not None and array.shape[array.ndim - len(shape) :] == shape
-    return callable(value) or (known and bool(np.isfinite(array).all()))
+    if array is None:
+        return callable(value)
+    return array.shape[array.ndim - len(shape) :] == shape and bool(np.isfinite(array).all())
 
 
 def _are_finite(value: Any, shape: Any) -> bool:
@@ -532,11 +561,11 @@ def _rise(value: Any, shape: Any) -> bool:
 
 
 def _are_positive(value: Any, shape: tuple[int, ...]) -> bool:
-    return is_numeric(value, shape) and np.min(value) > 0
+    return is_numeric(value, shape) and bool(np.min(value) > 0)
 
 
 def _are_whole(value: Any, shape: tuple[int, ...]) -> bool:
-    return _are_positive(value, shape) and not np.any(np.mod(value, 1))
+    return _are_positive(value, shape) and not bool(np.any(np.mod(value, 1)))
 
 
 def _is_count(value: Any, shape: Any) -> bool:

@@ -145,12 +145,13 @@ def of_graph(make: Callable[[Any], Made]) -> Callable[[Any], Made]:
 class Once:
     """A thing that does not change, with what is made of it."""
 
-    def once(self, make: Callable[[Any], Made]) -> Made:
-        """``make(self)``, made once and kept."""
+    def once(self, make: Callable[..., Made], *of: Any) -> Made:
+        """``make(*of, self)``, made once and kept."""
         kept = self._kept_of_graph if "of_graph" in vars(make) else self._kept
-        if make not in kept:
-            kept[make] = under(carried(self), make, self)
-        made: Made = kept[make]
+        key = (make, *of) if of else make
+        if key not in kept:
+            kept[key] = under(carried(self), make, *of, self)
+        made: Made = kept[key]
         return made
 
     def take_graph_of(self, other: Once) -> None:
@@ -158,11 +159,11 @@ class Once:
         vars(self)["_kept_of_graph"] = other._kept_of_graph
 
     @cached_property
-    def _kept(self) -> dict[Callable[..., Any], Any]:
+    def _kept(self) -> dict[Any, Any]:
         return {}
 
     @cached_property
-    def _kept_of_graph(self) -> dict[Callable[..., Any], Any]:
+    def _kept_of_graph(self) -> dict[Any, Any]:
         return {}
 
 

@@ -24,11 +24,10 @@ from mechgraph.memo import dataclass
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import SEATS, Marker, Pair, Stiffness
-from mechgraph.model.plane import dropped, in_space, lifted
+from mechgraph.model.plane import dropped, held_in_plane, in_plane, in_space, instead_of, lifted
 from mechgraph.pairs.contact_types import row_of
 from mechgraph.pairs.factors import Component
 from mechgraph.pairs.pair_type import PairType
-from mechgraph.pairs.plane import held_in_plane, in_plane, instead_of
 from mechgraph.quantities import is_numeric, unknown, wrong
 
 LEVEL = 1e-9

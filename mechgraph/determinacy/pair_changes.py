@@ -38,9 +38,9 @@ from mechgraph.model.couplings import motion_of
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.meshes import Mesh
 from mechgraph.model.pair import Link, Marker, Pair
+from mechgraph.model.plane import in_plane
 from mechgraph.pairs import pair_type as evaluation
 from mechgraph.pairs.pair_type import TABLE, PairType
-from mechgraph.pairs.plane import in_plane
 
 CHANGES_SHOWN, FREEING = 6, 3
 """Largest number of single changes, and of sets of changes, reported; and of changes that let a structure move."""

@@ -37,7 +37,7 @@ from mechgraph.fields import (
 )
 from mechgraph.maths.se3 import Array, cross, identity
 from mechgraph.memo import dataclass
-from mechgraph.model.couplings import OF_BELTS, MeshStep, are_placed, fitting_of, meeting, motion_of, way
+from mechgraph.model.couplings import OF_BELTS, MeshStep, fitting_of, meeting, motion_of, way
 from mechgraph.model.gears import (
     LineCoupling,
     LinePlaces,
@@ -49,6 +49,7 @@ from mechgraph.model.gears import (
     dot,
     pose_along,
 )
+from mechgraph.model.pair import are_placed
 from mechgraph.quantities import FORCE, LENGTH, shown, unknown, wrong
 
 

@@ -14,6 +14,7 @@ from mechgraph.fields import (
     TEXT,
     Described,
     FieldFormat,
+    Nameable,
     number_fault,
     plain,
     sound_tol,
@@ -21,7 +22,6 @@ from mechgraph.fields import (
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import SHAPES
 from mechgraph.memo import dataclass
-from mechgraph.model.pair import Nameable, Pair, pairs_are_sound
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.quantities import LENGTH, PURE, is_numeric, shown, without_units, wrong
 
@@ -91,6 +91,11 @@ class BaseCoupling(Described, ABC):
     def varies(self) -> bool:
         """Whether its coefficients are numbers of their own, which a study may vary."""
         return not self.steps
+
+    @classmethod
+    def doubts(cls, m: Any) -> list[str]:
+        """What may be meant otherwise of all that a mechanism holds of this kind."""
+        return []
 
     def renumbered(self, coefficients: Sequence[float], constant: float) -> Self:
         """The same with other coefficients, and another constant where it has one."""
@@ -229,14 +234,7 @@ def fitting_of(m: Any) -> float:
     return max(SHAPES.met, 2.0 * sound_tol(m.tol))
 
 
-def are_placed(m: Any) -> bool:
-    """Whether every pair says where it sits, without faults."""
-    return all(pair.has_geometry for pair in m.pairs) and (
-        pairs_are_sound(m.pairs, 0.0) or not any(pair.faults() for pair in m.pairs)
-    )
-
-
-def motion_of(pair: Pair) -> str:
+def motion_of(pair: Any) -> str:
     """``"turn"`` or ``"slide"`` of a pair whose only freedom is one about or along its axis; nothing for other pairs."""
     freedoms = pair.type.freedoms
     plain: dict[tuple[float, ...], str] = {
@@ -322,7 +320,7 @@ def followed(
     """
     senses: list[float] = []
     for step in steps[: 1 if motion == "slide" else None]:
-        pair: Pair = m.pairs[step.pair]
+        pair = m.pairs[step.pair]
         before, behind = (pair.markers[int((step.sense > 0) == later)] for later in (False, True))
         q, w = before.line
         off = 0.0 if motion == "slide" else _largest_of_cross(q - p, z)

@@ -261,7 +261,7 @@ def with_play(m: Mechanism) -> tuple[Mechanism, list[Stop]]:
             couplings.append(c)
             continue
         met = c.seen(m)
-        line = met.flanks(True)[0](met.a, met.b, np.array(met.numbers)[:, None, None])
+        line = met.line()
         n, z, arm = (v[:, 0, 0] for v in (line.along, met.a.axis, line.point - met.a.point))
         way = z if isinstance(met.one, GearRack) else np.cross(z, arm)
         known = _facts(m, c).backlash

@@ -33,6 +33,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
+from mechgraph.errors import DeclarationError
 from mechgraph.fields import (
     DIRECTION,
     FLAG,
@@ -59,7 +60,7 @@ from mechgraph.model.couplings import (
     tooth_angle,
 )
 from mechgraph.pairs import pair_type as evaluation
-from mechgraph.quantities import LENGTH, PURE, repeated, shown, unknown, wrong
+from mechgraph.quantities import LENGTH, PURE, door, repeated, shown, unknown, wrong
 
 # --- couplings along lines ------------------------------------------------------------------------------------------
 
@@ -278,30 +279,27 @@ CROSSING = {side: partial(between_axes, side) for side in (1.0, -1.0)}
 # --- gears ---------------------------------------------------------------------------------------------------------------
 
 
+@dataclass(frozen=True)
 class _OnLink(Described):
     """What gears and pulleys share: a place on a link."""
 
     kind: ClassVar[str]
-    mark: Any = None
-    if TYPE_CHECKING:
-        name: str
-        link: str
-        point: Any
-        axis: Any
+    name: Annotated[str, TEXT("differs from all gears and pulleys")]
+    link: Annotated[str, LINK_NAME("the link on which it is")]
 
     @cached_property
-    def place(self) -> LinkPlace:
+    def place(self: Any) -> LinkPlace:
         """The place with unit directions."""
         axis: Array = np.asarray(self.axis, dtype=float)
         axis = axis / np.linalg.norm(axis)
-        mark: Array = np.asarray(second_direction(axis) if self.mark is None else self.mark, dtype=float)
+        mark: Array = np.asarray(getattr(self, "mark", None) or second_direction(axis), dtype=float)
         mark = mark - axis * (mark @ axis)
         return LinkPlace(self.link, self.point, tuple(axis), tuple(mark / np.linalg.norm(mark)))
 
     def value_faults(self, where: str) -> list[str]:
         """See ``Described``."""
         found = super().value_faults(where)
-        if self.axis is None:
+        if getattr(self, "axis", None) is None:
             found.append(f"{where}axis: is missing; give a direction, e.g. (0, 0, 1) (planar=True needs none)")
         return found
 
@@ -360,8 +358,6 @@ class Gear(_Involute):
     """
 
     kind: ClassVar[str] = "gear"
-    name: Annotated[str, TEXT("differs from all gears and pulleys")]
-    link: Annotated[str, LINK_NAME("the link on which it is")]
     teeth: Annotated[int, INTEGER("number of teeth")]
     point: Annotated[Any, _POINT]
     axis: Annotated[Any, DIRECTION("its axis", normal=True, default="in a plane its normal")] = None
@@ -396,8 +392,6 @@ class GearRack(_Involute):
     """
 
     kind: ClassVar[str] = "rack"
-    name: Annotated[str, TEXT("differs from all gears and pulleys")]
-    link: Annotated[str, LINK_NAME("the link on which it is")]
     point: Annotated[Any, POINT("in the middle of its width, on the pitch line", LENGTH)]
     direction: Annotated[Any, DIRECTION("in which its teeth stand in a row, across the axis of the pinion")]
     normal: Annotated[Any, DIRECTION("out of its teeth, towards the pinion")]
@@ -429,8 +423,6 @@ class BevelGear(_Toothed):
     """
 
     kind: ClassVar[str] = "bevel"
-    name: Annotated[str, TEXT("differs from all gears and pulleys")]
-    link: Annotated[str, LINK_NAME("the link on which it is")]
     teeth: Annotated[int, INTEGER("number of teeth")]
     point: Annotated[Any, POINT("on its axis, on the side of the apex where it is", LENGTH)]
     axis: Annotated[Any, DIRECTION("its axis")]
@@ -456,8 +448,6 @@ class Worm(_Toothed):
     """
 
     kind: ClassVar[str] = "worm"
-    name: Annotated[str, TEXT("differs from all gears and pulleys")]
-    link: Annotated[str, LINK_NAME("the link on which it is")]
     teeth: Annotated[int, INTEGER("number of starts")]
     point: Annotated[Any, POINT("on its axis", LENGTH)]
     axis: Annotated[Any, DIRECTION("its axis")]
@@ -479,8 +469,6 @@ class WormWheel(_Toothed):
     """
 
     kind: ClassVar[str] = "worm_wheel"
-    name: Annotated[str, TEXT("differs from all gears and pulleys")]
-    link: Annotated[str, LINK_NAME("the link on which it is")]
     teeth: Annotated[int, INTEGER("number of teeth")]
     point: Annotated[Any, POINT("on its axis", LENGTH)]
     axis: Annotated[Any, DIRECTION("its axis")]
@@ -502,7 +490,6 @@ class Pulley(_OnLink):
 
     kind: ClassVar[str] = "pulley"
     name: Annotated[str, TEXT("differs from all pulleys")]
-    link: Annotated[str, LINK_NAME("the link on which it is")]
     point: Annotated[Any, POINT("its center, in the plane of the belt", LENGTH)]
     axis: Annotated[
         Any,
@@ -583,3 +570,48 @@ def off_axis(m: Any) -> Iterator[str]:
                 f"{gear.kind} {gear.name!r} is {away[name][0]:.6g} beside the axis of pair {name!r}, about which its link turns: it runs "
                 "eccentrically; move its point onto that axis if it should not"
             )
+
+
+@door
+def planet_places(sun: int, ring: int, n: int) -> Array:
+    """Return the angles ``(n,)`` [rad] at which ``n`` planets between a sun and a ring can be put in, as evenly as teeth allow.
+
+    The planets have ``(ring - sun) / 2`` teeth. Even places need ``(sun + ring) / n`` whole; others are multiples of ``2 pi / (sun +
+    ring)``. Neighbors need ``(sun + planet) sin(pi / n) > planet + 2``.
+
+    Parameters
+    ----------
+    sun, ring, n : int
+        Teeth of the sun and of the ring; number of planets.
+
+    Raises
+    ------
+    DeclarationError
+        Planets that would overlap, or whose teeth are no whole number.
+
+    Examples
+    --------
+    >>> import mechgraph as mg
+    >>> import numpy as np
+    >>> np.rad2deg(mg.planet_places(20, 54, 3)).round(4)
+    array([  0.    , 121.6216, 238.3784])
+    """
+    faults = [
+        f"{name} = {shown(value)}: expected a whole number above 0"
+        for name, value in (("sun", sun), ("ring", ring), ("n", n))
+        if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < 1
+    ]
+    if not faults and (ring - sun < 2 or (ring - sun) % 2):
+        faults.append(f"sun = {sun}, ring = {ring}: planets have half the difference, a whole number above 0")
+    if not faults:
+        planet, steps = (ring - sun) // 2, np.round(np.arange(n) * (sun + ring) / n)
+        found = 2 * pi * steps / (sun + ring)
+        gaps = np.diff(np.append(found, 2 * pi))
+        room = float((sun + planet) * np.sin(min(gaps.min(), pi) / 2)) if n > 1 else np.inf
+        if room <= planet + 2:
+            faults.append(
+                f"n = {n}: neighbors overlap, ({sun} + {planet}) sin(half their angle) = {room:.6g}; expected more than {planet + 2}"
+            )
+    if faults:
+        raise DeclarationError("planet_places", faults)
+    return np.asarray(found)

@@ -33,10 +33,10 @@ from mechgraph.fields import (
     VECTOR,
     VECTOR_SERIES,
     Described,
+    Nameable,
 )
 from mechgraph.maths.se3 import Array, rotate
 from mechgraph.memo import dataclass
-from mechgraph.model.pair import Nameable
 from mechgraph.quantities import (
     ACCELERATION,
     FORCE,

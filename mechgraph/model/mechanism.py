@@ -34,16 +34,15 @@ from mechgraph.model.declaration import (
     item_faults,
     mapping_faults,
 )
+from mechgraph.model.gears import off_axis
 from mechgraph.model.loads import Gravity, Load
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Pair
-from mechgraph.model.plane import in_space, is_flat, pair_in_plane, pair_in_space, spatial_row
-from mechgraph.model.planets import gear_doubts
+from mechgraph.model.plane import in_plane, in_space, is_flat, pair_in_plane, pair_in_space, spatial_row
 from mechgraph.model.response_setup import ResponseSetup
 from mechgraph.model.synthesis_setup import SynthesisSetup
 from mechgraph.pairs.contact_types import row_of, travels
 from mechgraph.pairs.pair_type import TABLE, PairType
-from mechgraph.pairs.plane import in_plane
 from mechgraph.quantities import (
     LENGTH,
     MASS,
@@ -67,8 +66,9 @@ def mechanism_document(m: DeclaredParts) -> Document:
     """The mechanism as a document; what is long is cut, with the number of what is left out."""
     blocks: list[Block] = [Paragraph(m.description), Paragraph(f"Source: {m.source}" if m.source else "")]
     blocks.append(Paragraph(_counts(m)))
-    for title, parts in PARTS.items():
-        blocks += [Heading(title, 2), *found] if (found := list(parts(m))) else []
+    lines = {title: _listed(items) for title, items in _in_lines(m).items()}
+    for title, parts in {"Links": _links(m), "Pairs": _pairs(m), "Drivers": _drives(m), **lines}.items():
+        blocks += [Heading(title, 2), *found] if (found := list(parts)) else []
     return Document(f"Mechanism {m.name}", tuple(blocks))
 
 
@@ -143,30 +143,6 @@ def _motion(motion: Motion | None) -> str:
     return "" if motion is None else repr(motion).removeprefix("Motion(").removesuffix(")")
 
 
-def _couplings(m: DeclaredParts) -> Iterator[Block]:
-    yield from _listed(f"{c.name}: {c.text}" for c in m.couplings)
-
-
-def _gears(m: DeclaredParts) -> Iterator[Block]:
-    yield from _listed(map(repr, m.gears))
-
-
-def _loads(m: DeclaredParts) -> Iterator[Block]:
-    yield from _listed(map(repr, m.loads))
-
-
-def _response(m: DeclaredParts) -> Iterator[Block]:
-    yield from _listed([] if m.response is None else [repr(m.response)])
-
-
-def _synthesis(m: DeclaredParts) -> Iterator[Block]:
-    yield from _listed([] if m.synthesis is None else [repr(m.synthesis)])
-
-
-def _start(m: DeclaredParts) -> Iterator[Block]:
-    yield from _listed(f"{name} = {value:.6g}" for name, value in m.start.items() if value)
-
-
 def _listed(items: Iterable[str]) -> Iterator[Block]:
     texts = list(items)
     more = [f"... and {len(texts) - LISTED:,} more"] if len(texts) > LISTED else []
@@ -174,11 +150,16 @@ def _listed(items: Iterable[str]) -> Iterator[Block]:
         yield Bullets([*texts[:LISTED], *more])
 
 
-PARTS: Mapping[str, Any] = {
-    "Links": _links, "Pairs": _pairs, "Drivers": _drives, "Gears": _gears, "Couplings": _couplings, "Loads": _loads,
-    "Response": _response, "Synthesis": _synthesis, "Start": _start,
-}  # fmt: skip
-"""The parts of the document by title."""
+def _in_lines(m: DeclaredParts) -> dict[str, Iterable[str]]:
+    """What is told in a line each, by headings."""
+    return {
+        "Gears": map(repr, m.gears),
+        "Couplings": (f"{c.name}: {c.text}" for c in m.couplings),
+        "Loads": map(repr, m.loads),
+        "Response": [] if m.response is None else [repr(m.response)],
+        "Synthesis": [] if m.synthesis is None else [repr(m.synthesis)],
+        "Start": (f"{name} = {value:.6g}" for name, value in m.start.items() if value),
+    }
 
 
 def _number(value: float) -> str:
@@ -304,21 +285,28 @@ class Mechanism(DeclaredParts, Shown):
             expected=MappingProxyType(dict(expected) if isinstance(expected, Mapping) else {}),
         )
         if not faults:
-            self._take_plane()
-            faults = declaration_faults(self)
-            if faults and self._take_quantities():
-                self._take_plane()
-                self._set(_kept={}, _kept_of_graph={})  # what was found of pairs with quantities
-                faults = declaration_faults(self)
+            faults = self._checked(declaration_faults)
         self._finish(start, faults + mapping_faults(units=units, start=start, expected=expected))
         self._set(couplings=tuple(one for c in self.couplings for one in c.written(self)))
         self._doubt()
-        for fault in gear_doubts(self) if self.gears and "_changed_from" not in vars(self) else ():
-            warnings.warn(f"mechanism {self.name!r}: {fault}", MechgraphWarning, stacklevel=3)
+        if self.gears and self.has_geometry and "_changed_from" not in vars(self):
+            kinds = dict.fromkeys(map(type, self.couplings))
+            for fault in (*off_axis(self), *(fault for kind in kinds for fault in kind.doubts(self))):
+                warnings.warn(f"mechanism {self.name!r}: {fault}", MechgraphWarning, stacklevel=3)
 
     def _set(self, **fields: Any) -> None:
         for key, value in fields.items():
             object.__setattr__(self, key, value)
+
+    def _checked(self, faults_of: Callable[[Mechanism], list[str]]) -> list[str]:
+        """Its faults, with what follows from the plane filled in; where there are some, after its quantities are read."""
+        self._take_plane()
+        faults = faults_of(self)
+        if faults and self._take_quantities():
+            self._take_plane()
+            self._set(_kept={}, _kept_of_graph={})  # what was found of pairs with quantities
+            faults = faults_of(self)
+        return faults
 
     def _take_quantities(self) -> bool:
         """Turn quantities of pint into plain numbers, where units are declared; whether there may have been any."""
@@ -438,12 +426,7 @@ class Mechanism(DeclaredParts, Shown):
             (k, v) for k, v in vars(self).items() if isinstance(getattr(Mechanism, k, None), cached_property)
         )
         start = changes.get("start", self.start)
-        out._take_plane()
-        faults = item_faults(out)
-        if faults and out._take_quantities():
-            out._take_plane()
-            faults = item_faults(out)
-        out._finish(start, wrong_kinds + faults + mapping_faults(start=start))
+        out._finish(start, wrong_kinds + out._checked(item_faults) + mapping_faults(start=start))
         if "loads" in changes:
             out._doubt()
         return out

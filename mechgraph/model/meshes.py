@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
 from math import atan, cos, pi, sin, tan
 from typing import Annotated, Any, ClassVar, Self
 
@@ -18,7 +19,6 @@ from mechgraph.memo import dataclass
 from mechgraph.model.couplings import (
     OF_TEETH,
     MeshStep,
-    are_placed,
     fitting_of,
     followed,
     meeting,
@@ -29,9 +29,11 @@ from mechgraph.model.gears import (
     CROSSING,
     CYLINDRICAL,
     RACKED,
+    Gear,
     GearRack,
     LineCoupling,
     LinePlaces,
+    LinesAt,
     LinkPlace,
     Relation,
     Worm,
@@ -44,6 +46,7 @@ from mechgraph.model.gears import (
     pose_along,
     tip_radius,
 )
+from mechgraph.model.pair import are_placed
 from mechgraph.quantities import LENGTH, shown, unknown
 
 FLANKS = ("auto", "forward", "backward")
@@ -74,10 +77,7 @@ class Meshing(LineCoupling):
 
     def seen(self, m: Any) -> Meeting:
         """Both gears where they meet."""
-        known = m.once(_meetings)
-        if self not in known:
-            known[self] = self._met(m)
-        met: Meeting = known[self]
+        met: Meeting = m.once(type(self)._met, self)
         return met
 
     def placed(self, m: Any) -> Self:
@@ -247,6 +247,38 @@ class Mesh(Meshing):
                     found += [fault] if (fault := m.freedom_fault(self.play, single=True)) else []
         return [where + fault for fault in found]
 
+    @classmethod
+    def doubts(cls, m: Any) -> list[str]:
+        """Planets between the same two gears that cannot be put in, or overlap, at the declared places.
+
+        The value of a mesh with the first gear less that with the second one leaves the turn of the planet out; modulo the base pitch it is
+        the same for all that fit.
+        """
+        meshes = [c for c in m.couplings if isinstance(c, Mesh)]
+        of_gear: dict[str, list[Mesh]] = {}
+        for c in meshes:
+            for name in (c.a, c.b):
+                of_gear.setdefault(name, []).append(c)
+        groups: dict[tuple[str, str], list[tuple[str, float, Gear]]] = {}
+        period = {}
+        for name, own in of_gear.items():
+            if len(own) != 2 or not any(getattr(g, "internal", False) for c in own for g in c.pair_of(m)):
+                continue
+            met = [c.seen(m) for c in own]
+            if not all(isinstance(one, Parallel) for one in met):
+                continue
+            values, mates = [], []
+            for c, one in zip(own, met, strict=True):
+                value = float(one.line().value[0, 0])
+                values.append(value * np.sign(one.one.base_radius))
+                mates.append(c.b if c.a == name else c.a)
+            order = np.argsort(mates)
+            key = mates[order[0]], mates[order[1]]
+            gear = next(g for g in (met[0].one, met[0].two) if g.name == name)
+            groups.setdefault(key, []).append((name, values[order[0]] - values[order[1]], gear))
+            period[key] = met[0].period
+        return [fault for key, planets in groups.items() for fault in _group_faults(m, key, planets, period[key])]
+
     def _met(self, m: Any) -> Meeting:
         """See ``Meshing``."""
         one, two = self.pair_of(m)
@@ -273,11 +305,6 @@ def _reached(m: Any) -> set[str]:
     return out
 
 
-def _meetings(m: Any) -> dict[Meshing, Meeting]:
-    """Where gears meet, as far as it was asked for."""
-    return {}
-
-
 def _placed_soundly(m: Any) -> bool:
     """Whether all pairs and gears are sound and hang together, so that places can be looked at."""
     known = set(m.link_names())
@@ -301,14 +328,21 @@ class Meeting(ABC):
         """Why their teeth do not fit each other."""
         return iter(())
 
-    @abstractmethod
+    relations: Mapping[float, Relation]
+    """Those of both flanks, 1 and -1."""
+
     def flanks(self, forward: bool) -> tuple[Relation, Relation]:
         """The relation of the flank that is asked for, and that of the other one."""
+        side = 1.0 if forward else -1.0
+        return self.relations[side], self.relations[-side]
+
+    def line(self, forward: bool = True) -> LinesAt:
+        """Along which that flank pushes at the declared places."""
+        return self.flanks(forward)[0](self.a, self.b, np.array(self.numbers)[:, None, None])
 
     def powers(self, forward: bool) -> tuple[float, float]:
         """Powers of a unit force along the line of a flank at unit rates of both gears."""
-        line = self.flanks(forward)[0](self.a, self.b, np.array(self.numbers)[:, None, None])
-        (P, n), out = (part[:, 0, 0] for part in line[1:]), []
+        (P, n), out = (part[:, 0, 0] for part in self.line(forward)[1:]), []
         for place, gear in ((self.a, self.one), (self.b, self.two)):
             z, p = place.axis[:, 0, 0], place.point[:, 0, 0]
             out.append(float(n @ (z if isinstance(gear, GearRack) else cross(z, P - p))))
@@ -354,6 +388,8 @@ def _apart(one: Any, two: Any, h: float) -> Iterator[str]:
 class Parallel(Meeting):
     """Cylindrical gears on parallel axes."""
 
+    relations = CYLINDRICAL
+
     def __init__(self, one: Any, two: Any, a: LinePlaces, b: LinePlaces) -> None:
         super().__init__(one, two, a, b)
         self.k = one.base_radius + two.base_radius
@@ -363,11 +399,6 @@ class Parallel(Meeting):
         self.distance = float(np.sqrt(dot(across, across))[0, 0])
         self.numbers = (one.base_radius, two.base_radius, one.base_radius * one.base_lean, *_halves(one, two))
         self.period = one.base_pitch
-
-    def flanks(self, forward: bool) -> tuple[Relation, Relation]:
-        """See ``Meeting``."""
-        order = (1.0, -1.0) if forward else (-1.0, 1.0)
-        return CYLINDRICAL[order[0]], CYLINDRICAL[order[1]]
 
     def powers(self, forward: bool) -> tuple[float, float]:
         """See ``Meeting``: the base radii times the cosine of the lean of the line."""
@@ -475,6 +506,7 @@ class WithRack(Meeting):
         self.sign = -1.0 if isinstance(one, GearRack) else 1.0
         self.pinion, self.rack = (one, two) if self.sign > 0 else (two, one)
         self.at, self.there = (a, b) if self.sign > 0 else (b, a)
+        self.relations = {side: RACKED[side, self.sign] for side in (1.0, -1.0)}
         base = self.pinion.base_radius
         halves = _halves(one, two)[:: int(self.sign)]
         self.numbers = (base, self.pinion.radius, base * self.pinion.base_lean, *halves)
@@ -484,11 +516,6 @@ class WithRack(Meeting):
     def ratio(self) -> float:
         """See ``Meeting``: of a turn and a slide."""
         return float(self.pinion.radius**-self.sign)
-
-    def flanks(self, forward: bool) -> tuple[Relation, Relation]:
-        """See ``Meeting``."""
-        order = (1.0, -1.0) if forward else (-1.0, 1.0)
-        return RACKED[order[0], self.sign], RACKED[order[1], self.sign]
 
     def misfits(self, fitting: float) -> list[str]:
         """See ``Meeting``."""
@@ -532,6 +559,8 @@ def teeth_lines(P: Array, away: Array, trace: Array, pressure_angle: float) -> t
 class Still(Meeting):
     """Axes that keep their places: the line stands still between them."""
 
+    relations = CROSSING
+
     def __init__(self, one: Any, two: Any, a: LinePlaces, b: LinePlaces) -> None:
         super().__init__(one, two, a, b)
         self.za, self.zb, self.pa, self.pb = (v[:, 0, 0] for v in (a.axis, b.axis, a.point, b.point))
@@ -558,11 +587,6 @@ class Still(Meeting):
         both = push[first], -push[1 - first]
         self.numbers = (1.0, *(frame @ (P - foot)), *(frame @ both[0]), *(frame @ both[1]))
         self.period = abs(powers[first]) * 2 * pi / self.one.teeth
-
-    def flanks(self, forward: bool) -> tuple[Relation, Relation]:
-        """See ``Meeting``."""
-        order = (1.0, -1.0) if forward else (-1.0, 1.0)
-        return CROSSING[order[0]], CROSSING[order[1]]
 
 
 class Crossed(Still):
@@ -736,3 +760,25 @@ def met_at(one: Any, two: Any, pose: Array) -> Meeting:
 
 def _words_of_kinds(kind: str) -> str:
     return " or ".join(f"a {b}" for a, b in _KINDS if a == kind)
+
+
+def _group_faults(m: Any, key: tuple[str, str], planets: list[tuple[str, float, Gear]], period: float) -> Iterator[str]:
+    """See ``Mesh.doubts``, for the planets between two gears."""
+    first, tolerance = planets[0], max(1e-6, 10 * fitting_of(m))
+    for name, value, _ in planets[1:]:
+        off = (value - first[1]) / period
+        if abs(off - round(off)) > tolerance:
+            yield (
+                f"planets {first[0]!r} and {name!r} between {key[0]!r} and {key[1]!r} cannot both be put in: their teeth are off by "
+                f"{abs(off - round(off)):.4g} of a tooth; mg.planet_places gives places that fit"
+            )
+    for (one, _, gear), (two, _, other) in combinations(planets, 2):
+        # planets on one carrier keep their distance
+        apart = float(np.linalg.norm(np.subtract(gear.point, other.point)))
+        if m.once(_as_assembled) and gear.link != other.link and apart < tip_radius(gear) + tip_radius(other):
+            yield f"planets {one!r} and {two!r} overlap: {apart:.6g} apart; expected more than {tip_radius(gear) + tip_radius(other):.6g}"
+
+
+def _as_assembled(m: Any) -> bool:
+    """Whether all places are in one frame."""
+    return all(pair.on_a is None for pair in m.pairs)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, field
 from functools import cached_property, partial
 from types import MappingProxyType
-from typing import Annotated, Any, ClassVar, Protocol
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -153,33 +153,6 @@ class Link(Described):
                     f"{where}inertia: {fault}; no body has it (unphysical=True accepts it)" for fault in impossible
                 ]
         return found
-
-
-class Nameable(Protocol):
-    """Links and freedoms of a mechanism, by name."""
-
-    @property
-    def link_index(self) -> Mapping[str, int]:
-        """Place of every link, by name."""
-
-    @property
-    def planar(self) -> bool:
-        """Whether it is a planar one."""
-
-    def freedom_fault(self, name: Any, *, single: bool) -> str | None:
-        """Why ``name`` is no freedom (with ``single``: no single freedom), or None."""
-
-    def massive_links(self) -> tuple[str, ...]:
-        """Links that have mass."""
-
-    def link(self, name: str) -> Link:
-        """The link of that name."""
-
-    def ends_of(self, freedom: str) -> tuple[str, str]:
-        """Links a and b of the pair of a freedom."""
-
-    def full_name(self, name: str) -> str:
-        """The full spelling ``"B.Tz"`` of a freedom."""
 
 
 def largest_cosine(tol: float) -> float:
@@ -680,3 +653,10 @@ def _markers_are_sound(markers: Sequence[Any], most: Array) -> bool:
         return False
     cosine = np.abs((z * x).sum(axis=1)) / (length[0] * length[1])
     return not (cosine > most).any()
+
+
+def are_placed(m: Any) -> bool:
+    """Whether every pair says where it sits, without faults."""
+    return all(pair.has_geometry for pair in m.pairs) and (
+        pairs_are_sound(m.pairs, 0.0) or not any(pair.faults() for pair in m.pairs)
+    )

@@ -22,12 +22,11 @@ from mechgraph.maths import inertia
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import SHAPES
 from mechgraph.model.declaration import Parts as Parts
-from mechgraph.model.gears import Gear
+from mechgraph.model.gears import Gear, planet_places
 from mechgraph.model.loads import Effort, Load, Spring
 from mechgraph.model.meshes import Mesh
 from mechgraph.model.pair import Link, Pair
 from mechgraph.model.plane import NORMAL
-from mechgraph.model.planets import planet_places
 from mechgraph.model.short_forms import Rack, SpurGears
 from mechgraph.quantities import (
     Count,

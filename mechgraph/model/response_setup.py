@@ -21,13 +21,13 @@ from mechgraph.fields import (
     TABLES,
     TEXT,
     Described,
+    Nameable,
     plain,
     remade,
 )
 from mechgraph.maths.se3 import Array
 from mechgraph.memo import dataclass
 from mechgraph.model.motion import Drive, Motion
-from mechgraph.model.pair import Nameable
 from mechgraph.quantities import (
     LENGTH,
     PURE,

@@ -23,7 +23,6 @@ from mechgraph.model.couplings import (
     OF_BELTS,
     PRESSURE,
     MeshStep,
-    are_placed,
     fitting_of,
     motion_of,
     tooth_angle,
@@ -45,6 +44,7 @@ from mechgraph.model.gears import (
     pose_along,
 )
 from mechgraph.model.meshes import Meeting, Meshing, about_ends, met_at
+from mechgraph.model.pair import are_placed
 from mechgraph.quantities import LENGTH, shown, wrong
 
 SHOWN_TEETH = 20
@@ -55,14 +55,13 @@ SHOWN_TEETH = 20
 class GearSeats:
     """Where the pairs of a and b sit on the links of both gears, of which that of b has the ``pose (3, 4)`` in the frame of that of a."""
 
-    on_a: LinkPlace
-    on_b: LinkPlace
+    places: tuple[LinkPlace, LinkPlace]
     pose: Array
 
     @cached_property
     def seen(self) -> tuple[LinePlaces, LinePlaces]:
         """Both places in the frame of the link of a."""
-        return self.on_a.seen(identity()), self.on_b.seen(self.pose)
+        return self.places[0].seen(identity()), self.places[1].seen(self.pose)
 
     @cached_property
     def across(self) -> float:
@@ -71,30 +70,10 @@ class GearSeats:
         return float(np.linalg.norm(cross(b.point - a.point, a.axis)))
 
     @property
-    def places(self) -> tuple[LinkPlace, LinkPlace]:
-        """Both places."""
-        return self.on_a, self.on_b
-
-    @property
     def beside(self) -> Array:
         """The point of axis a ``(3,)`` in the plane through that of b."""
         a, b = self.seen
         return np.asarray(a.point + a.axis * dot(b.point - a.point, a.axis))[:, 0, 0]
-
-
-def _ways(m: Any) -> dict[ShortForm, tuple[MeshStep, ...] | str]:
-    """The ways between gears of short forms, as far as they were asked for."""
-    return {}
-
-
-def _abouts(m: Any) -> dict[ShortForm, tuple[list[float], list[float], float]]:
-    """The senses of the pairs on the ways, as far as they were asked for."""
-    return {}
-
-
-def _seats(m: Any) -> dict[ShortForm, GearSeats]:
-    """Where the pairs of short forms sit, as far as it was asked for."""
-    return {}
 
 
 @dataclass(frozen=True)
@@ -151,11 +130,11 @@ class ShortForm(Meshing):
 
     def _about(self, m: Any, steps: tuple[MeshStep, ...]) -> tuple[list[float], list[float], float]:
         """See ``Meshing``: as the faults have found it."""
-        known = m.once(_abouts)
-        if self not in known:
-            known[self] = about_ends(m, steps, self._seats(m).places, (False, self.slides))
-        found: tuple[list[float], list[float], float] = known[self]
+        found: tuple[list[float], list[float], float] = m.once(ShortForm._followed, self)
         return found
+
+    def _followed(self, m: Any) -> tuple[list[float], list[float], float]:
+        return about_ends(m, self._steps(m)[0], self._seats(m).places, (False, self.slides))
 
     def _way(self, m: Any) -> tuple[MeshStep, ...] | str:
         """The pairs from gear a to gear b, or why there is no carrier between them."""
@@ -181,28 +160,22 @@ class ShortForm(Meshing):
         return steps, True
 
     def _known_way(self, m: Any) -> tuple[MeshStep, ...] | str:
-        known = m.once(_ways)
-        if self not in known:
-            known[self] = self._way(m)
-        found: tuple[MeshStep, ...] | str = known[self]
+        found: tuple[MeshStep, ...] | str = m.once(ShortForm._way, self)
         return found
 
     def _seats(self, m: Any) -> GearSeats:
         """Where both pairs sit."""
-        known = m.once(_seats)
-        if self not in known:
-            known[self] = self._seated(m, self._steps(m)[0])
-        found: GearSeats = known[self]
+        found: GearSeats = m.once(ShortForm._seated, self)
         return found
 
-    def _seated(self, m: Any, steps: tuple[MeshStep, ...]) -> GearSeats:
-        places = []
+    def _seated(self, m: Any) -> GearSeats:
+        steps, places = self._steps(m)[0], []
         for step, behind in ((steps[0], False), (steps[-1], True)):
             pair = m.pairs[step.pair]
             side = int((step.sense > 0) == behind)
             p, z = pair.markers[side].line
             places.append(LinkPlace(pair.b if side else pair.a, tuple(p), tuple(z), second_direction(z)))
-        return GearSeats(places[0], places[1], pose_along(m, steps))
+        return GearSeats((places[0], places[1]), pose_along(m, steps))
 
     def _met(self, m: Any) -> Meeting:
         """See ``Meshing``."""
@@ -332,7 +305,7 @@ class SpurGears(_OfTeeth):
         module = self._module_at(seats.across)
         out = []
         for place, point, (name, teeth, helix) in zip(
-            seats.places, (seats.beside, seats.on_b.point), self.rims, strict=True
+            seats.places, (seats.beside, seats.places[1].point), self.rims, strict=True
         ):
             inner = self.internal and teeth == max(self.teeth)
             more: dict[str, Any] = {
@@ -482,6 +455,8 @@ STRANDS: dict[float, Relation] = {side: partial(strand, side) for side in (1.0, 
 class Pulleys(Meeting):
     """Two pulleys in an open, or a crossed belt."""
 
+    relations = STRANDS
+
     def __init__(self, one: Pulley, two: Pulley, a: LinePlaces, b: LinePlaces, crossed: bool) -> None:
         super().__init__(one, two, a, b)
         self.numbers = (one.pitch_radius, -two.pitch_radius if crossed else two.pitch_radius)
@@ -490,10 +465,6 @@ class Pulleys(Meeting):
     def ratio(self) -> float:
         """See ``Meeting``."""
         return float(self.two.pitch_radius / self.one.pitch_radius)
-
-    def flanks(self, forward: bool) -> tuple[Relation, Relation]:
-        """See ``Meeting``: the strands."""
-        return STRANDS[1.0], STRANDS[-1.0]
 
 
 @dataclass(frozen=True)
@@ -542,7 +513,7 @@ class Belt(ShortForm):
 
     def gears_at(self, seats: GearSeats) -> tuple[Any, Any]:
         """See ``ShortForm``."""
-        points, names = (seats.beside, seats.on_b.point), (self.a, self.b)
+        points, names = (seats.beside, seats.places[1].point), (self.a, self.b)
         one, two = (
             Pulley(name, place.link, point, place.axis, radius=r)
             for name, place, point, r in zip(names, seats.places, points, self.radii, strict=True)
