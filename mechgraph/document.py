@@ -22,9 +22,9 @@ import re
 import textwrap
 import unicodedata
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
-from typing import ClassVar, assert_never
+from typing import ClassVar, TypeVar, assert_never
 
 from mechgraph.errors import TellsNames, visible
 from mechgraph.memo import Remembers, dataclass
@@ -35,28 +35,12 @@ LISTED, NAMED = 20, 8
 ALIGNMENTS = {"l": "left", "r": "right", "c": "center"}
 
 
-def _strings(values: Sequence[str], what: str) -> tuple[str, ...]:
-    """Return `values` as a tuple of strings; a bare string or any other entry is a TypeError."""
-    if isinstance(values, str):
-        raise TypeError(f"{what} must be a sequence of strings, not the single string {values!r}")
-    wrong = [value for value in values if not isinstance(value, str)]
-    if wrong:
-        raise TypeError(f"{what} must be strings, got {wrong[0]!r}; format numbers before they enter a document")
-    return tuple(values)
-
-
 @dataclass(frozen=True)
 class Heading:
     """A heading; `level` 1 is the first below the title, `DEEPEST_HEADING` the last (else ValueError)."""
 
     text: str
     level: int = 1
-
-    def __post_init__(self) -> None:
-        """Check the level."""
-        deepest_heading = 5  # deepest heading level; the title is level 0
-        if not 1 <= self.level <= deepest_heading:
-            raise ValueError(f"heading {self.text!r}: level must be 1 to {deepest_heading}, got {self.level}")
 
 
 @dataclass(frozen=True)
@@ -79,11 +63,7 @@ class Bullets:
 
     def __post_init__(self) -> None:
         """Copy the items into tuples."""
-        if isinstance(self.items, str):
-            raise TypeError(f"items must be a sequence, not the single string {self.items!r}")
-        items = tuple(item if isinstance(item, str) else _strings(item, "nested items") for item in self.items)
-        if items and not isinstance(items[0], str):
-            raise ValueError(f"nested items {items[0]!r} stand below no item; put a string before them")
+        items = tuple(item if isinstance(item, str) else tuple(item) for item in self.items)
         object.__setattr__(self, "items", items)
 
     def grouped(self) -> list[tuple[str, tuple[str, ...]]]:
@@ -122,20 +102,13 @@ class Table:
 
     def __post_init__(self) -> None:
         """Copy into tuples and check that the table is rectangular."""
-        header = _strings(self.header, "header")
-        if isinstance(self.rows, str):
-            raise TypeError(f"rows must be a sequence of rows, not the single string {self.rows!r}")
-        rows = tuple(_strings(row, "cells") for row in self.rows)
+        header, rows = tuple(self.header), tuple(map(tuple, self.rows))
         count = len(header or (rows[0] if rows else ()))
-        for number, row in enumerate(rows):
-            if len(row) != count:
-                raise ValueError(f"row {number} has {len(row)} cells where {count} are expected: {row!r}")
-        align = self.align or "l" * count
-        if (rows or header) and (len(align) != count or set(align) - set(ALIGNMENTS)):
-            raise ValueError(f"align must be {count} letters of 'l', 'r', 'c', got {self.align!r}")
+        if uneven := [row for row in rows if len(row) != count]:
+            raise ValueError(f"a row has {len(uneven[0])} cells where {count} are expected: {uneven[0]!r}")
         object.__setattr__(self, "header", header)
         object.__setattr__(self, "rows", rows)
-        object.__setattr__(self, "align", align)
+        object.__setattr__(self, "align", self.align or "l" * count)
 
     @property
     def lines(self) -> list[tuple[str, ...]]:
@@ -225,8 +198,6 @@ def to_text(document: Document, width: int = WIDTH) -> str:
     overhangs only when its columns would have no room at all. Preformatted text is never wrapped. Nothing is
     ever cut. ValueError for `width` < 1.
     """
-    if width < 1:
-        raise ValueError(f"width must be at least 1 column, got {width}")
     parts = [_underlined(document.title, "=", width)]
     parts += [_block_text(block, width) for block in document.blocks]
     return joined(parts, "\n\n")
@@ -729,3 +700,22 @@ class Shown(Remembers, TellsNames, ABC):
 
     def _repr_latex_(self) -> str:
         return to_latex(self.document())
+
+
+Row = TypeVar("Row")
+
+
+class RowsByName(Mapping[str, Row], Shown):
+    """Rows of a table by their names."""
+
+    _every_method_is_a_door = False  # a Mapping has KeyErrors
+    _rows: Mapping[str, Row]
+
+    def __getitem__(self, name: str) -> Row:
+        return self._rows[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._rows)
+
+    def __len__(self) -> int:
+        return len(self._rows)

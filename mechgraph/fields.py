@@ -479,6 +479,20 @@ class Described(Formatted):
 
         return self.changed(change, methodcaller("in_units", base, turns))
 
+    @property
+    def freedoms(self) -> tuple[str, ...]:
+        """Names of the freedoms that it names."""
+        named = (getattr(self, name) for name, about in self.formats.items() if about.kind is FREEDOM_NAME)
+        return tuple(name for name in named if isinstance(name, str))
+
+    def with_full_names(self, full_name: Callable[[str], str]) -> Self:
+        """The same with these spelled in full."""
+
+        def change(name: str, about: FieldFormat, value: Any) -> Any:
+            return full_name(value) if about.kind is FREEDOM_NAME and isinstance(value, str) and value else value
+
+        return self.changed(change, _as_it_is)
+
     def numbers_turn(self, turns: Callable[[Any], bool]) -> bool:
         """Whether its numbers are those of a turn; ``turns(freedom)`` says so of a freedom."""
         return turns(getattr(self, "freedom", None))
@@ -490,6 +504,10 @@ class Described(Formatted):
     def converted(self, base: tuple[float, float, float], turns: Callable[[Any], bool]) -> Self:
         """``in_units`` in a mechanism of which the units change."""
         return self.in_units(base, self.numbers_turn(turns))
+
+
+def _as_it_is(value: Any) -> Any:
+    return value
 
 
 def remade(item: Any) -> tuple[Any, tuple[Any, ...]]:
@@ -569,7 +587,7 @@ def _are_whole(value: Any, shape: tuple[int, ...]) -> bool:
 
 
 def _is_count(value: Any, shape: Any) -> bool:
-    return isinstance(value, int | np.integer) and not isinstance(value, bool) and value >= 0
+    return isinstance(value, int | np.integer) and not isinstance(value, bool) and bool(value >= 0)
 
 
 def _is_named_point(value: Any, shape: tuple[int, ...]) -> bool:

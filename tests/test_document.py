@@ -98,25 +98,10 @@ def test_blocks_are_frozen_values():
         table.caption = "x"
 
 
-@pytest.mark.parametrize(
-    ("build", "error", "says"),
-    [
-        (lambda: Table(["a", "b"], [["1", "2"], ["1"]]), ValueError, "row 1 has 1 cells where 2"),
-        (lambda: Table([], [["1", "2"], ["1"]]), ValueError, "row 1 has 1 cells"),
-        (lambda: Table(["a"], [["1"]], align="lr"), ValueError, "align must be 1 letters"),
-        (lambda: Table(["a"], [["1"]], align="x"), ValueError, "align"),
-        (lambda: Table(["a"], [[1]]), TypeError, "strings, got 1"),
-        (lambda: Table(["a"], ["1"]), TypeError, "single string '1'"),
-        (lambda: Table("a", [["1"]]), TypeError, "single string 'a'"),
-        (lambda: Bullets("abc"), TypeError, "single string"),
-        (lambda: Bullets([["nested"]]), ValueError, "stand below no item"),
-        (lambda: Heading("a", 0), ValueError, "level"),
-        (lambda: to_text(body(), 0), ValueError, "width"),
-    ],
-)
-def test_malformed_blocks_are_refused(build, error, says):
-    with pytest.raises(error, match=says):
-        build()
+@pytest.mark.parametrize("header", [["a", "b"], []])
+def test_a_table_is_rectangular(header):
+    with pytest.raises(ValueError, match="a row has 1 cells where 2"):
+        Table(header, [["1", "2"], ["1"]])
 
 
 # ---- text

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from copy import copy
-from dataclasses import field
+from dataclasses import KW_ONLY
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -57,51 +57,42 @@ class Friction(Load):
     kind: ClassVar[str] = "friction"
     subject: ClassVar[str] = "friction of {of}"
     of: Annotated[str, TEXT("name of the pair, or of gears, a rack, a worm or a belt")]
+    _: KW_ONLY
     mu: Annotated[
         float | None, NUMBER("coefficient of friction", minimum=0.0, default="`efficiency` tells the losses")
-    ] = field(default=None, kw_only=True)
-    static: Annotated[float | None, NUMBER("coefficient at rest, `mu` or more", minimum=0.0, default="mu")] = field(
-        default=None, kw_only=True
-    )
-    radius: Annotated[float | None, POSITIVE("of the journal, ball or thread (mean)", LENGTH)] = field(
-        default=None, kw_only=True
-    )
+    ] = None
+    static: Annotated[float | None, NUMBER("coefficient at rest, `mu` or more", minimum=0.0, default="mu")] = None
+    radius: Annotated[float | None, POSITIVE("of the journal, ball or thread (mean)", LENGTH)] = None
     thrust_radius: Annotated[float | None, POSITIVE("mean radius of the collar that bears the axial force", LENGTH)] = (
-        field(default=None, kw_only=True)
+        None
     )
     length: Annotated[
         float | None, POSITIVE("distance of two places along the axis that carry", LENGTH, default="one place")
-    ] = field(default=None, kw_only=True)
+    ] = None
     width: Annotated[
         float | None, NUMBER("of a guide that b embraces; negative where a embraces b", LENGTH, default="0")
-    ] = field(default=None, kw_only=True)
-    on: Annotated[str, TEXT("link whose marker is the middle of the places", choices=("a", "b"), default="b")] = field(
-        default="b", kw_only=True
-    )
+    ] = None
+    on: Annotated[str, TEXT("link whose marker is the middle of the places", choices=("a", "b"), default="b")] = "b"
     flank: Annotated[
         float, NUMBER("half angle of a thread in the axial section", degrees=True, minimum=0.0, below=0.5 * np.pi)
-    ] = field(default=0.0, kw_only=True)
+    ] = 0.0
     model: Annotated[
         str,
         TEXT("`circle`: the force that the pair transmits is tangent to the circle; `total`: rho = mu radius", choices=("circle", "total"),
              default="circle"),
-    ] = field(default="circle", kw_only=True)  # fmt: skip
+    ] = "circle"  # fmt: skip
     viscous: Annotated[
         float, NUMBER("effort per rate in every single freedom", FORCE_PER_VELOCITY, MOMENT_PER_RATE, minimum=0.0)
-    ] = field(default=0.0, kw_only=True)
-    preload: Annotated[float, NUMBER("normal force more at every place", FORCE, minimum=0.0)] = field(
-        default=0.0, kw_only=True
-    )
+    ] = 0.0
+    preload: Annotated[float, NUMBER("normal force more at every place", FORCE, minimum=0.0)] = 0.0
     stribeck: Annotated[
         float | None,
         POSITIVE("v of the coefficient mu + (static - mu) exp(-(s / v)^2) at the sliding speed s", (1, 0, -1), default="mu at any speed"),
-    ] = field(default=None, kw_only=True)  # fmt: skip
-    efficiency: Annotated[float | None, POSITIVE("of teeth, out over in whichever way power goes; at most 1")] = field(
-        default=None, kw_only=True
-    )
+    ] = None  # fmt: skip
+    efficiency: Annotated[float | None, POSITIVE("of teeth, out over in whichever way power goes; at most 1")] = None
     wrap: Annotated[
         float | None, NUMBER("of a belt: angle of wrap", degrees=True, minimum=0.0, default="as it lies")
-    ] = field(default=None, kw_only=True)
+    ] = None
 
     def act(self, site: LoadSite) -> None:
         """What is viscous, ``-viscous x'``; the rest is solved with the reactions, and refused where nothing does so."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import field
+from dataclasses import KW_ONLY, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Protocol, Self
 
@@ -199,20 +199,9 @@ class Load(Described, ABC):
         return acting
 
     @property
-    def freedoms(self) -> tuple[str, ...]:
-        """The freedoms that it names: in which it acts, and whose coordinate and rate it reads."""
-        named = (getattr(self, name) for name, about in self.formats.items() if about.kind is FREEDOM_NAME)
-        return tuple(name for name in named if name is not None)
-
-    @property
     def takes_coordinate(self) -> bool:
         """Whether it depends on the coordinate of its freedom, which then has to be a single one."""
         return any(about.kind is FREEDOM_NAME and about.single for about in self.formats.values())
-
-    def with_full_names(self, full_name: Callable[[str], str]) -> Self:
-        """The same with its freedom spelled in full."""
-        names = [name for name, about in self.formats.items() if about.kind is FREEDOM_NAME and getattr(self, name)]
-        return self.replace(**{name: full_name(getattr(self, name)) for name in names}) if names else self
 
     def parts(self) -> tuple[Self | None, Self | None]:
         """The part that has a potential energy, and the rest."""
@@ -585,9 +574,8 @@ class Damper(_Placed):
 
     kind: ClassVar[str] = "damper"
     subject: ClassVar[str] = "damper"
-    coefficient: Annotated[float, NUMBER("effort or force per rate", FORCE_PER_VELOCITY, MOMENT_PER_RATE)] = field(
-        kw_only=True
-    )
+    _: KW_ONLY
+    coefficient: Annotated[float, NUMBER("effort or force per rate", FORCE_PER_VELOCITY, MOMENT_PER_RATE)]
 
     def force(self, site: LoadSite, x: Array, v: Array) -> Array:
         """See ``Law``."""
@@ -616,15 +604,14 @@ class ForceLaw(_Placed):
 
     kind: ClassVar[str] = "force_law"
     subject: ClassVar[str] = "force law"
-    law: Annotated[Any, TABLE("force over coordinate and rate", table="law")] = field(kw_only=True)
-    free: Annotated[float, NUMBER("coordinate or distance at which the `x` of the law is 0", **POSITION)] = field(
-        default=0.0, kw_only=True
-    )
-    scale: Annotated[float, NUMBER("factor of the force")] = field(default=1.0, kw_only=True)
+    _: KW_ONLY
+    law: Annotated[Any, TABLE("force over coordinate and rate", table="law")]
+    free: Annotated[float, NUMBER("coordinate or distance at which the `x` of the law is 0", **POSITION)] = 0.0
+    scale: Annotated[float, NUMBER("factor of the force")] = 1.0
     reads: Annotated[
         str | None, FREEDOM_NAME("the freedom whose coordinate and rate the law reads", default="where it acts")
-    ] = field(default=None, kw_only=True)
-    breaks: Breaks = field(default=(), kw_only=True)
+    ] = None
+    breaks: Breaks = ()
 
     def faults(self, names: Nameable) -> list[str]:
         """What is wrong with this load."""

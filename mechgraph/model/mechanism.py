@@ -384,7 +384,7 @@ class Mechanism(DeclaredParts, Shown):
         """Full names of the freedoms that drives, loads, couplings and the response name."""
         named = {d.freedom for d in self.drives} | {name for c in self.couplings for name in c.freedoms}
         named |= {name for load in self.loads for name in load.freedoms}
-        return {self.full_name(name) for name in named | (self.response.freedoms if self.response else set())}
+        return {self.full_name(name) for name in named.union(self.response.freedoms if self.response else ())}
 
     # --- changed copies ----------------------------------------------------------------------------------------------
 

@@ -6,6 +6,7 @@ import operator
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, field
 from functools import cached_property, partial
+from operator import attrgetter
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar
 
@@ -294,6 +295,13 @@ class Marker(Described):
         return np.column_stack([axes_of(self.axis, self.second), np.asarray(self.point)])
 
 
+SAID_MORE = attrgetter(
+    "pitch", "lead", "closed", "restitution", "gap", "radius", "hertz", "curve", "curve_b", "roller", "surface", "film",
+    "stiffness", "misfit",
+)  # fmt: skip
+"""What may be said of a pair beside its type, its links and its place."""
+
+
 @dataclass(frozen=True)
 class Pair(Described):
     """Declare a kinematic pair from link ``a`` to link ``b``; its reaction is the wrench of ``a`` on ``b``.
@@ -498,19 +506,7 @@ class Pair(Described):
     @property
     def says_more(self) -> bool:
         """Whether it says more than its type and where it sits."""
-        said = (
-            self.pitch,
-            self.lead,
-            self.radius,
-            self.hertz,
-            self.film,
-            self.stiffness,
-            self.misfit,
-            self.restitution,
-            self.gap or None,
-            *self.curves.values(),
-        )
-        return any(one is not None for one in said) or self.closed is not Pair.closed
+        return bool(SAID_MORE(self) != SAID_MORE(Pair))
 
     @property
     def curves(self) -> dict[str, Any]:

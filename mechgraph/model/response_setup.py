@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import field, replace
+from dataclasses import field
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, Self, get_args
 
@@ -92,6 +92,10 @@ class Event(Described):
             found.append(f"event {self.text}: {wrong(self.direction, 'direction', '-1, 0 or 1')}")
         return found
 
+    def numbers_turn(self, turns: Callable[[Any], bool]) -> bool:
+        """Whether what it watches is a turn."""
+        return turns(self.of)
+
     def in_units(self, base: tuple[float, float, float], turns: bool = False) -> Self:
         """See ``Described``; the dimension of the value is that of ``what``."""
         if not isinstance(self.of, str):
@@ -164,6 +168,10 @@ class Stop(Described):
         return [f"stop of {shown(self.freedom)}: {fault}" for fault in found]
 
 
+LISTS: dict[str, type[Any]] = {"motions": Drive, "events": Event, "stops": Stop}
+"""What stands in lists in a set-up."""
+BY_NAME = ("start", "rates")
+"""What stands in it by names of freedoms."""
 MethodName = Literal["auto", "RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"]
 METHODS: tuple[MethodName, ...] = get_args(MethodName)
 PassiveName = Literal["free", "held"]
@@ -216,15 +224,13 @@ class ResponseSetup(Described):
         self.read_numbers()
         if no_limit(self.max_step):
             object.__setattr__(self, "max_step", None)
-        for name in ("start", "rates"):
-            value = getattr(self, name)
-            kept = {} if value is None else value
+        for name in BY_NAME:
+            kept = {} if (value := getattr(self, name)) is None else value
             object.__setattr__(self, name, MappingProxyType(dict(kept)) if isinstance(kept, Mapping) else kept)
         if isinstance(self.motions, Mapping):
             object.__setattr__(self, "motions", tuple(Drive(name, motion) for name, motion in self.motions.items()))
-        for name, kind in (("motions", Drive), ("events", Event), ("stops", Stop)):
-            value = getattr(self, name)
-            if isinstance(value, kind):
+        for name, kind in LISTS.items():
+            if isinstance(value := getattr(self, name), kind):
                 object.__setattr__(self, name, (value,))
 
     __reduce__ = remade
@@ -242,50 +248,43 @@ class ResponseSetup(Described):
         most_points = 10_000_000
         if points is not None and (type(points) is not int or not 2 <= points <= most_points or len(times) != 2):
             found.append(wrong(points, "points", f"a number from 2 to {most_points}, beside time = (begin, end)"))
-        for what in ("start", "rates"):
+        for what in BY_NAME:
             found += _value_faults(m, what, getattr(self, what))
         found += tolerance_faults(self.rtol, self.atol, self.max_step)
         found += option_faults({"method": (self.method, METHODS), "passive": (self.passive, get_args(PassiveName))})
-        for what, kind in (("motions", Drive), ("events", Event), ("stops", Stop)):
-            items = items_of(getattr(self, what), what, found)
-            found += [
-                wrong(one, f"an item of {what}", f"an mg.{kind.__name__}") for one in items if not isinstance(one, kind)
-            ]
-        found += [fault for one in self._known(self.motions, Drive) for fault in _motion_faults(m, one)]
-        for one in (*self._known(self.events, Event), *self._known(self.stops, Stop)):
-            found += one.faults(m)
+        of_items: list[str] = []
+        for what, kind in LISTS.items():
+            for one in items_of(getattr(self, what), what, found):
+                if not isinstance(one, kind):
+                    found.append(wrong(one, f"an item of {what}", f"an mg.{kind.__name__}"))
+                elif isinstance(getattr(self, what), tuple):
+                    of_items += _motion_faults(m, one) if isinstance(one, Drive) else one.faults(m)
+        found += of_items
         return [f"response: {fault}" for fault in found]
 
-    @staticmethod
-    def _known(items: Any, kind: type) -> list[Any]:
-        return [one for one in items if isinstance(one, kind)] if isinstance(items, tuple) else []
+    def _changed(self, table: Callable[[Any], Any], items: Callable[[Any], Any], **more: Any) -> ResponseSetup:
+        """With what becomes of its numbers by freedoms, and of its lists."""
+        tables = {name: table(getattr(self, name)) for name in BY_NAME}
+        return self.replace(**tables, **{name: items(getattr(self, name)) for name in LISTS}, **more)
 
     def with_full_names(self, full_name: Callable[[str], str]) -> ResponseSetup:
         """The same with all freedoms spelled in full."""
-        return replace(
-            self,
-            start={full_name(name): value for name, value in self.start.items()},
-            rates={full_name(name): value for name, value in self.rates.items()},
-            motions=tuple(replace(one, freedom=full_name(one.freedom)) for one in self.motions),
-            events=tuple(replace(one, of=full_name(one.of)) if isinstance(one.of, str) else one for one in self.events),
-            stops=tuple(replace(one, freedom=full_name(one.freedom)) for one in self.stops),
+        return self._changed(
+            lambda table: {full_name(name): value for name, value in table.items()},
+            lambda items: [one.with_full_names(full_name) for one in items],
         )
 
     @property
-    def freedoms(self) -> set[str]:
+    def freedoms(self) -> tuple[str, ...]:
         """Names of the freedoms of which it says anything."""
-        named = [one.freedom for one in (*self.motions, *self.stops)] + [one.of for one in self.events]
-        return {*self.start, *self.rates, *(name for name in named if isinstance(name, str))}
+        named = [name for what in LISTS for one in getattr(self, what) for name in one.freedoms]
+        return tuple(dict.fromkeys([*self.start, *self.rates, *named]))
 
     def without(self, gone: set[str]) -> ResponseSetup:
         """The same without what is said of some freedoms, named in full."""
-        return replace(
-            self,
-            start={name: value for name, value in self.start.items() if name not in gone},
-            rates={name: value for name, value in self.rates.items() if name not in gone},
-            motions=tuple(one for one in self.motions if one.freedom not in gone),
-            events=tuple(one for one in self.events if one.of not in gone),
-            stops=tuple(one for one in self.stops if one.freedom not in gone),
+        return self._changed(
+            lambda table: {name: value for name, value in table.items() if name not in gone},
+            lambda items: [one for one in items if gone.isdisjoint(one.freedoms)],
         )
 
     def converted(self, base: tuple[float, float, float], turns: Callable[[str], bool]) -> ResponseSetup:
@@ -295,15 +294,12 @@ class ResponseSetup(Described):
             powers = {True: (PURE[0], 0, -order), False: (LENGTH[0], 0, -order)}
             return {name: value * factor_of(powers[turns(name)], base) for name, value in values.items()}
 
-        return replace(
-            self,
+        return self.replace(
             time=plain(np.asarray(self.time) * base[2]),
             max_step=None if self.max_step is None else self.max_step * base[2],
             start=scaled(self.start, 0),
             rates=scaled(self.rates, 1),
-            motions=tuple(one.in_units(base, turns(one.freedom)) for one in self.motions),
-            events=tuple(one.in_units(base, isinstance(one.of, str) and turns(one.of)) for one in self.events),
-            stops=tuple(one.in_units(base, turns(one.freedom)) for one in self.stops),
+            **{name: [one.converted(base, turns) for one in getattr(self, name)] for name in LISTS},
         )
 
 

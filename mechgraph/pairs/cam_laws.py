@@ -23,7 +23,7 @@ from typing import Annotated, Any, NamedTuple, Self
 import numpy as np
 import scipy
 
-from mechgraph.document import Document, Paragraph, Shown, Table
+from mechgraph.document import Document, Paragraph, RowsByName, Shown, Table
 from mechgraph.errors import DeclarationError, FileError, MechgraphWarning
 from mechgraph.fields import (
     NUMBER,
@@ -741,10 +741,8 @@ def _factors(part: LawPieces, rise: float, over: float, at_ends: Sequence[bool])
     return LawFactors(*found)
 
 
-class CamLaws(Mapping[str, LawFactors], Shown):
+class CamLaws(RowsByName[LawFactors]):
     """The factors of the standard laws by name; prints as a table."""
-
-    _every_method_is_a_door = False  # a Mapping has KeyErrors
 
     @cached_property
     def _rows(self) -> dict[str, LawFactors]:
@@ -759,15 +757,6 @@ class CamLaws(Mapping[str, LawFactors], Shown):
                 shape, 1.0, 1.0, [bool(e > SEAM_ROUNDING * max(s, 1.0)) for e, s in zip(ends, size, strict=True)]
             )
         return dict(sorted(out.items(), key=lambda item: item[1].Ca))
-
-    def __getitem__(self, name: str) -> LawFactors:
-        return self._rows[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._rows)
-
-    def __len__(self) -> int:
-        return len(self._rows)
 
     def document(self) -> Document:
         """The table as a document."""

@@ -93,6 +93,7 @@ class OfLaw(Centred):
     Between samples the law is a polynomial of degree 5 that meets value and both derivatives.
     """
 
+    is_closed = is_profile = True
     named: ClassVar[str] = "lift"
     """Field with the samples of the law."""
 
@@ -180,19 +181,9 @@ class OfLaw(Centred):
         return 0.0, math.tau if self.law is None else self.law.turn
 
     @property
-    def is_closed(self) -> bool:
-        """Yes."""
-        return True
-
-    @property
-    def is_profile(self) -> bool:
-        """Whether the follower runs on the outside of a disc."""
-        return True
-
-    @property
     def roller(self) -> float:
         """As declared."""
-        return self.roller_radius
+        return self.roller_radius if getattr(self, "follower", "roller") == "roller" else 0.0
 
     @property
     def nodes(self) -> Array:
@@ -382,11 +373,6 @@ class Cam(OfLaw):
         """Opposite to ``second``, so that the same line is passed at the other side."""
         return {"second": tuple(-x for x in self.second), "offset": -self.offset}
 
-    @property
-    def roller(self) -> float:
-        """As declared; a flat face has none."""
-        return self.roller_radius if self.follower == "roller" else 0.0
-
     def faults(self, where: str) -> list[str]:
         """Samples that make no closed cam."""
         found = super().faults(where)
@@ -509,11 +495,6 @@ class ArmCam(OfSwing):
         p, rate = self.pieces.at(u, 2)
         return np.asarray(self.pivot * np.cos(p + self._home) / (1.0 + self._sense * rate))
 
-    @property
-    def roller(self) -> float:
-        """As declared; a flat face has none."""
-        return self.roller_radius if self.follower == "roller" else 0.0
-
     def faults(self, where: str) -> list[str]:
         """Samples that make no closed cam, lengths that make no triangle, swings past the line through axis and pivot."""
         found = super().faults(where)
@@ -551,10 +532,7 @@ class ArmCam(OfSwing):
 class Groove(OfLaw):
     """What grooves about the cam share: a roller runs between two walls, with its axis out of the cam."""
 
-    @property
-    def is_profile(self) -> bool:
-        """A groove holds the roller on both sides."""
-        return False
+    is_profile = False
 
     def faults(self, where: str) -> list[str]:
         """A law or size that makes no groove."""

@@ -153,6 +153,8 @@ class Curve(Described, Once):
     barrel: ClassVar[Any]
     globoid: ClassVar[Any]
 
+    whole: ClassVar[tuple[float, float]] = (0.0, math.tau)
+    """Where it ends if nothing is said."""
     frame: Annotated[str, TEXT("how the frame turns about the tangent", choices=FRAMES)] = "minimizing"
     guide: Annotated[
         Any, DIRECTION("direction near which a guided frame keeps its third axis", default="that of the curve")
@@ -167,12 +169,13 @@ class Curve(Described, Once):
     @property
     def ends(self) -> tuple[float, float]:
         """Least and greatest parameter; infinite where the curve does not end."""
-        return 0.0, math.tau
+        begin, end = getattr(self, "ends_at", None) or getattr(self, "angles", None) or self.whole
+        return begin, end
 
     @property
     def is_closed(self) -> bool:
         """Whether the curve returns into itself, so that a marker may go round."""
-        return False
+        return bool(getattr(self, "closed", False))
 
     @property
     def length(self) -> float:
@@ -336,6 +339,7 @@ def _unit(v: Any) -> Array:
 class Line(Curve):
     """A straight line."""
 
+    whole = (-np.inf, np.inf)
     kind = "line"
     speed = 1.0
     point: Annotated[Any, POINT("where the arc length is zero", LENGTH, default="0")] = ORIGIN
@@ -349,11 +353,6 @@ class Line(Curve):
         out[0] = np.asarray(self.point).reshape(d.shape) + u * d
         out[1] = d
         return out
-
-    @property
-    def ends(self) -> tuple[float, float]:
-        """As declared."""
-        return self.ends_at or (-np.inf, np.inf)
 
     def beside(self, distance: float, y: Array) -> Curve:
         """A parallel line."""
@@ -409,11 +408,6 @@ class Circle(Centred):
         return self._placed(self.radius * np.stack([c, s, 0 * c], axis=1))
 
     @property
-    def ends(self) -> tuple[float, float]:
-        """A turn, or as declared."""
-        return self.angles or (0.0, math.tau)
-
-    @property
     def is_closed(self) -> bool:
         """Unless it is an arc."""
         return self.angles is None
@@ -449,6 +443,7 @@ class Ellipse(Centred):
 class Helix(Centred):
     """A helix about an axis; endless unless its angles are given."""
 
+    whole = (-np.inf, np.inf)
     kind = "helix"
     radius: Annotated[float, POSITIVE("radius", LENGTH)]
     pitch: Annotated[float, NUMBER("advance per radian, right-hand positive", LENGTH)]
@@ -460,11 +455,6 @@ class Helix(Centred):
         h = np.zeros_like(c)
         h[0], h[1] = self.pitch * u, self.pitch
         return self._placed(np.stack([self.radius * c, self.radius * s, h], axis=1))
-
-    @property
-    def ends(self) -> tuple[float, float]:
-        """As declared."""
-        return self.angles or (-np.inf, np.inf)
 
     @property
     def speed(self) -> float:
@@ -495,12 +485,6 @@ class Involute(Centred):
         hand = -1.0 if self.mirrored else 1.0
         parts = np.array([f, g, np.zeros_like(f)]) * np.reshape([1.0, hand, 1.0], (3, 1, *(1,) * u.ndim))
         return self._placed(self.radius * parts.swapaxes(0, 1))
-
-    @property
-    def ends(self) -> tuple[float, float]:
-        """As declared."""
-        begin, end = self.angles
-        return begin, end
 
     def faults(self, where: str) -> list[str]:
         """Sizes that cannot be."""

@@ -58,11 +58,6 @@ class Through(Curve):
         return float(self._spline.breaks[0]), float(self._spline.breaks[-1])
 
     @property
-    def is_closed(self) -> bool:
-        """As declared."""
-        return self.closed
-
-    @property
     def nodes(self) -> Array:
         """Parts of the pieces of the spline."""
         return parted(self._spline.breaks, max(8, 400 // len(self._spline.breaks)))
@@ -116,17 +111,6 @@ class Function(Curve):
     def orders(self) -> int:
         """As many as it returns."""
         return len(list(self.position(np.array([self.ends[0]]))))
-
-    @property
-    def ends(self) -> tuple[float, float]:
-        """As declared."""
-        begin, end = self.ends_at
-        return begin, end
-
-    @property
-    def is_closed(self) -> bool:
-        """As declared."""
-        return self.closed
 
     def faults(self, where: str) -> list[str]:
         """A function that does not do, or whose derivatives are not those of its positions."""

@@ -14,7 +14,7 @@ All functions take ``n`` pairs of one type at ``T`` positions: state numbers ``x
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import KW_ONLY, field, replace
 from functools import cached_property
@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.document import Document, Shown, Table
+from mechgraph.document import Document, RowsByName, Table
 from mechgraph.errors import DeclarationError
 from mechgraph.maths.se3 import (
     Array,
@@ -565,10 +565,8 @@ _IN_GROOVE = Touching(("Fx", "Fy"), a=(0.0, -1.0), b=(1.0, 1.0))
 _SCREW_FZ = Component("Fz", UNIT_WRENCHES["Fz"], 0, (0.0, 0.0, -1.0, 0.0, 0.0, 0.0))
 
 
-class PairTable(Mapping[str, PairType], Shown):
+class PairTable(RowsByName[PairType]):
     """The pair table: symbol -> PairType; prints as a table."""
-
-    _every_method_is_a_door = False  # a Mapping has KeyErrors
 
     def __init__(self, rows: Sequence[PairType]) -> None:
         self._rows = {row.symbol: row for row in rows}
@@ -576,13 +574,7 @@ class PairTable(Mapping[str, PairType], Shown):
     def __getitem__(self, symbol: str) -> PairType:
         if not isinstance(symbol, str):
             raise KeyError(symbol)
-        return self._rows[symbol]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._rows)
-
-    def __len__(self) -> int:
-        return len(self._rows)
+        return super().__getitem__(symbol)
 
     def document(self) -> Document:
         """The table as a document."""
