@@ -17,14 +17,13 @@ from numpy.testing import assert_allclose
 from strategies import body, motions, solvable
 
 import mechgraph as mg
-from mechgraph.graph.linkgraph import link_graph
-from mechgraph.kinematics import layout
+from mechgraph.graph import linkgraph
+from mechgraph.graph.linkgraph import Tree, link_graph
 from mechgraph.kinematics.assembly import assembled, scaled_start
-from mechgraph.kinematics.layout import Numbers, Tree
 from mechgraph.kinematics.solver import engine_for
 from mechgraph.kinematics.sparse_system import LoopSystem
 from mechgraph.kinematics.state import ClosureRows, Configuration
-from mechgraph.kinematics.system import System
+from mechgraph.kinematics.system import Numbers, System
 from mechgraph.maths.linear import BlockTriangular, SparseFactors
 from mechgraph.model.parameters import parameters
 
@@ -287,7 +286,7 @@ def test_deep_trees_by_pointer_doubling(monkeypatch: pytest.MonkeyPatch) -> None
     x = system.state_of(rng.uniform(-1, 1, (system.n_freedoms, 2)))
     terms, loads = rng.normal(size=(6, P, 2)), rng.normal(size=(6, n, 2))
     shallow, poses = Tree(link_graph(m)), Configuration(system, x).poses
-    monkeypatch.setattr(layout, "DEEP", 0)
+    monkeypatch.setattr(linkgraph, "DEEP", 0)
     deep = Tree(link_graph(m))
     assert deep.deep
     assert not shallow.deep

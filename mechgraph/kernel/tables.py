@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 
 from mechgraph.fields import PerCase
 from mechgraph.kinematics.rates import PassiveMotion
+from mechgraph.kinematics.rows import CouplingRows
 from mechgraph.kinematics.state import Configuration
-from mechgraph.kinematics.system import CouplingRows, System
+from mechgraph.kinematics.system import System
 from mechgraph.kinematics.touching import on_carrier, pretension_conditions
 from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Array, Index, compose, cross, identity, inverse, rotate

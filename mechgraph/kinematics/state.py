@@ -25,9 +25,9 @@ from typing import Any, Protocol
 import numpy as np
 import scipy
 
-from mechgraph.graph.linkgraph import LinkGraph
-from mechgraph.kinematics.layout import ScrewTable, entries_of, run_sums
-from mechgraph.kinematics.system import System
+from mechgraph.graph.linkgraph import LinkGraph, entries_of, run_sums
+from mechgraph.kinematics.rows import in_places
+from mechgraph.kinematics.system import ScrewTable, System
 from mechgraph.maths.linear import LeastNorm, complement
 from mechgraph.maths.newton import closest_zeros, least_norm_steps
 from mechgraph.maths.se3 import (
@@ -302,7 +302,8 @@ class Configuration:
     @cached_property
     def residual(self) -> Array:
         """What the closure rows leave open ``(n_rows, T)``: loops first, then the others."""
-        return _stacked([part.residual(self) for part in self.system.position_rows])
+        rows = self.system.position_rows
+        return in_places(rows, [part.residual(self) for part in rows])
 
     @property
     def rounding(self) -> Array:
@@ -312,7 +313,8 @@ class Configuration:
     @cached_property
     def J(self) -> Array:
         """Closure Jacobian ``(n_rows, F, T)``; of the loops ``J = (C x I6) diag(S_k)``."""
-        return _stacked([part.jacobian(self) for part in self.system.position_rows])
+        rows = self.system.position_rows
+        return in_places(rows, [part.jacobian(self) for part in rows])
 
     @property
     def loop_jacobian(self) -> Array:
@@ -339,7 +341,8 @@ class Configuration:
 
     def closure_rates(self, dq: Array) -> Array:
         """``J q' (n_rows, T)`` for rates ``dq (F, T)``, without forming ``J``."""
-        return _stacked([part.rates(self, dq) for part in self.system.position_rows])
+        rows = self.system.position_rows
+        return in_places(rows, [part.rates(self, dq) for part in rows])
 
     def meets_all_rows(self, Z: Array) -> bool:
         """Whether the rates ``Z (F, d, T)`` for unit rates of the fixed columns meet all rows: the fixed columns move independently."""
@@ -350,14 +353,15 @@ class Configuration:
         """Velocity part ``(n_rows, T)`` of the closure accelerations ``J q'' + bias`` from that of the pairs (``bias``, ``(6, P, T)``) and
         the twists ``V (6, N, T)`` of all links.
         """
-        return _stacked([part.bias(self, pairs, V) for part in self.system.rows])
+        rows = self.system.rows
+        return in_places(rows, [part.bias(self, pairs, V) for part in rows])
 
     def row_efforts(self, x: Array) -> Array:
         """Efforts ``(F, k, T)`` that multipliers ``x (n_rows, k, T)`` of rows other than loops exert in the freedoms."""
         s = self.system
         out = np.zeros((s.n_freedoms, *x.shape[1:]), dtype=x.dtype)
-        for part, at in zip(s.rows, s.row_places, strict=True):
-            efforts = part.efforts(self, x[at])
+        for part in s.rows:
+            efforts = part.efforts(self, x[part.places])
             if efforts is not None:
                 out += efforts
         return out
@@ -442,11 +446,6 @@ def _summed(matrix: scipy.sparse.csr_array, values: Array) -> Array:
     k, _, T = values.shape
     flat = values.swapaxes(0, 1).reshape(matrix.shape[1], k * T)
     return np.asarray(matrix @ flat).reshape(matrix.shape[0], k, T).swapaxes(0, 1)
-
-
-def _stacked(parts: list[Array]) -> Array:
-    """Rows of several contributors, one below the other."""
-    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 class FactoredClosure(Protocol):
@@ -547,8 +546,10 @@ class ClosureRows:
     def at(cls, here: Configuration, t: int = 0) -> ClosureRows:
         """The rows at one position of a configuration; rows of couplings stand behind those of the loops."""
         s = here.system
-        others = [more for part in s.rows if (more := part.sparse_jacobian(here, t)) is not None]
-        more = scipy.sparse.csr_array(scipy.sparse.vstack(others)) if others else None
+        others = [(part.places, more) for part in s.rows if (more := part.sparse_jacobian(here, t)) is not None]
+        more = scipy.sparse.csr_array(scipy.sparse.vstack([own for _, own in others])) if others else None
+        if more is not None and len(others) > 1:
+            more = more[np.argsort(np.concatenate([np.arange(s.n_rows)[at] for at, _ in others]))]
         return cls(s.graph, s.first_column, here.S[:, :, t], here.pair_points[:, :, t], more)
 
     @classmethod

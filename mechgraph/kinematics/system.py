@@ -1,206 +1,577 @@
-"""A mechanism made ready for evaluation: layout, numbers, states, rows of the closure equations.
+"""A mechanism made ready for evaluation: places of everything in arrays, numbers as the kernel multiplies them, states, closure rows.
 
-The rows of the closure equations: every constraint contributes its own, a loop six (in the plane three), a coupling of freedoms one.
-
-Rows of all contributors stand one below the other, in the order of ``System.rows``: the loops first. A new kind of constraint
-implements the protocol ``Rows``; nothing else in the package knows how many rows there are or where they come from.
-
-A mechanism made ready for evaluation: places of everything in arrays, numbers as the kernel multiplies them, closure rows.
-
-What follows from links, pairs and frame is in ``kinematics.layout`` and is made once a mechanism; the numbers are in
-``coefficients.Numbers`` and are made when first asked for.
+Where everything stands (columns of freedoms, rows of the state, nodes of the walk, screws, loops) follows from links, pairs and frame. It
+is made when first asked for, once for all systems of a mechanism. All single factors of all pairs are evaluated together, whatever types
+they belong to: their places in the walk, their coordinates and coefficients are arrays, so that no kernel goes through pairs. ``Numbers``
+follow from the parameters and are made when first asked for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from dataclasses import fields
 from functools import cached_property
-from itertools import pairwise, starmap
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from mechgraph.graph.linkgraph import LinkGraph, link_graph
-from mechgraph.kinematics.layout import FACTORS_AT_ONCE, Numbers, Places
-from mechgraph.kinematics.lines import LineRows, RowsInOrder
+from mechgraph.graph.linkgraph import Entries, LinkGraph, Ranks, Tree, Walk, entries_of, link_graph, ranked
+from mechgraph.kinematics.rows import CouplingRows, LineRows, LoopRows, Rows, in_places
 from mechgraph.maths.linear import Place, compact
-from mechgraph.maths.se3 import Array, Index, turn_between, turn_tangent, turned
-from mechgraph.memo import graph_cached
+from mechgraph.maths.se3 import Array, Index, cross, homogeneous, identity, inverse, turn_between, turn_tangent, turned
+from mechgraph.memo import dataclass, graph_cached, of_graph, unit_cached
 from mechgraph.model.gears import moving_lines
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Parameters, coupling_places, parameters
 from mechgraph.pairs import pair_type as evaluation
+from mechgraph.pairs.factors import Component, Factor, FixedStack, Stack
+from mechgraph.pairs.pair_type import PairType
+from mechgraph.pairs.travelling import Travelling
+
+MARKER_A, MARKER_B = range(2)
+"""Order of the constant poses in ``Numbers.constants``, after the identity."""
 
 
-class Evaluated(Protocol):
-    """What rows need of a configuration of ``T`` positions."""
+@dataclass(frozen=True)
+class PairsOfType:
+    """The pairs of one type: their indices, the columns of their freedoms ``(f, n)`` and rows of their state ``(nx, n)``."""
 
-    x: Array
-    T: int
-
-    @property
-    def S(self) -> Array:
-        """Twists of all freedoms ``(6, F, T)``."""
-
-    @property
-    def poses(self) -> Array:
-        """Poses of all links ``(3, 4, N, T)``."""
-
-    @property
-    def chord_gaps(self) -> Array:
-        """Closure errors of the chords at their pair points, ``(6, chords, T)``."""
-
-    @property
-    def loop_errors(self) -> Array:
-        """Closure errors of the loops about their middles, stacked ``(loop rows, T)``."""
-
-    @property
-    def loop_jacobian(self) -> Array:
-        """Twists of the freedoms in the rows of every loop, about its middle, ``(loop rows, F, T)``."""
-
-    def pair_sums(self, terms: Array) -> Array:
-        """``(6, F, T)`` -> ``(6, P, T)``."""
-
-    def loop_sums(self, per_pair: Array) -> Array:
-        """``(6, P, T)`` -> ``(loop rows, T)``."""
+    row: PairType
+    pairs: Index
+    columns: Index
+    state_rows: Index
 
 
-class PositionRows(Protocol):
-    """``n`` closure rows ``phi(q) = 0`` of one contributor, evaluated at a configuration of ``T`` positions."""
+@dataclass(frozen=True)
+class FactorBatch:
+    """All factors of one kind: their steps in the walk, columns of their freedoms ``(f, n)`` and rows of their state ``(nx, n)``.
 
-    @property
-    def scale(self) -> Array:
-        """Factors ``(n, 1)`` or one a position by which each row was multiplied, from the user's relation in the user's units."""
-
-    def residual(self, here: Evaluated) -> Array:
-        """``phi (n, T)``."""
-
-    def error(self, here: Evaluated) -> Array:
-        """The closure error ``(T,)``: the largest angle, length over L, or scaled residual."""
-
-    def jacobian(self, here: Evaluated) -> Array:
-        """``J (n, F, T)`` with ``d phi/dt = J q'``."""
-
-    def rates(self, here: Evaluated, dq: Array) -> Array:
-        """``J q' (n, T)`` for rates ``dq (F, T)``."""
-
-
-class Rows(PositionRows, Protocol):
-    """Rows that serve accelerations, forces and the sparse engine as well."""
-
-    def sparse_jacobian(self, here: Evaluated, t: int) -> scipy.sparse.csr_array | None:
-        """``J (n, F)`` at one position, entries at the same places at all of them; None for loops (see ``kinematics.state``)."""
-
-    def bias(self, here: Evaluated, pairs: Array, V: Array) -> Array:
-        """Velocity part ``(n, T)`` of ``d^2 phi/dt^2 = J q'' + bias``, from that of the relative accelerations of ``pairs (6, P, T)`` and
-        the twists ``V (6, N, T)`` of all links.
-        """
-
-    def efforts(self, here: Evaluated, x: Array) -> Array | None:
-        """``J^T x (F, k, T)`` for multipliers ``x (n, k, T)``; None where the rows act through pair wrenches, as loops do."""
-
-
-class LoopRows:
-    """Six rows a loop: the finite twist by which the loop is open, about its middle (the mean of its pair points), which moves with it.
-
-    ``J`` and ``bias`` are the derivatives where the loops are closed and rates meet the rows, as the middle moves otherwise.
+    ``member (n,)`` says which of ``factors`` each one is; without ``factors`` it is a pair that has none.
     """
 
-    def __init__(self, graph: LinkGraph) -> None:
-        self.n_loops, self.count = graph.n_loops, graph.loop_rows
+    factors: tuple[Factor, ...]
+    member: Index
+    pairs: Index
+    ranks: Index
+    steps: Index
+    columns: Index
+    state_rows: Index
 
-    @property
-    def scale(self) -> Array:
-        """Ones."""
-        return np.ones((self.count, 1))
+    @cached_property
+    def stack(self) -> Stack:
+        """The factors for evaluation together."""
+        if not self.factors:
+            return FixedStack(len(self.member))
+        starts = np.flatnonzero(np.concatenate([[True], self.member[1:] != self.member[:-1]]))
+        counts = np.diff(np.append(starts, len(self.member))).tolist()
+        runs = [self.factors[i] for i in self.member[starts].tolist()]
+        return runs[0].stack(runs, counts)
 
-    def residual(self, here: Evaluated) -> Array:
-        """Closure errors of the loops."""
-        return here.loop_errors
+    def part(self, at: slice) -> FactorBatch:
+        """Some of the factors."""
+        arrays = (self.member, self.pairs, self.ranks, self.steps, self.columns, self.state_rows)
+        return FactorBatch(self.factors, *(array[..., at] for array in arrays))
 
-    def error(self, here: Evaluated) -> Array:
-        """Largest of angle and length / L over all chords."""
-        if not self.n_loops:
-            return np.zeros(here.T)
-        gaps = here.chord_gaps
-        angle, length = (np.sqrt(np.abs(part * part).sum(axis=0)).max(axis=0) for part in (gaps[:3], gaps[3:]))
-        return np.maximum(angle, length)
-
-    def jacobian(self, here: Evaluated) -> Array:
-        """``(C x I6) diag(S_k)``."""
-        return here.loop_jacobian
-
-    def sparse_jacobian(self, here: Evaluated, t: int) -> None:
-        """None: ``kinematics.state`` makes it."""
-
-    def rates(self, here: Evaluated, dq: Array) -> Array:
-        """``sum_k C_lk S_k q'_k``."""
-        return here.loop_sums(here.pair_sums(here.S * dq))
-
-    def bias(self, here: Evaluated, pairs: Array, V: Array) -> Array:
-        """The velocity parts of the relative accelerations, summed along the loops."""
-        return here.loop_sums(pairs)
-
-    def efforts(self, here: Evaluated, x: Array) -> None:
-        """None: loops act through pair wrenches, ``Configuration.pair_wrenches``."""
+    @cached_property
+    def at_steps(self) -> Place:
+        """The steps, as a slice where that can be."""
+        return compact(self.steps)
 
 
-class CouplingRows:
-    """One row a coupling: a linear relation ``sum_j c_j q_j = constant`` between single freedoms.
+@dataclass(frozen=True)
+class ScrewTable:
+    """Constant screws, each in a frame of a pair: parts ``(3, K)``, the node of the frame and the constant pose behind it.
 
-    ``coefficients (K, B)`` of all terms stand in ``rows (K,)``, one after the other, and ``columns (K,)`` of the matrix; with ``constant
-    (n, B)`` they are in internal coordinates (lengths over L), every row scaled so that its largest coefficient is one. B is 1, or one a
-    position. Coordinates are those of the state (rows ``state_rows (F,)``): turns count on, they are not wrapped.
+    The line of a screw goes through the origin of its frame, or that of marker B of its pair where ``at_b``.
+    """
+
+    bound: Array
+    free: Array
+    per_pitch: Array
+    pairs: Index
+    nodes: Index
+    const: Index
+    at_b: NDArray[np.bool_]
+
+    @cached_property
+    def b_places(self) -> Index:
+        """The screws through the origin of marker B."""
+        return np.flatnonzero(self.at_b)
+
+    def taken(self, order: Place) -> ScrewTable:
+        """Some of the screws, in that order."""
+        return ScrewTable(*(getattr(self, part.name)[..., order] for part in fields(self)))
+
+
+def factor_batches(groups: Sequence[PairsOfType], walk: Walk, n_factors: Index) -> list[FactorBatch]:
+    """The factors of all pairs by kind, each kind in the order of the walk; pairs without a factor are a kind of their own."""
+    kinds: dict[Hashable, list[tuple[Factor, PairsOfType, int]]] = {}
+    for g in groups:
+        for rank, factor in enumerate(g.row.steps):
+            kinds.setdefault(factor.kind, []).append((factor, g, rank))
+    batches = [_batch(members, walk) for members in kinds.values()]
+    fixed = np.flatnonzero(n_factors == 0)
+    if fixed.size:
+        nothing = np.zeros((0, len(fixed)), dtype=np.intp)
+        steps = walk.step_of[walk.first[fixed]]
+        zeros = np.zeros(len(fixed), dtype=np.intp)
+        batches.append(FactorBatch((), zeros, fixed, zeros, steps, nothing, nothing))
+    return batches
+
+
+def _batch(members: Sequence[tuple[Factor, PairsOfType, int]], walk: Walk) -> FactorBatch:
+    parts = []
+    for number, (_, g, rank) in enumerate(members):
+        _, at_columns, at_rows = evaluation.placed(g.row)[rank]
+        same = [np.full(len(g.pairs), value, dtype=np.intp) for value in (rank, number)]
+        parts.append(
+            [g.columns[at_columns], g.state_rows[at_rows], g.pairs, walk.step_of[walk.first[g.pairs] + rank], *same]
+        )
+    joined: list[Index] = [np.concatenate(part, axis=-1) for part in zip(*parts, strict=True)]
+    order = np.argsort(joined[3], kind="stable")
+    columns, rows, pairs, steps, ranks, member = (part[..., order] for part in joined)
+    return FactorBatch(tuple(factor for factor, _, _ in members), member, pairs, ranks, steps, columns, rows)
+
+
+FACTORS_AT_ONCE = 2048
+"""Factors whose coefficients are multiplied with their markers at once: what lies between stays in the cache."""
+
+
+class Numbers:
+    """Coefficients of poses and screws of a system, from its parameters; a trailing batch axis of length 1, or one a variant.
+
+    ``for_one``: whether one state alone is evaluated, for which the coefficients of the poses are not kept.
     """
 
     def __init__(
-        self, coefficients: Array, rows: Index, columns: Index, constant: Array, scale: Array, state_rows: Index
+        self,
+        par: Parameters,
+        walk: Walk,
+        batches: Sequence[FactorBatch],
+        n_factors: Index,
+        n_freedoms: int,
+        for_one: bool = False,
     ) -> None:
-        self.coefficients, self.constant, self.scale = coefficients, constant, scale
-        self.term_rows, self.term_columns, self._state_rows = rows, columns, state_rows
-        self._first = np.searchsorted(rows, np.arange(len(constant)))
+        self.par, self.walk, self.batches, self.for_one = par, walk, batches, for_one
+        self.n_factors, self.n_freedoms = n_factors, n_freedoms
+        self.n_pairs = len(n_factors)
 
-    @cached_property
-    def matrix(self) -> Array:
-        """The coefficients ``(n, F, B)``."""
-        out = np.zeros((len(self.constant), len(self._state_rows), self.coefficients.shape[1]))
-        out[self.term_rows, self.term_columns] = self.coefficients
+    def taken(self, par: Parameters, which: Index) -> Numbers:
+        """Those of some variants, with their parameters."""
+        out = Numbers(par, self.walk, self.batches, self.n_factors, self.n_freedoms, self.for_one)
+        vars(out).update(constants=_of(self.constants, which), twists=_of(self.twists, which))
+        vars(out)["poses"] = [
+            (_of(C, which) if C.ndim == 4 else C, beside and (_of(beside[0], which), _of(beside[1], which)))
+            for C, beside in self.poses
+        ]
         return out
 
-    def _sums(self, values: Array) -> Array:
-        """``sum_j c_j v_j (n, T)`` of values ``(K, T)``, one a term."""
-        return np.asarray(np.add.reduceat(self.coefficients * values, self._first, axis=0))
+    @cached_property
+    def constants(self) -> Array:
+        """Constant poses ``(3, 4, 1 + 2 P, B)``: the identity, markers A, markers B."""
+        A, B = self.par.marker_a, self.par.marker_b
+        batch = np.broadcast_shapes(A.shape[3:], B.shape[3:])[0]
+        out = np.empty((3, 4, 1 + 2 * self.n_pairs, batch), dtype=np.result_type(A, B))
+        out[:, :, :1], out[:, :, 1 : 1 + self.n_pairs], out[:, :, 1 + self.n_pairs :] = identity(1, 1), A, B
+        return out
 
-    def residual(self, here: Evaluated) -> Array:
-        """``sum_j c_j q_j - constant``."""
-        return self._sums(here.x[self._state_rows[self.term_columns]]) - self.constant
+    @cached_property
+    def is_real(self) -> bool:
+        """Whether no parameter is complex."""
+        return not any(np.iscomplexobj(part) for part in (self.constants, self.par.pitch, self.par.frame))
 
-    def error(self, here: Evaluated) -> Array:
-        """The largest of them."""
-        return np.asarray(np.abs(self.residual(here)).max(axis=0))
+    @cached_property
+    def poses(self) -> list[tuple[Array, tuple[Array, Array] | None]]:
+        """For every batch of factors the coefficients of the poses of its steps with the markers beside them, seen from the nodes
+        from which the steps start (from the global frame where that is the frame link).
 
-    def jacobian(self, here: Evaluated) -> Array:
-        """The coefficients."""
-        return np.broadcast_to(self.matrix, (*self.matrix.shape[:2], here.T))
+        For one mechanism the markers are part of the coefficients, ``(n, 16, m)`` for a product of matrices. For variants, of
+        which each has few positions, they stay beside them, ``(4, 4, n, B)``, and where pitches vary coefficients are
+        ``(16, m, n, B)``.
+        """
+        out: list[tuple[Array, tuple[Array, Array] | None]] = []
+        for b in self.batches:
+            if self.constants.shape[3] == 1 and self.par.pitch.shape[1] == 1:
+                out.append((self._folded(b), None))
+                continue
+            C, left, right = self._coefficients(b), *self._beside(b)
+            C = C.reshape(16, *C.shape[2:])
+            out.append((np.ascontiguousarray(C[..., 0].transpose(2, 0, 1)) if C.shape[3] == 1 else C, (left, right)))
+        return out
 
-    def sparse_jacobian(self, here: Evaluated, t: int) -> scipy.sparse.csr_array:
-        """The coefficients ``(n, F)`` at one position, entries at the same places at all of them."""
-        values = self.coefficients[:, t if self.coefficients.shape[1] > 1 else 0]
-        return scipy.sparse.csr_array((values, (self.term_rows, self.term_columns)), shape=self.matrix.shape[:2])
+    def parts(self) -> Iterator[tuple[FactorBatch, Array, tuple[Array, Array] | None]]:
+        """The factors with their coefficients and the poses beside them, see ``poses``: whole batches, or few factors at once."""
+        if not self.for_one:
+            yield from ((b, *pose) for b, pose in zip(self.batches, self.poses, strict=True))
+            return
+        for b in self.batches:
+            for i in range(0, len(b.pairs), FACTORS_AT_ONCE):
+                part = b.part(slice(i, i + FACTORS_AT_ONCE))
+                C = self._coefficients(part)
+                yield part, C.reshape(16, *C.shape[2:]), self._beside(part)
 
-    def rates(self, here: Evaluated, dq: Array) -> Array:
-        """``sum_j c_j q'_j``."""
-        return self._sums(dq[self.term_columns])
+    def _coefficients(self, b: FactorBatch) -> Array:
+        """Coefficients ``(4, 4, m, n, B)`` of the poses of a batch in the sense of the walk."""
+        return b.stack.coefficients(self.par.pitch[b.pairs], np.asarray(self.walk.back[b.steps], dtype=bool))
 
-    def bias(self, here: Evaluated, pairs: Array, V: Array) -> Array:
-        """Zero: the relation is linear."""
-        return np.zeros((len(self.constant), here.T), dtype=pairs.dtype)
+    def _folded(self, b: FactorBatch) -> Array:
+        """The same with the markers beside them, ``(n, 16, m)``, of one mechanism."""
+        n = len(b.pairs)
+        if n > FACTORS_AT_ONCE:
+            first = self._folded(b.part(slice(0, FACTORS_AT_ONCE)))
+            out = np.empty((n, *first.shape[1:]), dtype=first.dtype)
+            out[:FACTORS_AT_ONCE] = first
+            for i in range(FACTORS_AT_ONCE, n, FACTORS_AT_ONCE):
+                out[i : i + FACTORS_AT_ONCE] = self._folded(b.part(slice(i, i + FACTORS_AT_ONCE)))
+            return out
+        C = self._coefficients(b)[..., 0]
+        left, right = self._beside(b)
+        C = np.einsum("acmn,cdn->admn", np.einsum("abn,bcmn->acmn", left[..., 0], C), right[..., 0])
+        return np.ascontiguousarray(C.reshape(16, *C.shape[2:]).transpose(2, 0, 1))
 
-    def efforts(self, here: Evaluated, x: Array) -> Array:
-        """``c_j x`` in every freedom."""
-        return np.asarray(np.einsum("rft,rkt->fkt", self.matrix, x))
+    def _beside(self, b: FactorBatch) -> tuple[Array, Array]:
+        """Constant poses before and behind the factors of a batch in the sense of the walk, homogeneous ``(4, 4, n, B)``."""
+        n, last = self.n_pairs, np.maximum(self.n_factors, 1) - 1
+        back, begins, ends = self.walk.back[b.steps], b.ranks == 0, b.ranks == last[b.pairs]
+        at_a, at_b = begins * (1 + MARKER_A * n + b.pairs), ends * (1 + MARKER_B * n + b.pairs)
+        before = homogeneous(self.constants.take(np.where(back, at_b, at_a), axis=2))
+        behind = homogeneous(inverse(self.constants.take(np.where(back, at_a, at_b), axis=2)))
+        starts = self.walk.parents[b.steps] == 0
+        before[:, :, starts] = np.einsum("abt,bcnt->acnt", homogeneous(self.par.frame), before[:, :, starts])
+        return before, behind
+
+    @cached_property
+    def twists(self) -> Array:
+        """Twists of all freedoms in their nodes, bound and free part ``(3, 2, F, B)``; zero for those that move."""
+        batch = np.broadcast_shapes(self.constants.shape[3:], self.par.pitch.shape[1:])[0]
+        out = np.zeros((3, 2, self.n_freedoms, batch), dtype=np.result_type(self.constants, self.par.pitch))
+        for b in self.batches:
+            S = b.stack.constant_twists(self.par.pitch[b.pairs])
+            if S is not None:
+                self.place_twists(out, b, S)
+        return out
+
+    def place_twists(self, out: Array, b: FactorBatch, S: Array) -> None:
+        """Twists ``(6, f, n, T)`` in the frames before the factors of a batch, written into ``out (3, 2, F, T)`` in their nodes."""
+        X = self.marker_a_if_first(b)
+        for j, columns in enumerate(b.columns):
+            out[:, 0, columns] = np.einsum("ijnt,jnt->int", X[:, :3], S[:3, j])
+            out[:, 1, columns] = np.einsum("ijnt,jnt->int", X[:, :3], S[3:, j])
+            out[:, 1, columns] += cross(X[:, 3], out[:, 0, columns])
+
+    def marker_a_if_first(self, b: FactorBatch) -> Array:
+        """The frames before the factors of a batch in their nodes ``(3, 4, n, B)``: markers A before the first ones of pairs."""
+        return self.constants[:, :, np.where(b.ranks == 0, 1 + MARKER_A * self.n_pairs + b.pairs, 0)]
+
+    def components(self, table: ScrewTable) -> Array:
+        """Wrenches of a table in their nodes, moment and force ``(3, 2, K, B)``; without arms where they act at markers B."""
+        batch = np.broadcast_shapes(self.constants.shape[3:], self.par.pitch.shape[1:])[0]
+        out = np.empty((3, 2, len(table.pairs), batch), dtype=np.result_type(self.constants, self.par.pitch))
+        for i in range(0, len(table.pairs), FACTORS_AT_ONCE):
+            self._place_components(table.taken(slice(i, i + FACTORS_AT_ONCE)), out[:, :, i : i + FACTORS_AT_ONCE])
+        return out
+
+    def _place_components(self, table: ScrewTable, out: Array) -> None:
+        X = self.constants[:, :, table.const]
+        free = table.free[..., None] + table.per_pitch[..., None] * self.par.pitch[table.pairs]
+        out[:, 0] = np.einsum("ijkt,jkt->ikt", X[:, :3], free)
+        out[:, 1] = np.einsum("ijkt,jk->ikt", X[:, :3], table.bound)
+        out[:, 0] += np.where(table.at_b[:, None], 0.0, cross(X[:, 3], out[:, 1]))
+
+    @cached_property
+    def ends(self) -> Array:
+        """Origins of the markers B in the frames of their links b, ``(3, 1, P, B)``."""
+        return self.par.marker_b[:, None, 3]
+
+
+def _of(values: Array, which: Index) -> Array:
+    """Some variants of a batch; of a batch of one, itself."""
+    return values.take(which, axis=-1) if values.shape[-1] > 1 else values
+
+
+@of_graph
+def _nothing_yet(m: Mechanism) -> dict[str, Any]:
+    """What the systems of a mechanism share."""
+    return {}
+
+
+class Places:
+    """The places of a mechanism with geometry; ``par`` gives the unit of length of pair types that have lengths."""
+
+    def __init__(self, m: Mechanism, graph: LinkGraph, par: Parameters) -> None:
+        self.m, self.graph, self.par = m, graph, par
+        self.a, self.b, self.chords = graph.a, graph.b, graph.chords
+        self._shared = m.once(_nothing_yet)
+        self._sized = {} if self.has_lengths else self._shared
+
+    @property
+    def sized_once(self) -> dict[Any, Any]:
+        """What is kept for all systems of the mechanism that have the same unit of length, or whose pair types have no lengths."""
+        return self._sized
+
+    @property
+    def types(self) -> list[PairType]:
+        """The pair types."""
+        return self._types[0]
+
+    @property
+    def type_of(self) -> Index:
+        """For every pair the number of its type among ``types``."""
+        return self._types[1]
+
+    @graph_cached
+    def _types(self) -> tuple[list[PairType], Index]:
+        """The pair types, and for every pair the number of its own."""
+        each = [pair.type for pair in self.m.pairs]
+        ids = np.fromiter(map(id, each), np.int64, len(each))
+        _, first, same = np.unique(ids, return_index=True, return_inverse=True)
+        numbers: dict[PairType, int] = {}
+        number = np.empty(len(first), dtype=np.intp)
+        for i in np.argsort(first).tolist():
+            number[i] = numbers.setdefault(each[first[i]], len(numbers))
+        return list(numbers), number[same]
+
+    def _by_type(self, of: Callable[[PairType], int]) -> Index:
+        """A number of every pair that follows from its type."""
+        types, number = self._types
+        return np.array([of(row) for row in types], dtype=np.intp)[number]
+
+    @graph_cached
+    def has_lengths(self) -> bool:
+        """Whether a pair type has lengths of its own."""
+        return any(row.has_lengths for row in self._types[0])
+
+    # --- index arrays ------------------------------------------------------------------------------------------------
+
+    @graph_cached
+    def first_column(self) -> Index:
+        """For every pair its first freedom, and the number of all behind the last."""
+        return np.concatenate([[0], np.cumsum(self._by_type(lambda row: row.f))]).astype(np.intp)
+
+    @graph_cached
+    def first_row(self) -> Index:
+        """For every pair its first number in the state, and the number of all behind the last."""
+        return np.concatenate([[0], np.cumsum(self._by_type(lambda row: row.nx))]).astype(np.intp)
+
+    @graph_cached
+    def n_freedoms(self) -> int:
+        """Number ``F`` of freedoms."""
+        return int(self.first_column[-1])
+
+    @graph_cached
+    def n_state(self) -> int:
+        """Length ``nx`` of the state."""
+        return int(self.first_row[-1])
+
+    @graph_cached
+    def n_factors(self) -> Index:
+        """For every pair the number of its factors."""
+        return self._by_type(lambda row: len(row.steps))
+
+    @graph_cached
+    def tree(self) -> Tree:
+        """The spanning tree."""
+        return Tree(self.graph)
+
+    @graph_cached
+    def walk(self) -> Walk:
+        """The way through every factor of the pairs."""
+        return Walk(self.tree, (self.a, self.b), self.chords, np.maximum(self.n_factors, 1))
+
+    @unit_cached
+    def groups(self) -> list[PairsOfType]:
+        """The pairs by type."""
+        out = []
+        for number, row in enumerate(self._types[0]):
+            index = np.flatnonzero(self._types[1] == number)
+            columns = self.first_column[index] + np.arange(row.f, dtype=np.intp)[:, None]
+            state = self.first_row[index] + np.arange(row.nx, dtype=np.intp)[:, None]
+            out.append(PairsOfType(row.scaled(self.par.L), index, columns, state))
+        return out
+
+    @unit_cached
+    def batches(self) -> list[FactorBatch]:
+        """The factors by kind."""
+        return factor_batches(self.groups, self.walk, self.n_factors)
+
+    @graph_cached
+    def is_length(self) -> NDArray[np.bool_]:
+        """Which freedoms are slides."""
+        out = np.zeros(self.n_freedoms, dtype=bool)
+        for g in self.groups:
+            out[g.columns] = np.array([not f.turns for f in g.row.freedoms], dtype=bool)[:, None]
+        return out
+
+    @unit_cached
+    def limits(self) -> tuple[Index, Array, Array]:
+        """The single freedoms whose coordinates have a range, and least and greatest values."""
+        ranges = np.full((self.n_freedoms, 2), (-np.inf, np.inf))
+        for g in self.groups:
+            ranges[g.columns] = (
+                np.array([end for step in g.row.steps for end in step.ranges])[:, None] if g.row.f else 0.0
+            )
+        columns = np.flatnonzero(np.isfinite(ranges).any(axis=1))
+        return columns, ranges[columns, 0], ranges[columns, 1]
+
+    @unit_cached
+    def periods(self) -> Array:
+        """By how much every freedom ``(F,)`` grows until it is back: a turn, the length of a closed curve; infinite where it goes on."""
+        out = np.full(self.n_freedoms, np.inf)
+        for g in self.groups:
+            out[g.columns] = np.array([p for step in g.row.steps for p in step.periods])[:, None] if g.row.f else np.inf
+        return out
+
+    def rounds(self, columns: Index | NDArray[np.bool_], gained: Array) -> Array:
+        """What whole rounds amount to in gains ``(n, ...)`` of some freedoms: zero in those that do not come back."""
+        period = self.periods[columns].reshape(-1, *(1,) * (gained.ndim - 1))
+        back = np.isfinite(period)
+        return np.where(back, np.where(back, period, 0.0) * np.round(gained / period), 0.0)
+
+    def place_of(self, pair: int) -> tuple[int, int]:
+        """Number of the group of a pair, and its place there."""
+        number = int(self._types[1][pair])
+        return number, int(np.searchsorted(self.groups[number].pairs, pair))
+
+    @graph_cached
+    def pair_of_freedom(self) -> Index:
+        """For every freedom its pair, as numbers."""
+        return np.repeat(np.arange(len(self.m.pairs)), np.diff(self.first_column))
+
+    def freedom_names_of(self, columns: Index) -> tuple[str, ...]:
+        """Full names of some freedoms."""
+        pairs = self.pair_of_freedom[columns]
+        places = columns - self.first_column[pairs]
+        return tuple(self.m.pairs[k].freedom_names[i] for k, i in zip(pairs.tolist(), places.tolist(), strict=True))
+
+    @graph_cached
+    def owners(self) -> Place:
+        """For every freedom its pair."""
+        return compact(self.pair_of_freedom)
+
+    @graph_cached
+    def pair_ranks(self) -> Ranks:
+        """Freedoms as runs by pair."""
+        return ranked(np.diff(self.first_column))
+
+    @graph_cached
+    def factor_ranks(self) -> Ranks:
+        """Freedoms as runs by factor, factors pair by pair."""
+        widths = [[len(step.freedoms) for step in row.steps] for row in self._types[0]]
+        table = np.array([w + [0] * (max(map(len, widths)) - len(w)) for w in widths], dtype=np.intp)
+        used = np.arange(table.shape[1]) < self.n_factors[:, None]
+        return ranked(table[self._types[1]][used])
+
+    @graph_cached
+    def factors_by_pair(self) -> Ranks:
+        """Factors as runs by pair."""
+        return ranked(self.n_factors)
+
+    @graph_cached
+    def factor_carriers(self) -> Place:
+        """For every factor the link a of its pair."""
+        return compact(np.repeat(self.a, self.n_factors))
+
+    def factor_numbers(self, batch: FactorBatch) -> Index:
+        """Numbers of the factors of a batch, counted pair by pair."""
+        return np.asarray((np.cumsum(self.n_factors) - self.n_factors)[batch.pairs] + batch.ranks)
+
+    @unit_cached
+    def moving_batches(self) -> list[FactorBatch]:
+        """The factors whose twists move with their coordinates."""
+        return [b for b in self.batches if b.stack.constant_twists(self.par.pitch[b.pairs]) is None]
+
+    @unit_cached
+    def bend(self) -> float:
+        """Greatest curvature of curves and surfaces, over one of the length of the mechanism; 0 where there are none."""
+        factors = [factor for b in self.moving_batches for factor in b.factors]
+        return max((factor.bend for factor in factors if isinstance(factor, Travelling)), default=0.0)
+
+    @graph_cached
+    def chord_nodes(self) -> tuple[Index, Index]:
+        """For every chord the node in which it ends, and that of its link b."""
+        return self.walk.end_node[self.chords], self.walk.link_node[self.b[self.chords]]
+
+    @graph_cached
+    def column_nodes(self) -> Index:
+        """For every freedom the node of the frame before its factor."""
+        out = np.empty(self.n_freedoms, dtype=np.intp)
+        for batch in self.batches:
+            out[batch.columns] = self.batch_nodes(batch)
+        return out
+
+    def batch_nodes(self, batch: FactorBatch) -> Index:
+        """Nodes of the frames before the factors of a batch."""
+        return self.walk.node_before(batch.pairs, batch.ranks)
+
+    def frame_place(self, g: PairsOfType, k: int) -> tuple[Index, Index]:
+        """Node of frame ``k`` of the pairs of a group, and the constant pose behind it (a place in ``Numbers.constants``)."""
+        n = len(self.m.pairs)
+        if k == 0:
+            return self.walk.link_node[self.a[g.pairs]], 1 + MARKER_A * n + g.pairs
+        if k == g.row.f:
+            return self.walk.end_node[g.pairs], 1 + MARKER_B * n + g.pairs
+        rank = next(r for r, factor in enumerate(g.row.factors) if k in factor)
+        return self.walk.node_before(g.pairs, rank), np.zeros(len(g.pairs), dtype=np.intp)
+
+    # --- screws of components ----------------------------------------------------------------------------------------
+
+    @unit_cached
+    def effort_table(self) -> ScrewTable:
+        """Efforts of all freedoms, in the order of the freedoms."""
+        parts = [(g, c) for g in self.groups for c in g.row.efforts]
+        table = self._screw_table(parts)
+        columns = [column for g in self.groups for column in g.columns]
+        order = np.argsort(np.concatenate(columns)) if columns else np.zeros(0, dtype=np.intp)
+        return table.taken(order)
+
+    @unit_cached
+    def reaction_table(self) -> ScrewTable:
+        """Constant reaction components, group by group, component by component."""
+        return self._screw_table([(g, c) for g in self.groups for c in g.row.reactions or ()])
+
+    def _screw_table(self, parts: Sequence[tuple[PairsOfType, Component]]) -> ScrewTable:
+        """The components of groups, one after the other, each for all pairs of its group."""
+        counts = [len(g.pairs) for g, _ in parts]
+        places: dict[tuple[int, int], tuple[Index, Index]] = {}
+        for g, c in parts:
+            if (id(g), c.frame) not in places:
+                places[id(g), c.frame] = self.frame_place(g, c.frame)
+        wrenches = np.array([(*c.wrench, *c.per_pitch) for _, c in parts]).reshape(len(parts), 12).T
+        vectors = np.repeat(wrenches, counts, axis=1)
+        at_b = np.repeat(np.array([c.at_b for _, c in parts], dtype=bool), counts)
+        nothing = [np.zeros(0, dtype=np.intp)]
+        pairs = np.concatenate([g.pairs for g, _ in parts] or nothing)
+        nodes, const = (np.concatenate([places[id(g), c.frame][side] for g, c in parts] or nothing) for side in (0, 1))
+        return ScrewTable(vectors[3:6], vectors[:3], vectors[6:9], pairs, nodes, const, at_b)
+
+    # --- loops -------------------------------------------------------------------------------------------------------
+
+    @graph_cached
+    def loop_columns(self) -> list[tuple[Index, Array]]:
+        """Columns of the freedoms along every loop, and their signs."""
+        return [self._columns_of_loop(loop) for loop in self.graph.loops]
+
+    def _columns_of_loop(self, loop: tuple[tuple[int, int], ...]) -> tuple[Index, Array]:
+        columns = [np.arange(self.first_column[k], self.first_column[k + 1]) for k, _ in loop]
+        signs = [np.full(len(c), float(sign)) for c, (_, sign) in zip(columns, loop, strict=True)]
+        return np.concatenate(columns), np.concatenate(signs)
+
+    @graph_cached
+    def entries(self) -> Entries:
+        """The freedoms along the loops."""
+        return entries_of(self.graph, self.first_column)
+
+    @graph_cached
+    def entry_places(self) -> Index | None:
+        """Where they stand in the Jacobian of the loops, see ``Entries.places``."""
+        return self.entries.places(self.n_freedoms)
+
+    @graph_cached
+    def loops_of_chords(self) -> scipy.sparse.csr_array:
+        """Which chord closures make up a loop, ``(loops, chords)`` with signs."""
+        return self.graph.sparse_loop_matrix[:, self.chords]
 
 
 class States(Places):
@@ -312,23 +683,17 @@ class System(States):
     @cached_property
     def rows(self) -> list[Rows]:
         """The contributors of closure rows: the loops, then the couplings."""
-        loops: list[Rows] = [LoopRows(self.graph)]
-        return loops + ([self._coupling_rows()] if self.m.couplings else [])
+        moving = self.m.once(moving_lines)
+        on_lines = np.array([c.name in moving for c in self.m.couplings], dtype=bool)
+        linear, lines = np.flatnonzero(~on_lines), np.flatnonzero(on_lines)
+        out: list[Rows] = [LoopRows(self.graph)]
+        out += [self._linear_rows(linear)] if linear.size else []
+        return out + ([LineRows(self, lines)] if lines.size else [])
 
     @property
-    def position_rows(self) -> Sequence[PositionRows]:
-        """The same where positions alone are asked for."""
+    def position_rows(self) -> Sequence[Rows]:
+        """The same where positions alone are asked for, and further ones of these."""
         return self.rows
-
-    def _coupling_rows(self) -> Rows:
-        """The rows of the couplings, in order."""
-        moving = self.m.once(moving_lines)
-        on_lines = np.array([c.name in moving for c in self.m.couplings])
-        linear, lines = np.flatnonzero(~on_lines), np.flatnonzero(on_lines)
-        if not lines.size:
-            return self._linear_rows(linear)
-        parts: list[tuple[Index, Rows]] = [(linear, self._linear_rows(linear))] if linear.size else []
-        return RowsInOrder([*parts, (lines, LineRows(self, lines))])
 
     def _linear_rows(self, which: Index) -> CouplingRows:
         """The rows of linear couplings, by their places; one without a constant keeps the value that it has at the start."""
@@ -346,7 +711,8 @@ class System(States):
         coefficients = coefficients * np.where(self.is_length[columns], self.par.L, 1.0)[:, None]
         largest = np.maximum.reduceat(np.abs(coefficients), first, axis=0)
         scale = 1.0 / np.where(largest > 0, largest, 1.0)
-        return CouplingRows(coefficients * scale[rows], rows, columns, constant * scale, scale, self.single_rows)
+        at = compact(self.graph.loop_rows + which)
+        return CouplingRows(at, coefficients * scale[rows], rows, columns, constant * scale, scale, self.single_rows)
 
     @cached_property
     def n_rows(self) -> int:
@@ -357,16 +723,18 @@ class System(States):
     def row_scale(self) -> Array:
         """Factors ``(n_rows, B)`` of every row over the user's relation: its multiplier in the user's units is ``scale * x``."""
         B = self.par.couplings.shape[1]
-        return np.concatenate([np.broadcast_to(part.scale, (len(part.scale), B)) for part in self.position_rows])
+        each = [np.broadcast_to(part.scale, (len(part.scale), B)) for part in self.position_rows]
+        return in_places(self.position_rows, each)
 
     @property
     def coupling_matrix(self) -> Array:
         """Coefficients ``(couplings, F, B)`` of the rows behind those of the loops, internal units."""
-        out = np.zeros((len(self.m.couplings), self.n_freedoms, self.par.couplings.shape[1]))
-        for at, part in self.rows[1].parts if self.m.couplings and isinstance(self.rows[1], RowsInOrder) else ():
-            out[at] = part.matrix if isinstance(part, CouplingRows) else 0.0
-        parts = [part.matrix for part in self.rows[1:] if isinstance(part, CouplingRows)]
-        return parts[0] if parts else out
+        first = self.graph.loop_rows
+        out = np.zeros((first + len(self.m.couplings), self.n_freedoms, self.par.couplings.shape[1]))
+        for part in self.rows:
+            if isinstance(part, CouplingRows):
+                out[part.places] = part.matrix
+        return out[first:]
 
     @property
     def coupled_freedoms(self) -> Index:
@@ -386,12 +754,6 @@ class System(States):
         out = self.is_length.copy()
         out[self.entries.column] = out[self.coupled_freedoms] = False
         return out
-
-    @cached_property
-    def row_places(self) -> list[slice]:
-        """The rows of every contributor."""
-        ends = np.cumsum([0, *(len(part.scale) for part in self.rows)]).tolist()
-        return list(starmap(slice, pairwise(ends)))
 
     # --- numbers ------ -----------------------------------------------------------------------------------------------
 

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.kinematics.lines import LineRows
+from mechgraph.kinematics.rows import LineRows
 from mechgraph.kinematics.state import Configuration, user_poses
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Array, Mask, compose, cross, identity, inverse, rotate, rotate_back

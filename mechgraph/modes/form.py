@@ -30,8 +30,9 @@ import numpy as np
 from mechgraph.determinacy.decomposition import MOST_SPLIT, Constraint, Constraints, rows_of_pair, smallest
 from mechgraph.errors import counted
 from mechgraph.graph.linkgraph import LinkGraph, components_of_edges
+from mechgraph.kinematics.rows import Evaluated, Rows
 from mechgraph.kinematics.state import Configuration
-from mechgraph.kinematics.system import Evaluated, PositionRows, System
+from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import Array as Reals
 from mechgraph.maths.se3 import (
@@ -66,20 +67,16 @@ class RodPoints:
     squares: Array
 
 
-class RodRows:
+class RodRows(Rows):
     """``(d^2 - l^2) / 2`` of every rod, polynomial in the poses; ``way (n, F)``: the freedoms between both links, with signs.
 
-    Implements ``system.PositionRows``. Its rate is the relative twist of the links on the line of ``d`` through ``p_b``:
+    They are rows of positions alone. Its rate is the relative twist of the links on the line of ``d`` through ``p_b``:
     ``phi' = W . (V_b - V_a)``, ``W = (p_b x d, d)``.
     """
 
-    def __init__(self, points: RodPoints, way: Reals) -> None:
-        self.points, self.way = points, way
-
-    @property
-    def scale(self) -> Reals:
-        """Ones."""
-        return np.ones((len(self.way), 1))
+    def __init__(self, points: RodPoints, way: Reals, first: int) -> None:
+        self.points, self.way, self.scale = points, way, np.ones((len(way), 1))
+        self.places = slice(first, first + len(way))
 
     def lines(self, here: Evaluated) -> tuple[Reals, Reals]:
         """``phi (n, T)`` and ``W (6, n, T)``."""
@@ -93,17 +90,9 @@ class RodRows:
         """``phi (n, T)``."""
         return self.lines(here)[0]
 
-    def error(self, here: Evaluated) -> Reals:
-        """The largest of them."""
-        return np.asarray(np.abs(self.residual(here)).max(axis=0, initial=0.0))
-
     def jacobian(self, here: Evaluated) -> Reals:
         """``W . S`` in the freedoms between both links."""
         return ((self.lines(here)[1].transpose(2, 1, 0) @ here.S.transpose(2, 0, 1)) * self.way).transpose(1, 2, 0)
-
-    def rates(self, here: Evaluated, dq: Reals) -> Reals:
-        """``J q'``."""
-        return np.asarray((self.jacobian(here) * dq).sum(axis=1))
 
 
 class RodSystem(System):
@@ -116,7 +105,8 @@ class RodSystem(System):
     @cached_property
     def rod_rows(self) -> RodRows:
         """The rows of rods."""
-        return RodRows(self.points, self.ways[:, self.pair_of_freedom])
+        first = self.graph.loop_rows + len(self.m.couplings)
+        return RodRows(self.points, self.ways[:, self.pair_of_freedom], first)
 
     @cached_property
     def ways(self) -> Reals:
@@ -144,7 +134,7 @@ class RodSystem(System):
         return [(pair, -sign) for pair, sign in up] + down[::-1]
 
     @cached_property
-    def position_rows(self) -> Sequence[PositionRows]:
+    def position_rows(self) -> Sequence[Rows]:
         """Those of loops and of rods."""
         return [*self.rows, self.rod_rows]
 

@@ -50,9 +50,9 @@ from mechgraph.force.friction import Rubbed
 from mechgraph.force.friction_problem import rubbed_in_motion
 from mechgraph.force.loads import Site, inertia_wrenches
 from mechgraph.force.reactions import ForceProblem
+from mechgraph.graph.linkgraph import Tree
 from mechgraph.kernel import build
 from mechgraph.kernel.tables import Integers, layout, pointer, tables, why_not, why_not_load
-from mechgraph.kinematics.layout import Tree
 from mechgraph.kinematics.motion_path import BLOCK
 from mechgraph.kinematics.rates import PassiveMotion, PassiveMotions, Rates, Velocities
 from mechgraph.kinematics.solver import closure_rank, closure_solver

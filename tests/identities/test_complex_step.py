@@ -13,7 +13,7 @@ import strategies
 from numpy.testing import assert_allclose
 
 import mechgraph as mg
-from mechgraph.kinematics import layout
+from mechgraph.graph import linkgraph
 from mechgraph.kinematics.assembly import scaled_system
 from mechgraph.kinematics.state import Configuration, close
 from mechgraph.kinematics.system import System, indexed
@@ -324,7 +324,7 @@ def test_a_batch_is_the_evaluation_of_each(seed, monkeypatch):
         return [np.array(part) for part in (*parts, *(X for frames in here.frames for X in frames))]
 
     whole = everything(Configuration(system, states), dq)
-    monkeypatch.setattr(layout, "DEEP", 0)
+    monkeypatch.setattr(linkgraph, "DEEP", 0)
     doubled = everything(Configuration(system, states), dq)
     monkeypatch.undo()
     for t in (0, 17, 69):

@@ -1,4 +1,9 @@
-"""Closure rows of couplings whose force acts along a line between two links, evaluated from the poses of both (see ``model.lines``).
+"""The rows of the closure equations: every constraint contributes its own, a loop six (in the plane three), a coupling one.
+
+A new kind of constraint is a class of ``Rows``; nothing else in the package knows how many rows there are or where they come from: they
+stand at the places that each contributor names, the loops first.
+
+Couplings whose force acts along a line between two links are evaluated from the poses of both (see ``model.lines``).
 
 With the line at the point P along n, ``G = (P x n, n)``, a row is ``phi - constant``, its rate and acceleration
 
@@ -10,24 +15,208 @@ derivative of the line along the motion of both poses, by a complex step.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import scipy
 
+from mechgraph.graph.linkgraph import LinkGraph
+from mechgraph.maths.linear import Place
 from mechgraph.maths.se3 import Array, Index, cross, rotate
 from mechgraph.maths.tolerances import COMPLEX_STEP
 from mechgraph.model.gears import LineCoupling, LinePlaces, LinesAt, Relation
 from mechgraph.quantities import LENGTH, unit_of
 
 
-class LineRows:
+class Evaluated(Protocol):
+    """What rows need of a configuration of ``T`` positions."""
+
+    x: Array
+    T: int
+
+    @property
+    def S(self) -> Array:
+        """Twists of all freedoms ``(6, F, T)``."""
+
+    @property
+    def poses(self) -> Array:
+        """Poses of all links ``(3, 4, N, T)``."""
+
+    @property
+    def chord_gaps(self) -> Array:
+        """Closure errors of the chords at their pair points, ``(6, chords, T)``."""
+
+    @property
+    def loop_errors(self) -> Array:
+        """Closure errors of the loops about their middles, stacked ``(loop rows, T)``."""
+
+    @property
+    def loop_jacobian(self) -> Array:
+        """Twists of the freedoms in the rows of every loop, about its middle, ``(loop rows, F, T)``."""
+
+    def pair_sums(self, terms: Array) -> Array:
+        """``(6, F, T)`` -> ``(6, P, T)``."""
+
+    def loop_sums(self, per_pair: Array) -> Array:
+        """``(6, P, T)`` -> ``(loop rows, T)``."""
+
+
+class Rows:
+    """``n`` closure rows ``phi(q) = 0`` of one contributor at ``places`` among all rows, at a configuration of ``T`` positions.
+
+    Rows for positions alone have ``scale``, ``residual`` and ``jacobian``.
+    """
+
+    places: Place
+    scale: Array
+    """Factors ``(n, 1)`` or one a position by which each row was multiplied, from the user's relation in the user's units."""
+
+    def residual(self, here: Evaluated) -> Array:
+        """``phi (n, T)``."""
+        raise NotImplementedError
+
+    def error(self, here: Evaluated) -> Array:
+        """The closure error ``(T,)``: the largest angle, length over L, or scaled residual."""
+        return np.asarray(np.abs(self.residual(here)).max(axis=0, initial=0.0))
+
+    def jacobian(self, here: Evaluated) -> Array:
+        """``J (n, F, T)`` with ``d phi/dt = J q'``."""
+        raise NotImplementedError
+
+    def sparse_jacobian(self, here: Evaluated, t: int) -> scipy.sparse.csr_array | None:
+        """``J (n, F)`` at one position, entries at the same places at all of them; None for loops (see ``kinematics.state``)."""
+        raise NotImplementedError
+
+    def rates(self, here: Evaluated, dq: Array) -> Array:
+        """``J q' (n, T)`` for rates ``dq (F, T)``."""
+        return np.asarray((self.jacobian(here) * dq).sum(axis=1))
+
+    def bias(self, here: Evaluated, pairs: Array, V: Array) -> Array:
+        """Velocity part ``(n, T)`` of ``d^2 phi/dt^2 = J q'' + bias``, from that of the relative accelerations of ``pairs (6, P, T)`` and
+        the twists ``V (6, N, T)`` of all links.
+        """
+        raise NotImplementedError
+
+    def efforts(self, here: Evaluated, x: Array) -> Array | None:
+        """``J^T x (F, k, T)`` for multipliers ``x (n, k, T)``; None where the rows act through pair wrenches, as loops do."""
+        return np.asarray(np.einsum("rft,rkt->fkt", self.jacobian(here), x))
+
+
+def in_places(rows: Iterable[Rows], values: Sequence[Array]) -> Array:
+    """Values ``(n, ...)`` of several contributors, at the places of their rows."""
+    if len(values) == 1:
+        return values[0]
+    shape = np.broadcast_shapes(*(own.shape[1:] for own in values))
+    out = np.empty((sum(map(len, values)), *shape), dtype=np.result_type(*values))
+    for part, own in zip(rows, values, strict=True):
+        out[part.places] = own
+    return out
+
+
+class LoopRows(Rows):
+    """Six rows a loop: the finite twist by which the loop is open, about its middle (the mean of its pair points), which moves with it.
+
+    ``J`` and ``bias`` are the derivatives where the loops are closed and rates meet the rows, as the middle moves otherwise.
+    """
+
+    def __init__(self, graph: LinkGraph) -> None:
+        self.n_loops, self.places = graph.n_loops, slice(0, graph.loop_rows)
+        self.scale = np.ones((graph.loop_rows, 1))
+
+    def residual(self, here: Evaluated) -> Array:
+        """Closure errors of the loops."""
+        return here.loop_errors
+
+    def error(self, here: Evaluated) -> Array:
+        """Largest of angle and length / L over all chords."""
+        if not self.n_loops:
+            return np.zeros(here.T)
+        gaps = here.chord_gaps
+        angle, length = (np.sqrt(np.abs(part * part).sum(axis=0)).max(axis=0) for part in (gaps[:3], gaps[3:]))
+        return np.maximum(angle, length)
+
+    def jacobian(self, here: Evaluated) -> Array:
+        """``(C x I6) diag(S_k)``."""
+        return here.loop_jacobian
+
+    def sparse_jacobian(self, here: Evaluated, t: int) -> None:
+        """None: ``kinematics.state`` makes it."""
+
+    def rates(self, here: Evaluated, dq: Array) -> Array:
+        """``sum_k C_lk S_k q'_k``."""
+        return here.loop_sums(here.pair_sums(here.S * dq))
+
+    def bias(self, here: Evaluated, pairs: Array, V: Array) -> Array:
+        """The velocity parts of the relative accelerations, summed along the loops."""
+        return here.loop_sums(pairs)
+
+    def efforts(self, here: Evaluated, x: Array) -> None:
+        """None: loops act through pair wrenches, ``Configuration.pair_wrenches``."""
+
+
+class CouplingRows(Rows):
+    """One row a coupling: a linear relation ``sum_j c_j q_j = constant`` between single freedoms.
+
+    ``coefficients (K, B)`` of all terms stand in ``rows (K,)``, one after the other, and ``columns (K,)`` of the matrix; with ``constant
+    (n, B)`` they are in internal coordinates (lengths over L), every row scaled so that its largest coefficient is one. B is 1, or one a
+    position. Coordinates are those of the state (rows ``state_rows (F,)``): turns count on, they are not wrapped.
+    """
+
+    def __init__(
+        self,
+        places: Place,
+        coefficients: Array,
+        rows: Index,
+        columns: Index,
+        constant: Array,
+        scale: Array,
+        state_rows: Index,
+    ) -> None:
+        self.places, self.coefficients, self.constant, self.scale = places, coefficients, constant, scale
+        self.term_rows, self.term_columns, self._state_rows = rows, columns, state_rows
+        self._first = np.searchsorted(rows, np.arange(len(constant)))
+
+    @cached_property
+    def matrix(self) -> Array:
+        """The coefficients ``(n, F, B)``."""
+        out = np.zeros((len(self.constant), len(self._state_rows), self.coefficients.shape[1]))
+        out[self.term_rows, self.term_columns] = self.coefficients
+        return out
+
+    def _sums(self, values: Array) -> Array:
+        """``sum_j c_j v_j (n, T)`` of values ``(K, T)``, one a term."""
+        return np.asarray(np.add.reduceat(self.coefficients * values, self._first, axis=0))
+
+    def residual(self, here: Evaluated) -> Array:
+        """``sum_j c_j q_j - constant``."""
+        return self._sums(here.x[self._state_rows[self.term_columns]]) - self.constant
+
+    def jacobian(self, here: Evaluated) -> Array:
+        """The coefficients."""
+        return np.broadcast_to(self.matrix, (*self.matrix.shape[:2], here.T))
+
+    def sparse_jacobian(self, here: Evaluated, t: int) -> scipy.sparse.csr_array:
+        """The coefficients ``(n, F)`` at one position, entries at the same places at all of them."""
+        values = self.coefficients[:, t if self.coefficients.shape[1] > 1 else 0]
+        return scipy.sparse.csr_array((values, (self.term_rows, self.term_columns)), shape=self.matrix.shape[:2])
+
+    def rates(self, here: Evaluated, dq: Array) -> Array:
+        """``sum_j c_j q'_j``."""
+        return self._sums(dq[self.term_columns])
+
+    def bias(self, here: Evaluated, pairs: Array, V: Array) -> Array:
+        """Zero: the relation is linear."""
+        return np.zeros((len(self.constant), here.T), dtype=pairs.dtype)
+
+
+class LineRows(Rows):
     """Rows of the line couplings at some places among the couplings of a system; lengths over L, so that rows are forces over ``1 / L``."""
 
     def __init__(self, system: Any, which: Index) -> None:
         m, self.system, self.which = system.m, system, which
+        self.places, self.scale = system.graph.loop_rows + which, np.full((len(which), 1), 1.0 / system.par.L)
         self.couplings: list[LineCoupling] = [m.couplings[g] for g in which]
         self.links = np.array([[m.place_of_link(end.link) for end in c.ends] for c in self.couplings], dtype=np.intp).T
         steps = [(i, step) for i, c in enumerate(self.couplings) for step in c.steps]
@@ -110,11 +299,6 @@ class LineRows:
             )
         return found[0], found[1]
 
-    @property
-    def scale(self) -> Array:
-        """Relations are lengths: over L."""
-        return np.full((len(self.couplings), 1), 1.0 / self.system.par.L)
-
     def _closed(self, like: type) -> tuple[Array, Array]:
         """Values ``(n, B)`` of closed rows, and the start state ``(nx, B)``; ``like`` is the class of configurations."""
         if self._at_start is None:
@@ -181,10 +365,6 @@ class LineRows:
                 return f"coupling {c.name!r}: {why}"
         return None
 
-    def error(self, here: Any) -> Array:
-        """The largest of them."""
-        return np.asarray(np.abs(self.residual(here)).max(axis=0))
-
     def _entries(self, here: Any, other: bool = False) -> Array:
         """``s_j G . S_j`` for every freedom on the ways, -1 for those by which flanks part, ``(K, T)``."""
         rows, columns, senses = self._terms
@@ -224,65 +404,9 @@ class LineRows:
         own = sense[:, None] * (G[:, rows] * pairs[:, pair]).sum(axis=0)
         return _summed(rows, own, len(self.couplings)) + (dG * (V[:, b] - V[:, a])).sum(axis=0)
 
-    def efforts(self, here: Any, x: Array) -> Array:
-        """``J^T x`` in every freedom."""
-        return np.asarray(np.einsum("rft,rkt->fkt", self.jacobian(here), x))
-
 
 def _summed(rows: Index, values: Array, count: int) -> Array:
     """Sums ``(count, T)`` of values ``(K, T)`` by rows."""
     out = np.zeros((count, values.shape[1]), dtype=values.dtype)
     np.add.at(out, rows, values)
     return out
-
-
-class RowsInOrder:
-    """Rows of couplings of several contributors, in the order of the couplings: ``parts`` with the places of their rows."""
-
-    def __init__(self, parts: Iterable[tuple[Index, Any]]) -> None:
-        self.parts = list(parts)
-        self.count = sum(len(at) for at, _ in self.parts)
-
-    def _merged(self, found: Iterable[Array]) -> Array:
-        values = list(found)
-        out = np.zeros(
-            (self.count, *np.broadcast_shapes(*(v.shape[1:] for v in values))), dtype=np.result_type(*values)
-        )
-        for (at, _), own in zip(self.parts, values, strict=True):
-            out[at] = own
-        return out
-
-    @property
-    def scale(self) -> Array:
-        """See ``Rows``."""
-        return self._merged(part.scale for _, part in self.parts)
-
-    def residual(self, here: Any) -> Array:
-        """See ``Rows``."""
-        return self._merged(part.residual(here) for _, part in self.parts)
-
-    def error(self, here: Any) -> Array:
-        """See ``Rows``."""
-        return np.asarray(np.max([part.error(here) for _, part in self.parts], axis=0))
-
-    def jacobian(self, here: Any) -> Array:
-        """See ``Rows``."""
-        return self._merged(part.jacobian(here) for _, part in self.parts)
-
-    def sparse_jacobian(self, here: Any, t: int) -> scipy.sparse.csr_array:
-        """See ``Rows``."""
-        stacked = scipy.sparse.csr_array(scipy.sparse.vstack([part.sparse_jacobian(here, t) for _, part in self.parts]))
-        order = np.argsort(np.concatenate([at for at, _ in self.parts]))
-        return scipy.sparse.csr_array(stacked[order])
-
-    def rates(self, here: Any, dq: Array) -> Array:
-        """See ``Rows``."""
-        return self._merged(part.rates(here, dq) for _, part in self.parts)
-
-    def bias(self, here: Any, pairs: Array, V: Array) -> Array:
-        """See ``Rows``."""
-        return self._merged(part.bias(here, pairs, V) for _, part in self.parts)
-
-    def efforts(self, here: Any, x: Array) -> Array:
-        """See ``Rows``."""
-        return np.asarray(sum(part.efforts(here, x[at]) for at, part in self.parts))
