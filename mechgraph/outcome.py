@@ -16,7 +16,15 @@ from mechgraph.force.block import FORCE_OUTCOMES, BlockForces, forces_of_block
 from mechgraph.force.redundant import ForceTask
 from mechgraph.kinematics.motion_path import BLOCK, DriverPath, Positions, Status, continued, in_blocks
 from mechgraph.kinematics.prescribed import DriverMotion
-from mechgraph.kinematics.rates import PassiveMotion, Rates, Velocities, accuracy, at_dead_points, disagreement, rates
+from mechgraph.kinematics.rates import (
+    PassiveMotion,
+    Rates,
+    Velocities,
+    at_dead_points,
+    disagreement,
+    expected_error,
+    rates,
+)
 from mechgraph.kinematics.solver import closure_solver
 from mechgraph.kinematics.state import CLOSED, ClosureSolver, Configuration, FactoredClosure
 from mechgraph.kinematics.system import System
@@ -144,7 +152,7 @@ class Outcome:
         if line.acting is not line.columns or len(line.lead) < len(line.columns):  # all their efforts are unknowns
             solver = closure_solver(line.engine, line.acting, line.hold)
             f = solver.factored(motion.here, solver.chosen(motion.here, np.full(motion.here.T, -1)))
-            self.trajectory.estimate(motion.places, accuracy(motion.here, f.condition))
+            self.trajectory.estimate(motion.places, expected_error(motion.here.rounding, f.condition))
         assert line.options.method is not None
         task = ForceTask(
             line.options.method,

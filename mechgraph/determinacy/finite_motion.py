@@ -125,7 +125,7 @@ class _Closed:
         # random starts; every set attracts a part of them
         first = _unit(rng.normal(size=(n, 24)))
         a, error = closest_zeros(
-            curvature.at, _CurvaturePoint.descent, lambda a, step: _unit(a + step), first, tolerance=BRANCH_RESIDUAL
+            curvature.at, _CurvaturePoint.descent, lambda a, step: _unit(a + step), first, BRANCH_RESIDUAL
         )
         a = a[:, error < 1e3 * BRANCH_RESIDUAL]
         fixed = np.linalg.matrix_rank(curvature.at(a).derivatives, tol=SAME) if a.size else np.zeros(0)
@@ -376,7 +376,7 @@ def _ways(curvature: _Curvature, rng: np.random.Generator) -> list[Array]:
     """The rates ``(F,)`` that have no residual, found from random starts."""
     # random starts of the search; k self-stresses that are not those of a regular position allow 2^k branches
     first = rng.normal(size=(curvature.N.shape[1], 64))
-    a, error = closest_zeros(curvature.at, _CurvaturePoint.steps, np.add, first, tolerance=BRANCH_RESIDUAL)
+    a, error = closest_zeros(curvature.at, _CurvaturePoint.steps, np.add, first, BRANCH_RESIDUAL)
     ways: list[Array] = []
     for one in (curvature.N @ a[:, error < 1e3 * BRANCH_RESIDUAL]).T:
         if all(np.abs(one - other).max() > SAME for other in ways):

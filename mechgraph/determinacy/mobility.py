@@ -30,7 +30,6 @@ from mechgraph.determinacy.finite_motion import MOVED, states_nearby
 from mechgraph.graph.linkgraph import (
     LinkGraph,
     components_of_edges,
-    cut_off,
     graph_of_ends,
     labels_of_bipartite,
     members,
@@ -205,8 +204,8 @@ class _Search:
     def cut_off(self, one: int, two: int) -> tuple[int, ...]:
         """The links that lose the frame when two pairs are cut."""
         graph = self.position.graph
-        ends = [graph.ends[k] for k in self.joining if k not in (one, two)]
-        return cut_off(graph.n_links, ends, graph.frame, ())
+        label = components_of_edges(graph.n_links, [graph.ends[k] for k in self.joining if k not in (one, two)])
+        return tuple(np.flatnonzero(label != label[graph.frame]).tolist())
 
     def loaded(self) -> Index:
         """The columns of the freedoms in which loads act, and that they read."""

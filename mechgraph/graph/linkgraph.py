@@ -10,7 +10,7 @@ Source: Jaja, An Introduction to Parallel Algorithms, 1992, section 2.2 (pointer
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from itertools import chain, pairwise
 from typing import TYPE_CHECKING
@@ -58,28 +58,6 @@ def members(numbers: Index) -> list[list[int]]:
         return []
     order = np.argsort(numbers, kind="stable")
     return [part.tolist() for part in np.split(order, np.flatnonzero(np.diff(numbers[order])) + 1)]
-
-
-def cut_off(count: int, ends: Sequence[tuple[int, int]], frame: int, cut: Iterable[int]) -> tuple[int, ...]:
-    """Nodes that lose the ``frame`` when the edges ``cut`` are taken away."""
-    gone = set(cut)
-    label = components_of_edges(count, [e for k, e in enumerate(ends) if k not in gone])
-    return tuple(np.flatnonzero(label != label[frame]).tolist())
-
-
-def reached(follows: scipy.sparse.csr_array, starts: Index) -> Index:
-    """Nodes that can be reached from any of ``starts`` along the entries (from row to column) of ``follows``."""
-    n = follows.shape[0]
-    extra = scipy.sparse.coo_array((np.ones(len(starts)), (np.full(len(starts), n), starts)), shape=(n + 1, n + 1))
-    whole = scipy.sparse.csr_array(extra + _padded(follows))
-    order = scipy.sparse.csgraph.breadth_first_order(whole, n, return_predecessors=False)
-    return np.sort(order[order < n]).astype(np.intp)
-
-
-def _padded(matrix: scipy.sparse.csr_array) -> scipy.sparse.coo_array:
-    coo = scipy.sparse.coo_array(matrix)
-    n = coo.shape[0] + 1
-    return scipy.sparse.coo_array((np.ones(coo.nnz), (coo.row, coo.col)), shape=(n, n))
 
 
 Loop = tuple[tuple[int, int], ...]
@@ -630,4 +608,8 @@ def parts_of(m: Mechanism, graph: LinkGraph) -> GraphParts:
 def _alternating(count: int, out: tuple[Index, Index], back: tuple[Index, Index], starts: Index) -> list[int]:
     """Nodes on alternating paths from ``starts``: outwards along every edge, back along those that the matching uses."""
     rows, columns = (np.concatenate([a, b]) for a, b in zip(out, back, strict=True))
-    return reached(scipy.sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(count, count)), starts).tolist()
+    graph = scipy.sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
+    steps = (
+        scipy.sparse.csgraph.dijkstra(graph, indices=starts, unweighted=True, min_only=True) if starts.size else np.inf
+    )
+    return np.flatnonzero(np.broadcast_to(np.isfinite(steps), count)).tolist()

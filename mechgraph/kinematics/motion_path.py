@@ -95,11 +95,7 @@ class DriverPath:
         x[self.rows] = drive
         if x.shape[1] == 1 and self._start is not None and x.tobytes() == self._start_bytes:
             return self._start
-        return Configuration(self.system_on(tracks), x)
-
-    def system_on(self, tracks: Index) -> System:
-        """The system with the numbers of the variants that tracks follow."""
-        return self._system_of(self.variant_of[tracks])
+        return Configuration(self._system_of(self.variant_of[tracks]), x)
 
     def chosen(self, point: Configuration, which: Index) -> Index:
         """See ``maths.newton.Problem``."""
@@ -301,20 +297,17 @@ def _continue(path: DriverPath, found: Positions, tracks: Index, out: Array) -> 
 
 
 def along_polygons(path: DriverPath, requests: list[Request], total: int) -> Positions:
-    """Polygons followed with nodes where interpolation does not do."""
-    legs = _polygons(path, requests, total)
+    """Several drivers: from every start the polygon through its positions in their order, with nodes where interpolation does not do."""
+    legs = Legs(path, total)
+    for request in requests:
+        points = request.polygon(path.rows)
+        legs.add(request, points, request.values, request.places, places_of(points)[-request.values.shape[1] :])
     # times that polygons are followed, every time with a node at the positions that did not come out as predicted before
     for _ in range(12):
-        found = legs.followed()
-        if not found.bad.size or not legs.stop_at(found.bad):
+        found, bad = legs.followed()
+        if not bad.size or not legs.stop_at(bad):
             break
-    return found.positions
-
-
-@dataclass
-class _Found:
-    positions: Positions
-    bad: Index
+    return found
 
 
 class Legs:
@@ -351,8 +344,8 @@ class Legs:
             stops[at] = True
         return changed
 
-    def followed(self) -> _Found:
-        """All tracks followed and all positions read off."""
+    def followed(self) -> tuple[Positions, Index]:
+        """All tracks followed and all positions read off; also those that did not come out as predicted."""
         self.path.variant_of = np.array(self.variants, dtype=np.intp)
         follower = Follower(self.path)
         paths = Paths(self.points, self.stops)
@@ -366,7 +359,7 @@ class Legs:
         out.status[wrong] = Status.NOT_CLOSED
         out.x[:, wrong] = np.nan
         self._say_why_not(out, reach)
-        return _Found(out, wrong)
+        return out, wrong
 
     def _reach(self, tracks: Tracks) -> Array:
         """The place up to which the positions of every track may be read off."""
@@ -493,13 +486,3 @@ class Legs:
 
 BEYOND = {End.FOLD: Status.OUT_OF_REACH, End.GIVEN_UP: Status.NOT_FOLLOWED}
 """Outcome behind the end of a track."""
-
-
-def _polygons(path: DriverPath, requests: list[Request], total: int) -> Legs:
-    """Several drivers: from every start the polygon through its positions in their order."""
-    legs = Legs(path, total)
-    for request in requests:
-        points = request.polygon(path.rows)
-        at = places_of(points)[-request.values.shape[1] :]
-        legs.add(request, points, request.values, request.places, at)
-    return legs

@@ -323,7 +323,7 @@ def at_dead_points(
 ) -> tuple[NDArray[np.bool_], Array]:
     """Which positions are so near to a singular one of the drivers that their rates would be noise, and the ``accuracy (T,)`` of all."""
     condition = factored.condition
-    dead, out = np.asarray(condition > PATH.singular), accuracy(here, condition)
+    dead, out = np.asarray(condition > PATH.singular), expected_error(here.rounding, condition)
     poor = np.flatnonzero((condition > PATH.poor) & ~dead)
     if poor.size:
         few = here.part(poor)
@@ -337,11 +337,6 @@ def at_dead_points(
             near[doubtful] = distance_to_dead_point(fewer, f.part(doubtful, fewer), solver.fixed)
             dead[poor] = ~(near > PATH.dead_point) | ((scatter > PATH.scatter) & (condition[poor] > PATH.doubtful))
     return dead, out
-
-
-def accuracy(here: Configuration, condition: Array) -> Array:
-    """See ``expected_error``, at the states of a configuration."""
-    return expected_error(here.rounding, condition)
 
 
 def expected_error(rounding: Array, condition: Array) -> Array:

@@ -530,7 +530,7 @@ def _along_curves(path: DriverPath, requests: list[Request], total: int) -> Posi
         ahead = way.length > 1e-14 * max(1.0, abs(begin))
         points = np.array([[begin, begin + way.sense * way.length] if ahead else [begin]])
         legs.add(way.request, points, values, places, at)
-    found = legs.followed().positions
+    found, _ = legs.followed()
     if turns.any():
         found.turns, found.gained = turns, np.zeros((path.system.n_freedoms, total))
         for way in ways:

@@ -634,12 +634,8 @@ def closure_solver(engine: Literal["dense", "sparse"], fixed: Index, keep: Index
 class RankSolution(Protocol):
     """What an engine determines about ``K``: self-stresses and motions in the kept rows and scaled free columns."""
 
-    name: Literal["dense", "sparse"]
     rank: int
     dropped: float
-
-    def margin(self) -> float:
-        """Smallest singular value kept, as part of the largest, where there is one."""
 
     def stresses(self, shares: Array) -> Array:
         """``y (height, k)`` with ``K^T y = 0`` for shares ``(height - rank, k)`` of the self-stresses."""
@@ -649,19 +645,11 @@ class RankSolution(Protocol):
 
 
 class _Dense:
-    name: Literal["dense", "sparse"] = "dense"
-
-    def __init__(self, reduced: ReducedRows, tolerance: float) -> None:
-        K = reduced.dense_matrix
-        self._U, self._s, self._Vt = np.eye(K.shape[0]), np.zeros(0), np.eye(K.shape[1])
-        if K.size:
-            self._U, self._s, self._Vt = np.linalg.svd(K)
-        self.rank = rank_of(self._s, tolerance)
-        rest = self._s[self.rank :]
-        self.dropped = float(rest[0] / self._s[0]) if rest.size and self._s[0] > 0 else 0.0
-
-    def margin(self) -> float:
-        return float(self._s[self.rank - 1] / self._s[0])
+    def __init__(self, K: Array, tolerance: float) -> None:
+        self._U, s, self._Vt = np.linalg.svd(K) if K.size else (np.eye(K.shape[0]), np.zeros(0), np.eye(K.shape[1]))
+        self.rank = rank_of(s, tolerance)
+        rest = s[self.rank :]
+        self.dropped = float(rest[0] / s[0]) if rest.size and s[0] > 0 else 0.0
 
     def stresses(self, shares: Array) -> Array:
         return np.asarray(self._U[:, self.rank :] @ shares)
@@ -671,13 +659,8 @@ class _Dense:
 
 
 class _Bordered:
-    name: Literal["dense", "sparse"] = "sparse"
-
     def __init__(self, loops: LoopSystem) -> None:
         self.loops, self.rank, self.dropped = loops, loops.rank, 0.0
-
-    def margin(self) -> float:
-        return singular_ratio(self.loops.matrix, self.rank, lambda: self.loops.least_norm)
 
     def stresses(self, shares: Array) -> Array:
         return self.loops.connecting_stress(self.loops.first, shares)
@@ -687,24 +670,6 @@ class _Bordered:
         return np.asarray((q / self.loops.scale[:, None])[self.loops.free])
 
 
-class _Eliminated:
-    name: Literal["dense", "sparse"] = "sparse"
-
-    def __init__(self, reduced: ReducedRows, tolerance: float) -> None:
-        self._reduced = reduced
-        self._found = Elimination(reduced.matrix, reduced.owners, tolerance)
-        self.rank, self.dropped = self._found.rank, self._found.dropped
-
-    def margin(self) -> float:
-        return singular_ratio(self._reduced.matrix, self.rank, lambda: self._reduced.least_norm)
-
-    def stresses(self, shares: Array) -> Array:
-        return self._found.stresses(shares)
-
-    def motions(self) -> Array:
-        return self._found.motions()
-
-
 class ClosureRank:
     """Rank, motions and self-stresses of the closure equations at one position, the columns ``fixed`` left out.
 
@@ -712,16 +677,18 @@ class ClosureRank:
     self-stresses that connect loops; ``engine`` which one ran.
     """
 
-    def __init__(self, reduced: ReducedRows, solution: RankSolution, tolerance: float) -> None:
-        self.reduced, self._solution, self._tolerance = reduced, solution, tolerance
-        self.engine, self.rank, self.count = solution.name, solution.rank, reduced.rows.count
+    def __init__(
+        self, reduced: ReducedRows, solution: RankSolution, tolerance: float, engine: Literal["dense", "sparse"]
+    ) -> None:
+        self.reduced, self._solution, self._tolerance, self.engine = reduced, solution, tolerance, engine
+        self.rank, self.count = solution.rank, reduced.rows.count
         self.shared = reduced.height - solution.rank
         self.dropped = max(solution.dropped, reduced.dropped)
 
     @cached_property
     def margin(self) -> float:
         """Smallest singular value of K that was kept, as part of the largest; 1 where there is none."""
-        return self._solution.margin() if self.rank else 1.0
+        return singular_ratio(self.reduced.matrix, self.rank, lambda: self.reduced.least_norm) if self.rank else 1.0
 
     @cached_property
     def motions(self) -> Array:
@@ -815,10 +782,10 @@ def rank_of_rows(
     proved = RANKS.proved if proved is None else proved
     # rows from which ``auto`` takes the sparse engine: measured on verdicts of ladders and grids, where the two meet at 100 to 240 rows
     if engine == "dense" or not rows.count or (engine == "auto" and rows.count < 144):
-        reduced = ReducedRows(rows, fixed, dense=True)
-        return ClosureRank(reduced, _Dense(reduced, tolerance), tolerance)
+        reduced = ReducedRows(rows, fixed)
+        return ClosureRank(reduced, _Dense(reduced.matrix.toarray(), tolerance), tolerance, "dense")
     bordered = LoopSystem(rows, fixed)
     if bordered.first.distance > max(0.0 if bordered.smallest > proved else RANKS.distance, tolerance):
-        return ClosureRank(bordered, _Bordered(bordered), tolerance)
+        return ClosureRank(bordered, _Bordered(bordered), tolerance, "sparse")
     reduced = ReducedRows(rows, fixed)
-    return ClosureRank(reduced, _Eliminated(reduced, tolerance), tolerance)
+    return ClosureRank(reduced, Elimination(reduced.matrix, reduced.owners, tolerance), tolerance, "sparse")

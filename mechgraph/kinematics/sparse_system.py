@@ -310,10 +310,10 @@ class LoopSystem(ReducedRows):
         return out
 
     def _motions_of_single_loops(self) -> list[tuple[Array, Index]]:
-        shared = np.bincount(self.entries.column, minlength=len(self._free)) > 1
+        shared = np.bincount(self.entries.column, minlength=len(self.free)) > 1
         if self.rows.more is not None:
             shared[self.rows.more.indices] = True
-        own = self._free & ~shared
+        own = self.free & ~shared
         rows: list[tuple[Array, Index]] = []
         for _, at in self._by_width:
             block = np.moveaxis(self._first[:, at], 0, 1)
@@ -324,8 +324,8 @@ class LoopSystem(ReducedRows):
         """Match kept rows and the rows of single-loop motions to the free columns; what stays unmatched."""
         e = self.entries
         starts = np.concatenate([[0], np.cumsum(self.kept)])
-        self._m, self._n = self.height, int(self._free.sum())
-        place = np.cumsum(self._free) - 1
+        self._m, self._n = self.height, int(self.free.sum())
+        place = np.cumsum(self.free) - 1
         more = scipy.sparse.coo_array(self._more(self.rows))
         rows = [
             (starts[e.loop][None] + np.arange(self.width)[:, None])[self._live],
@@ -360,9 +360,9 @@ class LoopSystem(ReducedRows):
     def _more(self, rows: ClosureRows) -> scipy.sparse.csr_array:
         """The rows behind those of the loops at any position in the free columns, of unit size; entries always at the same places."""
         if rows.more is None:
-            return scipy.sparse.csr_array((0, int(self._free.sum())))
-        out = rows.more[:, self._free]
-        out.data *= self._scale[self._free][out.indices]
+            return scipy.sparse.csr_array((0, int(self.free.sum())))
+        out = rows.more[:, self.free]
+        out.data *= self.scale[self.free][out.indices]
         return scipy.sparse.csr_array(out)
 
     def _border(self, beside: bool) -> tuple[Pattern, Array]:
@@ -410,10 +410,10 @@ class LoopSystem(ReducedRows):
     def unheld(self, dq: Array) -> Array:
         """Increments ``(F, k)`` with the least change that takes the held motions out of them, ``G (dq / scale) = 0``."""
         G = self.holding
-        y = dq[self._free] / self._scale[self._free][:, None]
+        y = dq[self.free] / self.scale[self.free][:, None]
         y = y - G.T @ self._normal.solve(G @ y)
         out = dq.copy()
-        out[self._free] = y * self._scale[self._free][:, None]
+        out[self.free] = y * self.scale[self.free][:, None]
         return out
 
     # --- solving ---------------------------------------------------------------------------------------------------------
@@ -459,12 +459,12 @@ class LoopSystem(ReducedRows):
     def turned_matrix(self, there: ClosureRows) -> scipy.sparse.csr_array:
         """``J (rows, free columns)`` in turned rows and columns of unit size; rows behind those of the loops as they are."""
         e = self.entries
-        place = np.cumsum(self._free) - 1
+        place = np.cumsum(self.free) - 1
         w = self.width
-        live = np.broadcast_to(self._free[e.column], (w, len(e.loop)))
+        live = np.broadcast_to(self.free[e.column], (w, len(e.loop)))
         rows = (w * e.loop + np.arange(w)[:, None])[live]
         cols = np.broadcast_to(place[e.column], (w, len(e.loop)))[live]
-        shape = (w * len(self.kept), int(self._free.sum()))
+        shape = (w * len(self.kept), int(self.free.sum()))
         J = scipy.sparse.csr_array((self._turned_blocks(there)[live], (rows, cols)), shape=shape)
         return scipy.sparse.csr_array(scipy.sparse.vstack([J, self._more(there)]))
 
@@ -485,8 +485,8 @@ class LoopSystem(ReducedRows):
 
     def _columns(self, y: Array) -> Array:
         """Freedoms ``(F, ...)`` of solutions ``y (size, ...)``, zero in fixed columns."""
-        q = np.zeros((len(self._free), *y.shape[1:]))
-        q[self._free] = y[: self._n] * self._scale[self._free].reshape(-1, *[1] * (y.ndim - 1))
+        q = np.zeros((len(self.free), *y.shape[1:]))
+        q[self.free] = y[: self._n] * self.scale[self.free].reshape(-1, *[1] * (y.ndim - 1))
         return q
 
     def solve(self, factor: Factored, b: Array) -> Array:
@@ -498,7 +498,7 @@ class LoopSystem(ReducedRows):
     def solve_transposed(self, factor: Factored, tau: Array) -> Array:
         """Multipliers ``x (rows, k, T)`` with ``J^T x = tau (F, k, T)`` in the free columns."""
         rhs = np.zeros((self._size, *tau.shape[1:]))
-        rhs[: self._n] = tau[self._free] * self._scale[self._free][:, None, None]
+        rhs[: self._n] = tau[self.free] * self.scale[self.free][:, None, None]
         kept = factor.solve(rhs, transposed=True)[: self._m]
         return self.multipliers(_flat(kept)).reshape(self.rows.count, *tau.shape[1:])
 
@@ -526,10 +526,10 @@ class LoopSystem(ReducedRows):
         for loops, at in self._by_width:
             power[at] = np.moveaxis(free[..., at].transpose(0, 2, 3, 1) @ local[loops], 0, -1)
         to = scipy.sparse.csr_array(
-            (np.ones(len(e.column)), (e.column, np.arange(len(e.column)))), shape=(len(self._free), len(e.column))
+            (np.ones(len(e.column)), (e.column, np.arange(len(e.column)))), shape=(len(self.free), len(e.column))
         )
         rhs = np.zeros((self._size, count, T))
-        rhs[: self._n] = -np.asarray(to[self._free] @ _flat(power)).reshape(self._n, count, T)
+        rhs[: self._n] = -np.asarray(to[self.free] @ _flat(power)).reshape(self._n, count, T)
         if self.shared:
             rhs[self._n :] = rng.normal(size=(self.shared, count))[:, :, None]
         kept = factor.solve(rhs, transposed=True)[: self._m]

@@ -580,22 +580,22 @@ class ReducedRows:
     """The rows of every loop turned so that its ``kept (loops,)`` independent ones come first; columns ``fixed`` left out.
 
     ``dropped`` is the largest singular value of the others. Multipliers of the kept rows and of ``rows.more``, one below the other,
-    have the length ``height``. ``dense``: whether ``K`` is worked with as a full matrix.
+    have the length ``height``. ``scale (F,)``: the sizes by which columns were multiplied; ``free (F,)``: which are not fixed.
     """
 
-    def __init__(self, rows: ClosureRows, fixed: Index, dense: bool = False) -> None:
-        self.rows, self.fixed, self.dense = rows, fixed, dense
+    def __init__(self, rows: ClosureRows, fixed: Index) -> None:
+        self.rows, self.fixed = rows, fixed
         self.entries = entries_of(rows.graph, rows.first_column)
         self.length = lengths_of(rows.graph, rows.points, rows.middles)
-        self._free = np.ones(rows.S.shape[1], dtype=bool)
-        self._free[fixed] = False
+        self.free = np.ones(rows.S.shape[1], dtype=bool)
+        self.free[fixed] = False
         blocks = self._blocks(rows.S, rows.middles)
         largest = np.zeros(rows.S.shape[1])
         np.maximum.at(largest, self.entries.column, np.abs(blocks).max(axis=0, initial=0.0))
         if rows.more is not None:
             largest = np.maximum(largest, abs(rows.more).max(axis=0).toarray())
-        self._scale = np.where(largest > 0, 1.0 / np.where(largest > 0, largest, 1.0), 1.0)
-        blocks *= self._scale[self.entries.column]
+        self.scale = np.where(largest > 0, 1.0 / np.where(largest > 0, largest, 1.0), 1.0)
+        blocks *= self.scale[self.entries.column]
         self._first = blocks
         self._reduce(blocks)
 
@@ -614,16 +614,6 @@ class ReducedRows:
         """Number of kept rows and further rows."""
         return int(self.kept.sum()) + self.rows.further
 
-    @property
-    def scale(self) -> Array:
-        """Sizes ``(F,)`` by which columns were multiplied."""
-        return self._scale
-
-    @property
-    def free(self) -> Mask:
-        """Which columns ``(F,)`` are not fixed."""
-        return self._free
-
     @cached_property
     def owners(self) -> Index:
         """For every kept or further row the number of its loop (further rows count on from the loops)."""
@@ -637,7 +627,7 @@ class ReducedRows:
         turns, slides = out[..., :3, :], out[..., 3:, :]
         slides += np.moveaxis(cross(np.moveaxis(turns, -2, 0), np.moveaxis(middles[..., e.loop], -2, 0)), 0, -2)
         slides /= self.length[e.loop]
-        out *= e.sign * self._free[e.column]
+        out *= e.sign * self.free[e.column]
         return out[..., self.rows.graph.span, :]
 
     @cached_property
@@ -666,7 +656,7 @@ class ReducedRows:
     def _live(self) -> Mask:
         """Which of the turned entries ``(width, entries)`` stand in the system: kept rows, free columns."""
         e = self.entries
-        return (np.arange(self.width)[:, None] < self.kept[e.loop][None]) & self._free[e.column][None]
+        return (np.arange(self.width)[:, None] < self.kept[e.loop][None]) & self.free[e.column][None]
 
     def _turned_blocks(self, rows: ClosureRows) -> Array:
         """Entries ``(..., width, entries)`` of rows at any positions in the turned rows of their loops and columns of unit size."""
@@ -679,7 +669,7 @@ class ReducedRows:
     def _unit_blocks(self, rows: ClosureRows) -> Array:
         """Entries ``(..., width, entries)`` of rows at any positions in columns of unit size."""
         out = self._blocks(rows.S, rows.middles)
-        out *= self._scale[self.entries.column]
+        out *= self.scale[self.entries.column]
         return out
 
     @cached_property
@@ -687,27 +677,15 @@ class ReducedRows:
         """``K (height, free columns)``: kept rows of all loops and the further rows, columns of unit size."""
         e = self.entries
         starts = np.concatenate([[0], np.cumsum(self.kept)])
-        place = np.cumsum(self._free) - 1
+        place = np.cumsum(self.free) - 1
         rows = (starts[e.loop][None] + np.arange(self.width)[:, None])[self._live]
         cols = np.broadcast_to(place[e.column], (self.width, len(e.loop)))[self._live]
-        shape = (int(starts[-1]), int(self._free.sum()))
+        shape = (int(starts[-1]), int(self.free.sum()))
         K = scipy.sparse.csr_array((self._turned_blocks(self.rows)[self._live], (rows, cols)), shape=shape)
         if self.rows.more is None:
             return K
-        more = self.rows.more[:, self._free] * self._scale[self._free]
+        more = self.rows.more[:, self.free] * self.scale[self.free]
         return scipy.sparse.csr_array(scipy.sparse.vstack([K, more]))
-
-    @cached_property
-    def dense_matrix(self) -> Array:
-        """The same as a full matrix."""
-        e, m, w = self.entries, int(self.kept.sum()), self.width
-        whole = np.zeros((w * self.loops, len(self._free)))
-        whole[w * e.loop + np.arange(w)[:, None], e.column] = self._turned_blocks(self.rows)
-        K = np.zeros((self.height, int(self._free.sum())))
-        K[:m] = whole[(np.arange(w) < self.kept[:, None]).ravel()][:, self._free]
-        if self.rows.more is not None:
-            K[m:] = (self.rows.more.toarray() * self._scale)[:, self._free]
-        return K
 
     def _turned(self, b: Array) -> Array:
         """Right sides ``(loop rows, k)`` as turned rows ``(loops, width, k)``."""
@@ -735,13 +713,13 @@ class ReducedRows:
     @cached_property
     def least_norm(self) -> LeastNorm:
         """The normal equations of ``K``, factored."""
-        return LeastNorm(self.dense_matrix if self.dense else self.matrix)
+        return LeastNorm(self.matrix)
 
     def correction(self, residual: Array) -> Array:
         """Smallest ``dq (F,)``, measured in columns of unit size, with ``J dq = -residual (rows,)`` in the kept rows."""
-        out = np.zeros(len(self._free))
+        out = np.zeros(len(self.free))
         dq = self.least_norm.solve(self.kept_part(residual[:, None]))[:, 0]
-        out[self._free] = -dq * self._scale[self._free]
+        out[self.free] = -dq * self.scale[self.free]
         return out
 
     def _wrenches(self, kept: Array, dropped: Array) -> Array:
@@ -774,17 +752,13 @@ class ReducedRows:
         return some, np.take_along_axis(unit, order[None], axis=1)
 
 
-def close(
-    system: System, x: Array, fixed: Index, iterations: int = 60, patience: int = 8, tol: float = 0.0
-) -> tuple[Array, float]:
+def close(system: System, x: Array, fixed: Index, tol: float = 0.0) -> tuple[Array, float]:
     """Close the loops from state ``x (nx,)`` with the coordinates in ``fixed`` kept; smallest change of the others."""
-    closed, error = close_all(system, x[:, None], fixed, iterations, patience, tol)
+    closed, error = close_all(system, x[:, None], fixed, tol)
     return closed[:, 0], float(error[0])
 
 
-def close_all(
-    system: System, x: Array, fixed: Index, iterations: int = 60, patience: int = 8, tol: float = 0.0
-) -> tuple[Array, Array]:
+def close_all(system: System, x: Array, fixed: Index, tol: float = 0.0) -> tuple[Array, Array]:
     """``close`` for states ``(nx, T)``; also the closure errors ``(T,)``. Rows that depend on others to ``tol`` are left alone."""
     free = complement(fixed, system.n_freedoms)
 
@@ -797,13 +771,5 @@ def close_all(
         dq[free] = least_norm_steps(here.J[:, free], here.residual, max(1e-9, tol))
         return dq
 
-    x, _ = closest_zeros(
-        partial(Configuration, system),
-        least,
-        system.advance,
-        x,
-        tolerance=CLOSURE_GOAL,
-        iterations=iterations,
-        patience=patience,
-    )
+    x, _ = closest_zeros(partial(Configuration, system), least, system.advance, x, CLOSURE_GOAL)
     return x, Configuration(system, x).closure

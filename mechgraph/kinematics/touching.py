@@ -223,18 +223,6 @@ class ContactLines:
                     self.settled[g][t] = True
         return self.settled
 
-    def on_gear(self, multipliers: Array, flank: Array) -> list[Array]:
-        """For every contact the wrench on gear b ``(6, ..., T)`` for multipliers ``(n, ..., T)`` of all couplings.
-
-        ``flank (n, T)``: the sign of the multiplier that says which line acts.
-        """
-        out = []
-        for (g, _), (G, _, _) in zip(self.contacts, self.wrenches, strict=True):
-            acting = np.where(self._acting(g, flank), G[:, 1], G[:, 0])
-            value = multipliers[g]
-            out.append(acting.reshape(6, *(1,) * (value.ndim - 1), self.here.T) * value)
-        return out
-
     def on_ways(self, wrenches: Array) -> Array:
         """Wrenches on gears b ``(6, n, ..., T)`` passed through the pairs on the way from gears a, ``s_j F``, ``(6, P, ..., T)``."""
         out = np.zeros((6, len(self.here.system.m.pairs), *wrenches.shape[2:]))
@@ -257,17 +245,20 @@ class ContactLines:
             for step in contact.steps
             for column in range(first[step.pair], first[step.pair + 1])
         ]
-        if steps:
-            for g, step, column in steps:
-                E = here.E[:, column] * coefficients[g, column]
-                out[:, step.pair] -= E.reshape(6, *(1,) * (multipliers.ndim - 2), here.T) * multipliers[g]
+        for g, step, column in steps:
+            E = here.E[:, column] * coefficients[g, column]
+            out[:, step.pair] -= E.reshape(6, *(1,) * (multipliers.ndim - 2), here.T) * multipliers[g]
         return out
 
     def on_gears(self, multipliers: Array, flank: Array) -> Array:
-        """For every coupling the wrench on gear b ``(6, n, ..., T)`` for multipliers ``(n, ..., T)``; zero where it acts in freedoms."""
+        """For every coupling the wrench on gear b ``(6, n, ..., T)`` for multipliers ``(n, ..., T)``; zero where it acts in freedoms.
+
+        ``flank (n, T)``: the sign of the multiplier that says which line acts.
+        """
         out = np.zeros((6, *multipliers.shape))
-        for (g, _), F in zip(self.contacts, self.on_gear(multipliers, flank), strict=True):
-            out[:, g] = F
+        for (g, _), (G, _, _) in zip(self.contacts, self.wrenches, strict=True):
+            acting = np.where(self._acting(g, flank), G[:, 1], G[:, 0])
+            out[:, g] = acting.reshape(6, *(1,) * (multipliers.ndim - 2), self.here.T) * multipliers[g]
         return out
 
     def unit(self, flank: Array) -> list[Array]:

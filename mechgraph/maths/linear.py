@@ -699,22 +699,19 @@ def _levels(before: Index, after: Index, count: int) -> Index:
 
 
 class LeastNorm:
-    """The normal equations of ``K (m, n)``, full or sparse, factored once."""
+    """The normal equations of ``K (m, n)``, factored once."""
 
-    def __init__(self, K: Array | scipy.sparse.csr_array) -> None:
+    def __init__(self, K: scipy.sparse.csr_array) -> None:
         self.K = K
         m = K.shape[0]
-        if isinstance(K, np.ndarray):
-            factor = scipy.linalg.lu_factor(K @ K.T + RANKS.damping * np.eye(m))
-            self._solve: Callable[[Array], Array] = partial(scipy.linalg.lu_solve, factor)
-        elif m:
+        if m:
             A = (K @ K.T + RANKS.damping * scipy.sparse.eye_array(m)).tocsc()
             symmetric = {"SymmetricMode": True}
-            self._solve = Factors(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=symmetric).solve
+            self._factors = Factors(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=symmetric)
 
     def multipliers(self, r: Array) -> Array:
         """``(K K^T + d I)^-1 r`` for ``r (m, k)``."""
-        return np.asarray(self._solve(r)) if self.K.shape[0] else r
+        return self._factors.solve(r) if self.K.shape[0] else r
 
     def solve(self, r: Array) -> Array:
         """Smallest ``(n, k)`` with ``K dq = r`` as far as that can be had, with one step of refinement."""
@@ -738,24 +735,7 @@ def singular_ratio(K: scipy.sparse.csr_array, rank: int, factored: Callable[[], 
     return 1.0 / float(np.sqrt(largest * _largest(inverse, inverse(start))))
 
 
-def _largest(apply: Callable[[Array], Array], v: Array) -> float:
-    """Largest eigenvalue of a symmetric operator by Lanczos steps, every vector made orthogonal to all before."""
-    basis = [v / np.linalg.norm(v)]
-    alpha: list[float] = []
-    beta: list[float] = []
-    value = 0.0
-    # relative change at which the Lanczos steps end
-    lanczos_settled = 1e-3
-    for _ in range(24):
-        w = apply(basis[-1])
-        alpha.append(float(w @ basis[-1]))
-        for u in basis:
-            w -= (w @ u) * u
-        found = float(scipy.linalg.eigvalsh_tridiagonal(alpha, beta)[-1])
-        size = float(np.linalg.norm(w))
-        if abs(found - value) <= lanczos_settled * found or size <= lanczos_settled**2 * found:
-            return found
-        value = found
-        beta.append(size)
-        basis.append(w / size)
-    return value
+def _largest(apply: Callable[[Array], Array], start: Array) -> float:
+    """Largest eigenvalue of a symmetric operator to a thousandth, by Lanczos steps from a vector."""
+    operator = scipy.sparse.linalg.LinearOperator((len(start),) * 2, matvec=apply, dtype=np.dtype(float))
+    return float(scipy.sparse.linalg.eigsh(operator, 1, v0=start, tol=1e-3, return_eigenvectors=False)[0])

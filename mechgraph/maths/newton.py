@@ -234,23 +234,19 @@ def closest_zeros(
     least: Callable[[Any], Array],
     advance: Callable[[Array, Array], Array],
     x: Array,
-    *,
     tolerance: float,
-    longest: float = 0.5,
-    iterations: int = 60,
-    patience: int = 8,
 ) -> tuple[Array, Array]:
     """Gauss-Newton with limited steps from points ``x (nx, T)``: the zero of the residual near to each, or the best point found.
 
     ``evaluate(x)`` gives a point with ``residual (m, T)``, ``least(point)`` the smallest steps ``(n, T)`` that take it to zero. Steps are
-    limited to ``longest`` (largest component) and halved while the residual grows; after ``patience`` steps without gain a point is
-    left. Converges linearly to double roots. Returns the points and the largest residual component at each, ``(T,)``.
+    limited (largest component) and halved while the residual grows; after eight steps without gain a point is left. Converges linearly to
+    double roots. Returns the points and the largest residual component at each, ``(T,)``.
     """
     x = x.copy()
     size = np.abs(evaluate(x).residual).max(axis=0, initial=0.0)
     best, best_size, stalled = x.copy(), size.copy(), np.zeros(len(size), dtype=np.intp)
     at = np.flatnonzero(size > tolerance)
-    for _ in range(iterations):
+    for _ in range(60):
         if not at.size:
             break
         point = evaluate(x[:, at])
@@ -258,7 +254,7 @@ def closest_zeros(
         biggest = np.abs(step).max(axis=0, initial=0.0)
         moves = np.flatnonzero(np.isfinite(biggest) & (biggest > 0))
         at, before = at[moves], before[moves]
-        step = step[:, moves] * np.minimum(1.0, longest / biggest[moves])
+        step = step[:, moves] * np.minimum(1.0, LONGEST / biggest[moves])
         left, begin = np.arange(at.size), x[:, at]
         for _ in range(6):
             if not left.size:
@@ -273,7 +269,7 @@ def closest_zeros(
         stalled[at] += 1
         stalled[gained] = 0
         best[:, gained], best_size[gained] = x[:, gained], size[gained]
-        at = at[(size[at] > tolerance) & (stalled[at] <= patience) & ~((best_size[at] < 1e-9) & (stalled[at] > 1))]
+        at = at[(size[at] > tolerance) & (stalled[at] <= 8) & ~((best_size[at] < 1e-9) & (stalled[at] > 1))]
     return best, best_size
 
 
