@@ -45,21 +45,6 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import wrong
 
 
-def weak(freedoms: Freedoms, driven: Index) -> list[int]:
-    """Columns of the drivers that move least when the mechanism does, and as little as the weakest combination of them."""
-    if len(driven) < 2:
-        return [int(c) for c in driven]
-    size = np.sqrt((freedoms.null[driven] ** 2).sum(axis=1))
-    return [int(c) for c in driven[size < 2 * freedoms.drive * size.max()]]
-
-
-def moving(freedoms: Freedoms, driven: Index, near: bool) -> Index:
-    """The drivers without those that depend on the ones before or stand still; ``near`` a dead point without the weak one."""
-    columns = independent_rows(freedoms.null, driven.tolist(), len(driven))
-    left_out = weak(freedoms, driven) if near and len(columns) == len(driven) else []
-    return np.array([c for c in columns if [c] != left_out], dtype=np.intp)
-
-
 def suggested(
     freedoms: Freedoms, driven: Index, moving: Index, able: NDArray[np.bool_], wanted: int, engine: EngineName
 ) -> list[int]:
@@ -77,19 +62,6 @@ def suggested(
         columns = independent
         after = freedoms_at(freedoms.position, columns, engine)
     return [int(c) for c in np.sort(columns[len(moving) :])]
-
-
-def ratios(freedoms: Freedoms, driven: Index, of: Index) -> Array:
-    """Rates of freedoms ``of (n,)`` for unit rates of the drivers, ``(n, d)`` in the user's units, passive motions at rest.
-
-    No columns where the drivers do not say all other motions.
-    """
-    null, fixed = freedoms.null, np.concatenate([driven, freedoms.hold])
-    if len(fixed) != null.shape[1] or freedoms.dependent or freedoms.undriven:
-        return np.zeros((len(of), 0))
-    rates = null[of] @ np.linalg.solve(null[fixed], np.eye(len(fixed), len(driven)))
-    units = freedoms.position.declared.system.in_user_units(np.ones(len(null)))
-    return np.asarray(units[of, None] * rates / units[driven])
 
 
 @dataclass(frozen=True, repr=False)
@@ -441,13 +413,19 @@ class Facts(GraphFacts):
     @property
     def weak_drives(self) -> list[int]:
         """Columns of the drivers that move least when the mechanism does, and as little as the weakest combination of them."""
-        return weak(self.geometry.freedoms, self.geometry.driven) if self.geometry else []
+        if not (g := self.geometry) or len(g.driven) < 2:
+            return g.driven.tolist() if g else []
+        size = np.sqrt((g.freedoms.null[g.driven] ** 2).sum(axis=1))
+        return [int(c) for c in g.driven[size < 2 * g.freedoms.drive * size.max()]]
 
     @cached_property
     def _moving_drives(self) -> Index:
         """Columns of the declared drivers without those that depend on the ones before, stand still, or nearly do (at a dead point)."""
-        g = self.geometry
-        return moving(g.freedoms, g.driven, near=self.dead_point) if g else np.zeros(0, dtype=np.intp)
+        if not (g := self.geometry):
+            return np.zeros(0, dtype=np.intp)
+        columns = independent_rows(g.freedoms.null, g.driven.tolist(), len(g.driven))
+        left_out = self.weak_drives if self.dead_point and len(columns) == len(g.driven) else []
+        return np.array([c for c in columns if [c] != left_out], dtype=np.intp)
 
     @cached_property
     def replaced_drives(self) -> tuple[str, ...]:
@@ -483,11 +461,15 @@ class Facts(GraphFacts):
         """Rates of freedoms that stand in couplings for a unit rate of each driver, the others at rest: ratios of gear trains."""
         if not (g := self.geometry) or not self.mechanism.couplings or not len(g.driven) or self.dead_point:
             return {}
-        names = self.mechanism.freedom_names()
+        f, fixed = g.freedoms, np.concatenate([g.driven, g.freedoms.hold])
+        if len(fixed) != f.mobility or f.dependent or f.undriven:  # the drivers do not say all other motions
+            return {}
         of = np.setdiff1d(g.system.coupled_freedoms, g.driven)
-        found = ratios(g.freedoms, g.driven, of)
+        rates = f.null[of] @ np.linalg.solve(f.null[fixed], np.eye(len(fixed), len(g.driven)))
+        units, names = g.system.in_user_units(np.ones(len(f.null))), self.mechanism.freedom_names()
+        found = units[of, None] * rates / units[g.driven]
         drives = [names[c] for c in g.driven]
-        return {names[c]: dict(zip(drives, row, strict=True)) for c, row in zip(of, found.tolist(), strict=True) if row}
+        return {names[c]: dict(zip(drives, row, strict=True)) for c, row in zip(of, found.tolist(), strict=True)}
 
     # --- reactions -------------------------------------------------------------------------------------------------------
 

@@ -252,18 +252,25 @@ def effect(before: Freedoms, driven: Index, changes: tuple[Change, ...], engine:
     pairs, couplings = position.m.pairs, position.m.couplings
     dropped = np.array([c.item - len(pairs) for c in changes if c.pair is None], dtype=np.intp)
     after_changes, column = position.with_changes({c.item: c.pair for c in changes if c.pair is not None}, dropped)
-    after = freedoms_at(after_changes, column[driven], engine)
+    named = tuple(
+        (pairs[c.item].name, pairs[c.item].type.symbol, c.pair.type.symbol)
+        if c.pair is not None
+        else (couplings[c.item - len(pairs)].name, COUPLING, LEFT_OUT)
+        for c in changes
+    )
+    turns = tuple(float(np.degrees(c.turn)) for c in changes)
+    return _before_after(before, freedoms_at(after_changes, column[driven], engine), named, turns)
+
+
+def _before_after(
+    before: Freedoms, after: Freedoms, changes: tuple[tuple[str, str, str], ...], turns: tuple[float, ...]
+) -> Effect:
     return Effect(
-        tuple(
-            (pairs[c.item].name, pairs[c.item].type.symbol, c.pair.type.symbol)
-            if c.pair is not None
-            else (couplings[c.item - len(pairs)].name, COUPLING, LEFT_OUT)
-            for c in changes
-        ),
+        changes,
         (before.redundancy, after.redundancy),
         (before.mobility, after.mobility),
         (len(before.passive), len(after.passive)),
-        tuple(float(np.degrees(c.turn)) for c in changes),
+        turns,
     )
 
 
@@ -495,14 +502,7 @@ def _effect_of(
     """The effect of changes, computed from a mechanism of its own."""
     system, x = assembled(new)
     columns, _ = named_columns(new, system, {d.freedom: 0.0 for d in new.drives})
-    after = free_motion(system, x, columns, engine)
-    return Effect(
-        changes,
-        (before.redundancy, after.redundancy),
-        (before.mobility, after.mobility),
-        (len(before.passive), len(after.passive)),
-        (0.0,) * len(changes),
-    )
+    return _before_after(before, free_motion(system, x, columns, engine), changes, (0.0,) * len(changes))
 
 
 def floating(freedoms: Freedoms, engine: EngineName = "auto") -> Iterator[Effect]:

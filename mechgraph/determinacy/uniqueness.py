@@ -161,6 +161,14 @@ def labels_of(pair: Pair, driven: Index) -> list[Label]:
     return out + [(pair.name, f"effort {pair.type.freedoms[j].name}") for j in driven]
 
 
+def _sum_of(terms: Mapping[str, float]) -> str:
+    """A sum of named terms in one line, ``A:Fz - 0.5 B:Fz``."""
+    return " ".join(
+        f"{'-' if v < 0 else '+'} {'' if abs(abs(v) - 1) < 5e-4 else f'{abs(v):.3g} '}{name}"
+        for name, v in terms.items()
+    ).removeprefix("+ ")
+
+
 @dataclass(frozen=True, repr=False)
 class SelfStress:
     """A reaction state without load: coefficients by ``pair:component``, the largest 1, moments divided by L so that they compare."""
@@ -172,11 +180,7 @@ class SelfStress:
     @property
     def text(self) -> str:
         """The state in one line."""
-        parts = [*self.components.items(), *((f"effort {name}", value) for name, value in self.efforts.items())]
-        line = " ".join(
-            f"{'-' if v < 0 else '+'} {'' if abs(abs(v) - 1) < 5e-4 else f'{abs(v):.3g} '}{name}" for name, v in parts
-        )
-        return line.removeprefix("+ ")
+        return _sum_of({**self.components} | {f"effort {name}": value for name, value in self.efforts.items()})
 
     def __repr__(self) -> str:
         return f"SelfStress({self.text!r})"
@@ -197,12 +201,8 @@ class MisfitSum:
     @property
     def text(self) -> str:
         """The note for a drawing."""
-        line = " ".join(
-            f"{'-' if c < 0 else '+'} {'' if abs(abs(c) - 1) < 5e-4 else f'{abs(c):.3g} '}{name}"
-            for name, c in self.coefficients.items()
-        ).removeprefix("+ ")
         known = np.isfinite(self.force_per_unit)
-        return f"these errors must cancel: {line}" + (
+        return f"these errors must cancel: {_sum_of(self.coefficients)}" + (
             f"; one unit of it locks in {self.force_per_unit:.4g}" if known else ""
         )
 
