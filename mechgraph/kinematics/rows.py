@@ -22,7 +22,6 @@ from typing import Any, Protocol
 import numpy as np
 import scipy
 
-from mechgraph.graph.linkgraph import LinkGraph
 from mechgraph.maths.linear import Place
 from mechgraph.maths.se3 import Array, Index, cross, rotate
 from mechgraph.maths.tolerances import COMPLEX_STEP
@@ -121,9 +120,8 @@ class LoopRows(Rows):
     ``J`` and ``bias`` are the derivatives where the loops are closed and rates meet the rows, as the middle moves otherwise.
     """
 
-    def __init__(self, graph: LinkGraph) -> None:
-        self.n_loops, self.places = graph.n_loops, slice(0, graph.loop_rows)
-        self.scale = np.ones((graph.loop_rows, 1))
+    def __init__(self, n_loops: int, count: int) -> None:
+        self.n_loops, self.places, self.scale = n_loops, slice(0, count), np.ones((count, 1))
 
     def residual(self, here: Evaluated) -> Array:
         """Closure errors of the loops."""

@@ -646,7 +646,9 @@ class RankSolution(Protocol):
 
 class _Dense:
     def __init__(self, K: Array, tolerance: float) -> None:
-        self._U, s, self._Vt = np.linalg.svd(K) if K.size else (np.eye(K.shape[0]), np.zeros(0), np.eye(K.shape[1]))
+        s, self._U, self._Vt = np.zeros(0), np.eye(K.shape[0]), np.eye(K.shape[1])
+        if K.size:
+            self._U, s, self._Vt = np.linalg.svd(K)
         self.rank = rank_of(s, tolerance)
         rest = s[self.rank :]
         self.dropped = float(rest[0] / s[0]) if rest.size and s[0] > 0 else 0.0

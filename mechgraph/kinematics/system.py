@@ -686,7 +686,7 @@ class System(States):
         moving = self.m.once(moving_lines)
         on_lines = np.array([c.name in moving for c in self.m.couplings], dtype=bool)
         linear, lines = np.flatnonzero(~on_lines), np.flatnonzero(on_lines)
-        out: list[Rows] = [LoopRows(self.graph)]
+        out: list[Rows] = [LoopRows(self.graph.n_loops, self.graph.loop_rows)]
         out += [self._linear_rows(linear)] if linear.size else []
         return out + ([LineRows(self, lines)] if lines.size else [])
 
@@ -729,12 +729,11 @@ class System(States):
     @property
     def coupling_matrix(self) -> Array:
         """Coefficients ``(couplings, F, B)`` of the rows behind those of the loops, internal units."""
-        first = self.graph.loop_rows
-        out = np.zeros((first + len(self.m.couplings), self.n_freedoms, self.par.couplings.shape[1]))
+        out = np.zeros((len(self.m.couplings), self.n_freedoms, self.par.couplings.shape[1]))
         for part in self.rows:
             if isinstance(part, CouplingRows):
-                out[part.places] = part.matrix
-        return out[first:]
+                out[np.arange(self.n_rows)[part.places] - self.graph.loop_rows] = part.matrix
+        return out
 
     @property
     def coupled_freedoms(self) -> Index:
