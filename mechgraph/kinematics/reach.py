@@ -382,8 +382,6 @@ def _ways_to(found: Positions, polygons: list[_Polygon], number: int, count: int
 def _ways_back(path: DriverPath, found: Positions, polygons: list[_Polygon]) -> list[_Way]:
     """For every polygon that did not end the first way that leads back to it, where there is one."""
     out: dict[int, _Way] = {}
-    tried: list[_Way] = []
-    left: list[float] = []
     count = FIRST_CORNERS
     while True:
         open_ = [i for i, p in enumerate(polygons) if p.ended is not None and i not in out and p.untried < len(p.at)]
@@ -392,45 +390,20 @@ def _ways_back(path: DriverPath, found: Positions, polygons: list[_Polygon]) -> 
         count = max(FIRST_CORNERS, min(count, MOST_CORNERS // len(open_)))
         ways = [way for i in open_ for way in _ways_to(found, polygons, i, count)]
         count *= 2
-        missing = _left(path, found, ways)
-        tried += ways
-        left += missing.tolist()
-        for way, rest in zip(ways, missing, strict=True):
+        for way, rest in zip(ways, _left(path, found, ways), strict=True):
             if rest <= 0.0:
                 out.setdefault(way.polygon, way)
-    for way in _nearly_passable(tried, left):
-        first = out.get(way.polygon)
-        if (first is None or way.corner < first.corner) and _left(path, found, [way], careful=True)[0] <= 0.0:
-            out[way.polygon] = way
     return list(out.values())
 
 
-def _nearly_passable(ways: list[_Way], left: list[float]) -> list[_Way]:
-    """Ways that ended shortly before corners, nearer to them than to the next ones: a polygon may come back by as little."""
-    least: dict[tuple[int, int], tuple[float, _Way]] = {}
-    for way, rest in zip(ways, left, strict=True):
-        key = way.polygon, way.corner
-        if key not in least or rest < least[key][0]:
-            least[key] = rest, way
-    out = []
-    for (polygon, corner), (rest, way) in least.items():
-        beside = [least[polygon, k][0] for k in (corner - 1, corner + 1) if (polygon, k) in least]
-        # the rest of the way may be a poor condition only
-        if 0.0 < rest < 0.05 and rest <= min(beside, default=rest):
-            out.append(way)
-    return out[:8]
-
-
-def _left(path: DriverPath, found: Positions, ways: list[_Way], careful: bool = False) -> Array:
-    """How much of every way was not reached, in steps of fair size unless ``careful``."""
-    if not ways:
-        return np.zeros(0)
+def _left(path: DriverPath, found: Positions, ways: list[_Way]) -> Array:
+    """How much of every way was not reached, in steps of fair size."""
     tracks, at = np.array([way.track for way in ways]), np.array([way.place for way in ways])
     lines = [way.line for way in ways]
     x, which = _states(path, found, tracks, at, np.stack([line[:, 0] for line in lines], axis=1))
     variants, path.variant_of = path.variant_of, path.variant_of[tracks]
     follower, paths = Follower(path), Paths(lines)
-    nodes = follower.follow(x, paths, which=which, careful=careful).nodes
+    nodes = follower.follow(x, paths, which=which, careful=False).nodes
     outside = range_ends(path, follower, nodes, np.full(len(ways), np.inf))[0]
     path.variant_of = variants
     end = np.where(follower.stuck, -np.inf, 0.0)
@@ -440,19 +413,17 @@ def _left(path: DriverPath, found: Positions, ways: list[_Way], careful: bool = 
 
 def _states(path: DriverPath, found: Positions, tracks: Index, at: Array, drive: Array) -> tuple[Array, Index]:
     """Closed states at places of tracks; of one that nowhere goes on its start."""
-    nodes = found.tracks.nodes
-    interpolation = Interpolation(path, nodes)
-    if not np.isin(tracks, nodes.track[interpolation.left]).all():
-        start = np.searchsorted(nodes.track, tracks)
-        x, which = nodes.x[:, start], nodes.which[start]
-        goes = np.flatnonzero(np.isin(tracks, nodes.track[interpolation.left]))
-        if goes.size:
-            x[:, goes], which[goes] = _states(path, found, tracks[goes], at[goes], drive[:, goes])
-        return x, which
-    step = interpolation.find(tracks, at)
-    which = interpolation.nodes.which[interpolation.left[step]]
-    closed = found.follower.newton.close(interpolation(step, at, drive), drive, tracks, which)
-    return closed.x, closed.which
+    nodes, interpolation = found.tracks.nodes, Interpolation(path, found.tracks.nodes)
+    start = np.searchsorted(nodes.track, tracks)
+    x, which = nodes.x[:, start], nodes.which[start]
+    goes = np.flatnonzero(np.isin(tracks, nodes.track[interpolation.left]))
+    if goes.size:
+        tracks, at, drive = tracks[goes], at[goes], drive[:, goes]
+        step = interpolation.find(tracks, at)
+        form = nodes.which[interpolation.left[step]]
+        closed = found.follower.newton.close(interpolation(step, at, drive), drive, tracks, form)
+        x[:, goes], which[goes] = closed.x, closed.which
+    return x, which
 
 
 def _requests(found: Positions, polygon: _Polygon, way: _Way) -> tuple[Request, list[Request]]:
