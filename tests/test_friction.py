@@ -706,19 +706,45 @@ def test_a_table_at_rest_slides_or_tips_first(height: float, mu: float, three: b
     assert s.self_locking
 
 
+def test_bearings_of_a_length_in_a_plane_bear_no_moment_that_is_locked_in() -> None:
+    """Moments across the plane are not unique and no load adds to them: halves of the force at both ends, as one force; said in words."""
+    loads = [mg.Wrench("slider", force=(-W, 0, 0), point=(0.4, 0, 0))]
+    links = ("frame", "crank", "rod", "slider", "frame")
+    at = zip("ABC", ((0, 0, 0), (0.1, 0, 0), (0.4, 0, 0)), links, links[1:], strict=False)
+    pins = [mg.Pair(k, "R", a, b, point=p, axis=Z) for k, p, a, b in at]
+    guide = mg.Pair("D", "P", "frame", "slider", point=(0.4, 0, 0), axis=X)
+    efforts = []
+    for length in (None, 0.1):
+        dry = mg.Friction("A", mu=MU, radius=RADIUS, length=length)
+        m = mg.Mechanism("slider-crank", pairs=[*pins, guide], drives=["A"], loads=[*loads, dry])
+        s = mg.solve(m, {"A": mg.Motion([0.5], velocity=1.0)})
+        efforts.append(float(s["A"].effort[0, 0]))
+        assert ("no locked-in force" in " ".join(str(s).split())) == (length is not None)
+        assert "by the friction circle, to which the whole reaction is tangent: A" in " ".join(str(s).split())
+    assert efforts[1] == pytest.approx(efforts[0], rel=1e-12)
+    # a load beside the plane adds to them
+    aside = mg.Wrench("crank", force=(0, 0, 5.0), point=(0.1, 0, 0))
+    s = mg.solve(m.replace(loads=[*m.loads, aside]), {"A": mg.Motion([0.5], velocity=1.0)})
+    assert s.status[0] == "friction not determined"
+
+
 def test_what_has_no_value_is_told_with_pairs_and_remedy() -> None:
     """Friction on reactions that are not unique, in motion and at rest; feet that tip; what is flagged; in ``s.warnings`` and in print."""
     pins = [mg.Pair(k, "R", "frame", "shaft", point=(0, 0, z), axis=Z) for k, z in (("A", 0.0), ("B", 0.3), ("C", 0.5))]
     dry = [mg.Friction(k, mu=MU, radius=RADIUS) for k in "ABC"]
     pull = mg.Wrench("shaft", force=(W, 0, 0), point=(0, 0, 0.2))
     m = mg.Mechanism("shaft", pairs=pins, drives=["A"], loads=[pull, *dry])
-    s = mg.solve(m, {"A": mg.Motion([0.0, 0.1], velocity=[1.0, 0.0])})
-    (note,) = s.warnings
+    s = mg.solve(m, {"A": mg.Motion([0.0, 0.0, 0.1], velocity=[1.0, 2.0, 0.0])})
+    note, _, ends = s.warnings
     assert (note.status, note.positions, note.pairs) == ("friction not determined", (0, 1), ("A", "B", "C"))
-    for words in ("A, B, C", "not unique", "redundant='elastic' with stiffness=", "2 of 2 positions", "A.Rz ="):
+    for words in ("A, B, C", "not unique", "redundant='elastic' with stiffness=", "2 of 3 positions", "A.Rz ="):
         assert words in str(note)
     assert "redundant='elastic'" in " ".join(str(s).split())
-    with pytest.raises(mg.DeclarationError, match="its status is 'friction not determined'"):
+    # at rest the effort is that without friction; between which ends it holds is not known
+    assert s.status[2] == "ok"
+    assert s["A"].effort[2, 0] == 0.0
+    assert "not known at 1 of 3 positions" in str(ends)
+    with pytest.raises(mg.DeclarationError, match="no known ends of what holds it"):
         assert mg.solve(m, {"A": 0.1}).self_locking
     at = [(1, 1), (-1, 0), (1, -1)]
     feet = [

@@ -102,6 +102,23 @@ def disk(mu, slope, planar, **more):
     return mg.Mechanism("disk", links, [pair], loads=[gravity, mg.Friction("K", mu=mu)], planar=planar)
 
 
+@pytest.mark.parametrize("angle", [0.3, 2.0, -1.0, 2.8])
+def test_a_line_in_the_plane_that_says_no_axis_is_touched_in_it(angle):
+    """A disk runs down a tilted line, on the side towards the axis that is closer to its normal, by 2/3 of g sin."""
+    t = np.array([np.cos(angle), np.sin(angle)])
+    n = np.array([-t[1], t[0]])
+    n *= np.sign(n[np.argmax(np.abs(n))])
+    line, rim = mg.Curve.line(point=(0, 0), direction=t), mg.Curve.circle(center=0.1 * n, radius=0.1)
+    pair = mg.Pair("K", "Kc", "frame", "disk", point=(0, 0), curve=line, curve_b=rim, closed="force")
+    loads = [mg.Gravity(G * (0.3 * t - n)), mg.Friction("K", mu=0.5)]
+    m = mg.Mechanism("disk", [mg.Link("frame"), mg.Link("disk", 2.0, 0.1 * n, 0.5 * 2.0 * 0.01)], [pair], loads=loads, planar=True)
+    r = mg.respond(m, (0, 0.5))
+    assert abs(r["K"].position[-1, 0]) == pytest.approx(0.3 * G / 3 * 0.25, rel=1e-6)
+    assert r["K"].sticks.all()
+    with pytest.raises(mg.DeclarationError, match="axis"):
+        mg.Mechanism("disk", pairs=[pair.replace(point=(0, 0, 0), axis=(0.6, 0.8))])
+
+
 @pytest.mark.parametrize(
     ("planar", "more"),
     [(True, {}), *(pytest.param(*one, marks=SLOW) for one in ((True, OPENS), (False, {}), (False, OPENS)))],

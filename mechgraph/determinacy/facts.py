@@ -520,7 +520,7 @@ class Facts(GraphFacts):
         ... ]
         >>> rubs = mg.Friction("B", mu=0.1, radius=0.01, thrust_radius=0.01)
         >>> print(mg.check(mg.Mechanism("door", pairs=hinges, drives=["A"], loads=[rubs])).friction[0])
-        friction of 'B' rests on Fz, not unique: not determined where loads add to it; change a pair type, or solve with redundant='elastic'
+        friction of 'B' rests on Fz, not unique: not determined where loads add to it, elsewhere that without locked-in force; change a pair type, or solve with redundant='elastic'
         """
         out = []
         for load in rubbing_loads(self.mechanism, self.mechanism.loads):
@@ -528,8 +528,8 @@ class Facts(GraphFacts):
             if loose := [name for name in rests_on(self.mechanism, load) if not known.get(name, True)]:
                 subject, it = load.where.removesuffix(": "), ("it", "them")[len(loose) > 1]
                 out.append(
-                    f"{subject} rests on {', '.join(loose)}, not unique: not determined where loads add to {it}; change a pair type, or "
-                    "solve with redundant='elastic'"
+                    f"{subject} rests on {', '.join(loose)}, not unique: not determined where loads add to {it}, elsewhere that without "
+                    "locked-in force; change a pair type, or solve with redundant='elastic'"
                 )
         return tuple(out)
 

@@ -215,9 +215,10 @@ def _efforts(r: Facts, known: Uniqueness) -> str:
     if not r.mechanism.drives:
         return ""
     unique = bool(known.is_unique[known.components.efforts].all())
+    smooth = " without friction" if unique and r.friction else ""
     if len(r.mechanism.drives) == 1:
-        return f"; the driver effort is {'' if unique else 'not '}unique"
-    return f"; {'all driver efforts are unique' if unique else 'driver efforts are not all unique'}"
+        return f"; the driver effort is {'' if unique else 'not '}unique{smooth}"
+    return f"; {'all driver efforts are unique' if unique else 'driver efforts are not all unique'}{smooth}"
 
 
 def _of_topology(r: Facts) -> str:
@@ -443,6 +444,7 @@ def _trusted(r: Facts) -> Iterator[str]:
         yield f"determined by equilibrium: {'; '.join(some + driven) or 'nothing'}"
         if not known.all_unique:
             yield HOW_MUCH
+    yield from r.friction[:NAMED]
     yield from doubts(r)
     yield from filter(None, (kind_line(r), count_line(r)))
     yield from motion_line(r)

@@ -221,15 +221,20 @@ def misfit_sums(m: Mechanism, states: Sequence[SelfStress], L: float) -> tuple[M
         seat = m.pair(pair).stiffness
         k = np.inf if seat is None else seat.by_component.get(component, np.inf)
         soft[j], loose[j] = (0.0, True) if k == 0.0 else (arm[j] ** 2 / k, False)
-    borne, force = np.flatnonzero(~N[:, loose].any(axis=1)), np.full(len(states), np.nan)
-    strain = (N[borne] * soft) @ N[borne].T
-    if borne.size and np.linalg.matrix_rank(strain, hermitian=True) == len(borne):
-        force[borne] = np.diag(np.linalg.inv(strain))
+    # components of stiffness 0 carry nothing: states without them, or sums of states in which they cancel
+    borne = N[~N[:, loose].any(axis=1)]
+    sums = scipy.linalg.null_space(N[:, loose].T).T @ N if loose.any() else borne
+    if len(sums) > len(borne):
+        sums /= np.abs(sums).max(axis=1, keepdims=True)
+        borne = np.where(np.abs(sums) > STRESSES.shown, sums, 0.0)
+    strain, force = (borne * soft) @ borne.T, np.full(len(borne), np.nan)
+    if len(borne) and np.linalg.matrix_rank(strain, hermitian=True) == len(borne):
+        force = np.diag(np.linalg.inv(strain))
     return tuple(
         MisfitSum(
             {name.replace(":", "."): float(c * a) for name, c, a in zip(names, row, arm, strict=True) if c}, float(f)
         )
-        for row, f in zip(N, force, strict=True)
+        for row, f in zip(borne, force, strict=True)
     )
 
 

@@ -473,11 +473,10 @@ _SUMS = ("efforts", "taken", "teeth", "beside", "rubbing")
 """What is summed over all that rubs."""
 
 
-def rubbed(here: Configuration, places: Sequence[Place], base: Array, unit: dict[int, Array], stress: Array) -> Rubbed:
+def rubbed(here: Configuration, places: Sequence[Place], base: Array, unit: dict[int, Array]) -> Rubbed:
     """Solve for the normal forces; ``base (6, P, T)`` reactions without friction, ``unit`` those of a unit effort in freedoms, by column.
 
-    Behind the reactions stand the forces on gears b, one a coupling, where teeth rub. Normal forces that ``stress (6, P, s, T)`` may
-    change have to be zero along it: the least friction, no force locked in.
+    Behind the reactions stand the forces on gears b, one a coupling, where teeth rub.
     """
     T = here.T
     starts = np.concatenate([[0], np.cumsum([len(place.A) for place in places])]).astype(np.intp)
@@ -494,16 +493,6 @@ def rubbed(here: Configuration, places: Sequence[Place], base: Array, unit: dict
     outcome = np.where(over, np.where((V[starts[signed]] > 0.0).any(axis=0), 2, 3), outcome)
     why = np.where(outcome == 3, Why.SEVERAL, Why.KNOWN)
     n[signed] = V[starts[signed]]
-    for t, place in enumerate(places):
-        loose = np.einsum("dct,cst->dst", place.A, stress[:, place.reads])
-        if loose.size and (size := np.sqrt((loose**2).sum(axis=(0, 1)))).max(initial=0.0) > STRESSES.unique:
-            along = np.abs(np.einsum("dst,dt->st", loose, np.nan_to_num(V[starts[t] : starts[t + 1]]))).max(
-                axis=0, initial=0.0
-            )
-            largest = np.abs(base).max(axis=(0, 1), initial=0.0)
-            unknown = (size > STRESSES.unique) & (along > STRESSES.unique * size * largest)
-            unknown &= (outcome == 0) | (why == Why.NOT_UNIQUE)
-            outcome[unknown], why[unknown], growth[t, unknown] = 3, Why.NOT_UNIQUE, 1.0
     n, V = np.where(outcome > 0, np.nan, n) + preload, np.where(outcome > 0, np.nan, V)
     P, F = len(here.system.m.pairs), here.system.n_freedoms
     speeds, names = np.array([place.speed for place in places]), tuple(place.of for place in places)

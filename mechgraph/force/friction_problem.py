@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from mechgraph.force.friction import OUTCOMES, Rubbed, Why, moving_rates, places_of, rests, rubbed
+from mechgraph.force.friction import OUTCOMES, Place, Rubbed, Why, moving_rates, places_of, rests, rubbed
 from mechgraph.force.reactions import (
     METHODS,
     ForceProblem,
@@ -150,8 +150,8 @@ class FrictionProblem:
             self._try_sets(dq)
             found, rubs = self._on_flanks(dq)
             turned, moved = self._turned(found, rubs), self._lifts(found)[1]
-        found = _undetermined(found, rubs, moved, Why.FEET, (True,) * len(rubs.names))
-        found = _undetermined(found, rubs, turned, Why.FLANKS, (True,) * len(rubs.names))
+        found = _undetermined(found, rubs, moved, Why.FEET)
+        found = _undetermined(found, rubs, turned, Why.FLANKS)
         # forces that grow without bound between feet held in place may let them lift before: then it tips, and does not jam
         grows = np.isin(rubs.outcome, (1, 2)) & (self.push is not None)
         rubs.outcome[grows], rubs.factor[grows], rubs.why[grows] = 3, np.nan, Why.FEET
@@ -219,7 +219,7 @@ class FrictionProblem:
             places = places_of(self.here, dq, reactions, self.dry, at_rest, (self.lines, self.flank))
             if np.any(self.part != 1.0):
                 places = [replace(place, D=self.part * place.D, K=self.part * place.K) for place in places]
-            rubs = rubbed(self.here, places, base, of, unknown)
+            rubs = rubbed(self.here, places, base, of)
             sums = {
                 name: getattr(found, name) + sum(one[name] * rubs.efforts[c] for c, one in self.unit.items())
                 for name in ("reactions", "efforts", "multipliers", "coupled")
@@ -230,9 +230,31 @@ class FrictionProblem:
             size = np.abs(reactions).max(axis=(0, 1))
             if not (any(place.follows for place in places) and (moved > STRESSES.rounding * size).any()):
                 break
-        follows = [place.follows for place in places]
-        doubtful = (moved > MOTIONS.still * size) & any(follows)
-        return _undetermined(replace(found, **sums), rubs, doubtful, Why.UNSETTLED, follows), rubs
+        follows = np.array([[place.follows] for place in places])
+        doubtful = (moved > MOTIONS.still * size) & follows.any()
+        loose = np.array([self._is_loose(place, unknown, self._read(sums), size) for place in places])
+        known = _undetermined(replace(found, **sums), rubs, loose.any(axis=0), Why.NOT_UNIQUE, loose)
+        return _undetermined(known, rubs, doubtful, Why.UNSETTLED, follows), rubs
+
+    def _is_loose(self, place: Place, stress: Array, forces: Array, size: Array) -> Mask:
+        """Where ``(T,)`` a place rubs under components that a ``stress (6, P, s, T)`` may change and to which loads add: components that
+        are zero along it stay so, the least friction, no force locked in.
+        """
+        here, P, A = self.here, len(self.here.system.m.pairs), place.A
+        reading = np.einsum("dct,cst->dst", A, stress[:, place.reads])
+        along = np.einsum("dst,dct,ct->st", reading, A, forces[:, place.reads])
+        if not place.between_teeth(P):
+            group, i = here.system.place_of(place.reads)
+            part = (np.einsum("dct,cjt->djt", A, here.W[group][:, :, i]) ** 2).sum(axis=0)
+            loose, value = (
+                PairFrames(here).components_of(group, i, of[:, place.reads]) for of in (stress, forces)
+            )
+            along = np.einsum("jst,jt,jt->st", loose, part, value)
+        most = np.sqrt((reading**2).sum(axis=(0, 1)))
+        acts = place.D.any(axis=0) | place.K.any(axis=(0, 1))
+        return np.asarray(
+            acts & (most > STRESSES.unique) & (np.abs(along).max(axis=0, initial=0.0) > STRESSES.unique * most * size)
+        )
 
     def _read(self, forces: Mapping[str, Array]) -> Array:
         """The wrenches that normal forces are read from: reactions, and behind them forces between teeth."""
@@ -338,13 +360,13 @@ def _worst(values: Array, sizes: Array) -> Mask:
     return np.asarray(least & (values < -STRESSES.rounding * sizes.max(axis=0)))
 
 
-def _undetermined(found: FreeForces, rubs: Rubbed, places: Mask, why: Why, of: Sequence[bool]) -> FreeForces:
+def _undetermined(found: FreeForces, rubs: Rubbed, places: Mask, why: Why, of: Mask | bool = True) -> FreeForces:
     """The same with no value where friction has no solution, or is not determined, as at some more ``places``, by the rubbing places
-    ``of`` which it is.
+    ``of (m, T)`` which it is.
     """
     more = places & (rubs.outcome == 0)
     rubs.outcome[more], rubs.why[more] = OUTCOMES.index("friction not determined"), why
-    rubs.growth[:, more] = np.array(of, dtype=float)[:, None]
+    rubs.growth[:, more] = np.broadcast_to(of, rubs.growth.shape)[:, more]
     for values in (rubs.efforts, rubs.taken, rubs.normals, rubs.teeth, rubs.beside, rubs.rubbing):
         values[..., places] = np.nan
     places = rubs.outcome > 0

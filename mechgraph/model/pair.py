@@ -458,7 +458,7 @@ class Pair(Described):
         row, point, axis, on_a, on_b = self.type, self.point, self.axis, self.on_a, self.on_b
         if point is None and isinstance(on_a, Marker):
             point, axis = on_a.point, on_a.axis
-        towards = axis if point is not None else None
+        towards = axis if point is not None and is_numeric(axis, (3,)) else None
         apart = on_b.pose() if isinstance(on_b, Marker) and not on_b.faults("", 1.0) else None
         curve, surface, curve_b, roller = self.curve, self.surface, self.curve_b, self.roller
         if isinstance(curve, Curve) and not curve_faults(row, curve, curve_b, roller, point, ""):

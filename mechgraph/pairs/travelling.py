@@ -374,12 +374,18 @@ def rounded(at: float, size: float) -> float:
 
 
 def across(curve: Curve, place: AlongCurve, z: Sequence[float] | Array | None) -> Curve:
-    """The curve; a straight one, which lies in many planes, in that at right angles to ``z`` where the frame has one."""
+    """The curve; a straight one, which lies in many planes, in that at right angles to ``z`` where the frame has one; if that is left out
+    and it lies in the x-y plane, in that, with y towards the axis that is closer to it.
+    """
     travel: Travel = curve.once(Travel)
-    if place.tangent != X or z is None or not travel.is_straight or curve.guide is not None:
+    if place.tangent != X or not travel.is_straight or curve.guide is not None:
         return curve
     here = travel.at(np.zeros(1))
-    k, y = here.k[:, 0], here.y[:, 0]
+    k, y, t = here.k[:, 0], here.y[:, 0], here.t[:, 0]
+    if z is None and not t[2]:
+        z = (0.0, 0.0, 1.0 if (t[0] if abs(t[0]) >= abs(t[1]) else -t[1]) > 0 else -1.0)
+    if z is None:
+        return curve
     # digits to which the direction of a plane is rounded, for the same reason
     along, beside = (round(v / float(np.linalg.norm(z)), 12) for v in (k @ np.asarray(z), y @ np.asarray(z)))
     return curve.replace(frame="guided", guide=along * k + beside * y) if beside or along < 0.0 else curve

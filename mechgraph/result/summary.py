@@ -10,10 +10,11 @@ import numpy as np
 
 from mechgraph.determinacy.snapping import SnappedMechanism
 from mechgraph.determinacy.uniqueness import labels_of
-from mechgraph.document import LISTED, Block, Bullets, Document, Heading, Paragraph, Table
-from mechgraph.errors import counted
+from mechgraph.document import LISTED, NAMED, Block, Bullets, Document, Heading, Paragraph, Table
+from mechgraph.errors import counted, listed
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.memo import dataclass
+from mechgraph.model.friction import Friction, places_in, rests_on
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import FORCE, POWER, PRESSURE, force_hint, unit_of
 from mechgraph.result.contacts import LiftOff, Overlap, contacts_of, lift_offs, overlaps
@@ -607,6 +608,7 @@ class _SummaryText(PositionLabels):
             yield Heading("Friction", 2)
             heads = (f"greatest normal force{force}", f"greatest power lost{power_unit}", "at", "mean")
             yield Table(("pair", *heads), (*rows[:LISTED], *rows[LISTED:][-1:]), align="lrrrr")
+            yield from self._laws_of_friction()
         if (brought > 0).any():
             left = 1.0 - total[brought > 0] / brought[brought > 0]
             parts = dict.fromkeys(map(number, (np.nanmin(left), np.nanmax(left))))
@@ -614,6 +616,21 @@ class _SummaryText(PositionLabels):
         if held:
             yield Heading("Efforts between which friction holds at rest", 2)
             yield Table(("driver", "at", "from", "to"), tuple(held[:LISTED]), align="lrrr")
+
+    def _laws_of_friction(self) -> Iterator[Block]:
+        """Which couples journals and balls have, and which components count as zero though they are not unique."""
+        m, dry = self.values.whole, [load for load in self.values.loads if isinstance(load, Friction)]
+        dry = [load for load in dry if load.of in m.pair_index]
+        turning = [x for x in dry if any(p.way == "ball" or (p.way == "axis" and p.turn is not None) for p in places_in(x, m.pair(x.of).type))]
+        laws = {"circle": "by the friction circle, to which the whole reaction is tangent", "total": "mu radius |F|"}
+        for law, words in laws.items():
+            if of := [x.of for x in turning if x.model == law]:
+                yield Paragraph(f"Couples {words}: {listed(of, NAMED)}.")
+        found = ((x.of, set(rests_on(m, x)) & set(self._not_unique(m.pair_index[x.of]))) for x in dry)
+        loose = [f"{name} ({', '.join(sorted(parts))})" for name, parts in found if parts]
+        if loose and not self.values.least_norm and not self.values.split_by_stiffness:
+            why = "Components that are not unique, and to which loads add nothing, count as zero: no locked-in force, the least friction"
+            yield Paragraph(f"{why}: {listed(loose, NAMED)}.")
 
     def contacts(self) -> Iterator[Block]:
         """Range of the normal force of every contact, its greatest sliding speed and pressure; where it would have to pull."""
