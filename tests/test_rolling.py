@@ -222,6 +222,9 @@ def test_a_ball_that_rolls_in_a_bowl_off_its_meridian_is_in_balance():
     n = -r.link("ball").center / rho
     F = M * (r.link("ball").center_acceleration + np.array([0.0, 0.0, G]))
     np.testing.assert_allclose(J * r.link("ball").angular_acceleration, -R * np.cross(n, F), atol=1e-10)
+    # the direction of the sliding is known to the last: tight steps end where it sticks
+    rough = m.replace(loads=[m.loads[0], mg.Friction("K", mu=2.0)])
+    assert names(mg.respond(rough, (0, 0.0065), rates={"K.Tu": 0.0, "K.Tv": 0.3}, rtol=1e-10, atol=1e-12)) == ["K sticks"]
 
 
 def ladder(mu, foot=0.5, **more):

@@ -208,7 +208,13 @@ def _touching(x: _Rubbing, rubs: Rubs) -> Place:
     """A point, or the center of pressure of a line, on the side of link b's curve to which the force points."""
     c, r = x.frame(x.touches_in)[:, 3], x.radius_b
     n, size = _unit(x.w[3:])
-    c = c + cross(n, x.w[:3] - cross(c, x.w[3:])) / np.where(size > 0, size, np.inf)
+    parts = x.row.reactions or ()
+    pushes = [part.wrench[3:] for part in parts if not part.is_couple]
+    if len(pushes) == 1:  # known to all digits, and so the direction of a slow sliding too
+        axis = x.frame(x.touches_in)[:, int(np.argmax(np.abs(pushes[0])))]
+        n = np.sign((axis * n).sum(axis=0)) * axis
+    if any(part.is_couple for part in parts):
+        c = c + cross(n, x.w[:3] - cross(c, x.w[3:])) / np.where(size > 0, size, np.inf)
     u, speed = _unit(x.twist[3:] + cross(x.twist[:3], c - r * n), x.rolls_below)
     mu = x.mu(speed)
     return x.place(
