@@ -111,7 +111,9 @@ def test_a_line_in_the_plane_that_says_no_axis_is_touched_in_it(angle):
     line, rim = mg.Curve.line(point=(0, 0), direction=t), mg.Curve.circle(center=0.1 * n, radius=0.1)
     pair = mg.Pair("K", "Kc", "frame", "disk", point=(0, 0), curve=line, curve_b=rim, closed="force")
     loads = [mg.Gravity(G * (0.3 * t - n)), mg.Friction("K", mu=0.5)]
-    m = mg.Mechanism("disk", [mg.Link("frame"), mg.Link("disk", 2.0, 0.1 * n, 0.5 * 2.0 * 0.01)], [pair], loads=loads, planar=True)
+    m = mg.Mechanism(
+        "disk", [mg.Link("frame"), mg.Link("disk", 2.0, 0.1 * n, 0.5 * 2.0 * 0.01)], [pair], loads=loads, planar=True
+    )
     r = mg.respond(m, (0, 0.5))
     assert abs(r["K"].position[-1, 0]) == pytest.approx(0.3 * G / 3 * 0.25, rel=1e-6)
     assert r["K"].sticks.all()
@@ -224,7 +226,9 @@ def test_a_ball_that_rolls_in_a_bowl_off_its_meridian_is_in_balance():
     np.testing.assert_allclose(J * r.link("ball").angular_acceleration, -R * np.cross(n, F), atol=1e-10)
     # the direction of the sliding is known to the last: tight steps end where it sticks
     rough = m.replace(loads=[m.loads[0], mg.Friction("K", mu=2.0)])
-    assert names(mg.respond(rough, (0, 0.0065), rates={"K.Tu": 0.0, "K.Tv": 0.3}, rtol=1e-10, atol=1e-12)) == ["K sticks"]
+    assert names(mg.respond(rough, (0, 0.0065), rates={"K.Tu": 0.0, "K.Tv": 0.3}, rtol=1e-10, atol=1e-12)) == [
+        "K sticks"
+    ]
 
 
 def ladder(mu, foot=0.5, **more):

@@ -519,8 +519,10 @@ class Facts(GraphFacts):
         ...     mg.Pair(k, "R", "frame", "door", point=(0, 0, z), axis=(0, 0, 1)) for k, z in (("A", 0), ("B", 1))
         ... ]
         >>> rubs = mg.Friction("B", mu=0.1, radius=0.01, thrust_radius=0.01)
-        >>> print(mg.check(mg.Mechanism("door", pairs=hinges, drives=["A"], loads=[rubs])).friction[0])
-        friction of 'B' rests on Fz, not unique: not determined where loads add to it, elsewhere that without locked-in force; change a pair type, or solve with redundant='elastic'
+        >>> print(
+        ...     mg.check(mg.Mechanism("door", pairs=hinges, drives=["A"], loads=[rubs])).friction[0].partition("; ")[0]
+        ... )
+        friction of 'B' rests on Fz, not unique: zero where no load adds to it, else not determined
         """
         out = []
         for load in rubbing_loads(self.mechanism, self.mechanism.loads):
@@ -528,8 +530,8 @@ class Facts(GraphFacts):
             if loose := [name for name in rests_on(self.mechanism, load) if not known.get(name, True)]:
                 subject, it = load.where.removesuffix(": "), ("it", "them")[len(loose) > 1]
                 out.append(
-                    f"{subject} rests on {', '.join(loose)}, not unique: not determined where loads add to {it}, elsewhere that without "
-                    "locked-in force; change a pair type, or solve with redundant='elastic'"
+                    f"{subject} rests on {', '.join(loose)}, not unique: zero where no load adds to {it}, else not determined; change a "
+                    "pair type, or solve with redundant='elastic'"
                 )
         return tuple(out)
 

@@ -233,7 +233,7 @@ class FrictionProblem:
         follows = np.array([[place.follows] for place in places])
         doubtful = (moved > MOTIONS.still * size) & follows.any()
         loose = np.array([self._is_loose(place, unknown, self._read(sums), size) for place in places])
-        known = _undetermined(replace(found, **sums), rubs, loose.any(axis=0), Why.NOT_UNIQUE, loose)
+        known = _undetermined(replace(found, **sums), rubs, np.asarray(loose.any(axis=0)), Why.NOT_UNIQUE, loose)
         return _undetermined(known, rubs, doubtful, Why.UNSETTLED, follows), rubs
 
     def _is_loose(self, place: Place, stress: Array, forces: Array, size: Array) -> Mask:
@@ -246,9 +246,7 @@ class FrictionProblem:
         if not place.between_teeth(P):
             group, i = here.system.place_of(place.reads)
             part = (np.einsum("dct,cjt->djt", A, here.W[group][:, :, i]) ** 2).sum(axis=0)
-            loose, value = (
-                PairFrames(here).components_of(group, i, of[:, place.reads]) for of in (stress, forces)
-            )
+            loose, value = (PairFrames(here).components_of(group, i, of[:, place.reads]) for of in (stress, forces))
             along = np.einsum("jst,jt,jt->st", loose, part, value)
         most = np.sqrt((reading**2).sum(axis=(0, 1)))
         acts = place.D.any(axis=0) | place.K.any(axis=(0, 1))

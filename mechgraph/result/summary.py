@@ -621,7 +621,8 @@ class _SummaryText(PositionLabels):
         """Which couples journals and balls have, and which components count as zero though they are not unique."""
         m, dry = self.values.whole, [load for load in self.values.loads if isinstance(load, Friction)]
         dry = [load for load in dry if load.of in m.pair_index]
-        turning = [x for x in dry if any(p.way == "ball" or (p.way == "axis" and p.turn is not None) for p in places_in(x, m.pair(x.of).type))]
+        ways = {x.of: {(p.way, p.turn is None) for p in places_in(x, m.pair(x.of).type)} for x in dry}
+        turning = [x for x in dry if ways[x.of] & {("ball", True), ("axis", False)}]
         laws = {"circle": "by the friction circle, to which the whole reaction is tangent", "total": "mu radius |F|"}
         for law, words in laws.items():
             if of := [x.of for x in turning if x.model == law]:
