@@ -47,6 +47,42 @@ def test_a_pulse_is_not_stepped_over(what, method):
     np.testing.assert_allclose(r["P"].position[-1], v * (10 - 0.5 * (BEGIN + END)), rtol=1e-5)
 
 
+HUMP = {"force": [0, 0, 40, 0, 0], "outside": "hold"}
+NARROW = {
+    "coordinate": lambda: mg.ForceLaw("P", law=mg.ForceTable(x=[-1e3, 27.6, 27.7, 27.8, 1e3], **HUMP)),
+    "function": lambda: mg.ForceLaw("P", law=lambda x, v, t: 40 * np.clip(1 - 10 * np.abs(x - 27.7), 0, None)),
+    "distance": lambda: mg.ForceLaw(
+        ("frame", "body", (-9, 0, 0), (0, 0, 0)), law=mg.ForceTable(x=[0, 36.6, 36.7, 36.8, 1e3], **HUMP)
+    ),
+    "effort": lambda: mg.Effort("P", lambda pose, twist, t: 40 * np.clip(1 - 10 * np.abs(pose[..., 0, 3] - 27.7), 0, None)),
+}
+
+
+@pytest.mark.parametrize("beside", [False, True])
+@pytest.mark.parametrize("what", NARROW)
+def test_a_hump_of_a_table_or_function_of_place_is_not_stepped_over(what, beside):
+    """Passed at 10 within a hundredth of a second in one of eight: the energy that it brings; along a path, and in a chart of two."""
+    load, m = NARROW[what](), block()
+    other = mg.Pair("Q", "P", "frame", "other", point=(0, 1, 0), axis=X)
+    more = {"links": [*m.links, mg.Link("other", 1.0, (0, 1, 0))], "pairs": [*m.pairs, other]} if beside else {}
+    r = mg.respond(m.replace(loads=[load], **more), (0, 8), rates={"P": 10.0})
+    law = getattr(load, "law", None)
+    gained = law.energy(np.array([0.0]))[0] - law.energy(np.array([1e3]))[0] if isinstance(law, mg.ForceTable) else 4.0
+    np.testing.assert_allclose(r["P"].velocity[-1], np.sqrt(100 + 2 * gained), rtol=1e-5)
+
+
+def test_a_hump_of_a_table_of_rates_is_not_stepped_over():
+    """v' = 5 - g(v): the time lost in the hump, by quadrature."""
+    table = mg.ForceTable(v=[-1e3, 10, 10.2, 10.4, 1e3], force=[0, 0, -4, 0, 0], outside="hold")
+    r = mg.respond(block(mg.ForceLaw("P", law=table), mg.Effort("P", 5.0)), (0, 8))
+
+    def slower(v):
+        return 1 / (5 + table.at(np.zeros(1), np.array([v]))[0]) - 0.2
+
+    lost = scipy.integrate.quad(slower, 10, 10.4, points=[10.2])[0]
+    np.testing.assert_allclose(r["P"].velocity[-1], 5 * (8 - lost), rtol=1e-6)
+
+
 @pytest.mark.parametrize("load", [mg.Effort, mg.ForceLaw, mg.Wrench])
 def test_steps_end_at_breaks_so_that_the_shortest_pulse_is_exact(load):
     """A thousandth of what is looked at; the number of steps stays small."""

@@ -135,7 +135,8 @@ class Friction(Load):
 
     def numbers_turn(self, turns: Callable[[Any], bool]) -> bool:
         """Whether its pair turns."""
-        return any(turns(name) for name in (self.of, *(f"{self.of}.R{axis}" for axis in "xyz")))
+        names = (self.of, *(f"{self.of}.R{axis}" for axis in "xyz")) if isinstance(self.of, str) else ()
+        return any(turns(name) for name in names)
 
     def with_numbers(self, number: Callable[[Any], Any]) -> Friction:
         """The same with what a function makes of its numbers."""
@@ -170,7 +171,7 @@ class Friction(Load):
             yield "mu: is missing; give the coefficient of friction"
         # what is no number, or below zero, is a fault of its own
         mu, static, part = (
-            of if isinstance(of, int | float) and of >= 0 else np.nan for of in (self._mu, self.static, self.efficiency)
+            of if isinstance(of, int | float) and 0 <= of < np.inf else np.nan for of in (self._mu, self.static, self.efficiency)
         )
         if static < mu:
             yield wrong(self.static, "static", f"mu = {mu:g} or more")

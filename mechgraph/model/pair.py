@@ -537,7 +537,7 @@ class Pair(Described):
     @property
     def freedom_names(self) -> tuple[str, ...]:
         """Full names of the freedoms, ``"B.Tz"``."""
-        if not isinstance(self.type, PairType):
+        if not isinstance(self.type, PairType) or not isinstance(self.name, str):
             return ()
         return tuple(f"{self.name}.{f.name}" for f in self.type.freedoms)
 

@@ -111,8 +111,10 @@ class AlongTerms:
         out[: len(rows) * VALUES_OF_FREEDOM : VALUES_OF_FREEDOM] = turns * moved
         return out
 
-    def forces(self, values: Array, rate: float, t: Array) -> tuple[Array, Array]:
-        """Generalized forces ``(T,)`` of the other loads, stored and not, at one place with a rate and times ``(T,)``; internal units."""
+    def forces(self, values: Array, rate: Array | float, t: Array) -> tuple[Array, Array]:
+        """Generalized forces ``(T,)`` of the other loads, stored and not, at times ``(T,)`` with values ``(m,)`` or ``(m, T)`` and a rate, or
+        one at each; internal units.
+        """
         stored, rest = (
             _AlongSite(self, values, rate, t).collected(some) if some else np.zeros(len(t))
             for some in (self.stored, self.rest)
@@ -121,9 +123,9 @@ class AlongTerms:
 
 
 class _AlongSite(Site):
-    """What loads see at one place of a path at times ``(T,)``, about the global origin; ``found`` is their power for a unit rate."""
+    """What loads see at places of a path at times ``(T,)``, about the global origin; ``found`` is their power for a unit rate."""
 
-    def __init__(self, terms: AlongTerms, values: Array, rate: float, t: Array) -> None:
+    def __init__(self, terms: AlongTerms, values: Array, rate: Array | float, t: Array) -> None:
         self.m, self.L = terms.system.m, terms.system.par.L
         self.terms, self.rate, self.t = terms, rate, t
         self.batch, self.good = (len(t),), np.arange(len(t))
@@ -139,14 +141,14 @@ class _AlongSite(Site):
         return self.found / self.L**2
 
     def _of_link(self, link: str) -> tuple[Array, Array]:
-        """Pose ``(3, 4, 1)`` and unit twist ``(6, 1)``."""
+        """Pose ``(3, 4, 1 or T)`` and unit twist ``(6, 1 or T)``."""
         at = self.terms.links[link]
-        values = self.tabulated[at : at + VALUES_OF_LINK, None]
-        return values[:12].reshape(3, 4, 1), values[12:]
+        values = self.tabulated[at : at + VALUES_OF_LINK].reshape(VALUES_OF_LINK, -1)
+        return values[:12].reshape(3, 4, -1), values[12:]
 
-    def _of_freedom(self, name: str) -> tuple[float, float]:
+    def _of_freedom(self, name: str) -> tuple[Any, Any]:
         at = VALUES_OF_FREEDOM * self.terms.columns[name]
-        return float(self.tabulated[at]), float(self.tabulated[at + 1])
+        return self.tabulated[at], self.tabulated[at + 1]
 
     def rotation(self, link: str) -> Array:
         """See ``LoadSite``."""
@@ -166,8 +168,9 @@ class _AlongSite(Site):
     def motion_of(self, link: str) -> tuple[Array, Array]:
         """See ``Site``."""
         X, V = self._of_link(link)
-        pose = np.concatenate([X[..., 0], [[0.0, 0.0, 0.0, 1.0]]])
-        return tuple(np.broadcast_to(one, (*self.batch, *one.shape)) for one in (pose, self.rate * V[:, 0]))  # type: ignore[return-value]
+        pose = np.broadcast_to(np.eye(4), (*self.batch, 4, 4)).copy()
+        pose[:, :3] = np.moveaxis(X, -1, 0)
+        return pose, self._spread(self.rate * V).T
 
     def _spread(self, value: Array) -> Array:
         return np.broadcast_to(value, (*value.shape[:-1], *self.batch))
@@ -569,7 +572,7 @@ class PathStage:
         self._mass, smooth, *_ = (terms := self._terms(u)).tolist()
         if self._piece is not None and self._mass <= RESPONSE.massless * np.abs(self._piece.series[:, 0]).sum():
             raise Stopped(AT_DEAD_POINT)
-        stored, rest = self._forces(terms, v, np.array([t]))
+        stored, rest = arc.terms.forces(terms[OF_LOADS:], v, np.array([t]))
         self.energy = 0.5 * self._mass * v * v + abs(smooth + float(stored[0] + rest[0])) or 1.0
 
     def begin(self) -> Array:
@@ -577,29 +580,24 @@ class PathStage:
         return self._first
 
     def _terms(self, u: float) -> Array:
-        """Values of the series at a place."""
+        """Values of the series at a place; those of freedoms and links in the user's units."""
         piece, turns = self._piece, self._turns
         w = u - self.arc.turn * turns
         if piece is None or not min(piece.begin, piece.end) <= w <= max(piece.begin, piece.end):
             found = self.arc.piece(u)
             if found is None:
-                return np.full(OF_LOADS, np.nan)
+                return np.full(OF_LOADS + len(self.arc.terms.sizes), np.nan)
             self._piece, self._turns = piece, turns = found
             w = u - self.arc.turn * turns
         z = (2.0 * w - piece.begin - piece.end) / (piece.end - piece.begin)
         # Chebyshev polynomials by their angles: one cosine each
         angle = math.acos(min(1.0, max(-1.0, z)))
-        return np.cos(_ORDERS * angle) @ piece.series
-
-    def _forces(self, terms: Array, v: float, t: Array) -> tuple[Array, Array]:
-        """Forces ``(T,)`` of the loads that are not tabulated, stored and not, at the place last asked for."""
-        of = self.arc.terms
-        if not (of.stored or of.rest):
-            return np.zeros(len(t)), np.zeros(len(t))
-        values = terms[OF_LOADS:] * of.sizes
-        if self._turns and self.arc.advance is not None:
-            values += of.after_turns(self.arc.advance, self._turns)
-        return of.forces(values, v, t)
+        terms = np.cos(_ORDERS * angle) @ piece.series
+        if len(terms) > OF_LOADS:
+            terms[OF_LOADS:] *= self.arc.terms.sizes
+            if turns and self.arc.advance is not None:
+                terms[OF_LOADS:] += self.arc.terms.after_turns(self.arc.advance, turns)
+        return terms
 
     def rates(self, t: float, y: Array) -> Array:
         """See ``Stage``."""
@@ -612,20 +610,25 @@ class PathStage:
         v = w / size
         rest = p1 + v * p2
         if len(terms) > OF_LOADS:
-            by_stored, by_rest = self._forces(terms, v, np.array([t]))
+            by_stored, by_rest = self.arc.terms.forces(terms[OF_LOADS:], v, np.array([t]))
             stored, rest = stored + float(by_stored[0]), rest + float(by_rest[0])
         return np.array([v, (stored + rest) / (size * self._mass), 0.0, v * rest])
 
-    def by_time(self, t: float, y: Array) -> tuple[Callable[[Array], Array], Array] | None:
+    def unsmooth(
+        self, t: float, y: Array, dense: Callable[[Any], Array]
+    ) -> tuple[Callable[[Array], Array], Array] | None:
         """See ``Stage``."""
-        if not any(load.of_time for load in (*self.arc.terms.stored, *self.arc.terms.rest)):
+        of = self.arc.terms
+        if not (of.stored or of.rest):
             return None
-        terms = self._terms(float(y[0]))
-        root = math.sqrt(float(terms[0]) * self._mass)
-        v = float(y[1]) * self._mass / root
 
         def accelerations(times: Array) -> Array:
-            return np.add(*self._forces(terms, v, times))[None] / root
+            u, w = dense(times)[:2]
+            terms = np.stack([self._terms(one) for one in u.tolist()], axis=1)
+            if not (terms[0] > 0.0).all():
+                return np.full((1, len(times)), np.nan)
+            size = np.sqrt(terms[0] / self._mass)
+            return np.add(*of.forces(terms[OF_LOADS:], w / size, times))[None] / (size * self._mass)
 
         return accelerations, y[1:2]
 

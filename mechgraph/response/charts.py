@@ -353,7 +353,7 @@ class ChartStage:
         self._last = _Known(t, np.concatenate([x, dq, np.zeros_like(dq)]), *self._sizes)
         self._path = [self._last]
         self._ways = [self._followed(task.loads, x, dq)]
-        self._of_time = tuple(load for some in (task.loads.stored, task.loads.rest) for load in some if load.of_time)
+        self._unsmooth = tuple(load for load in (*task.loads.stored, *task.loads.rest) if not load.smooth)
         self._kernel: KernelRates | None = None
         self.trouble: Stopped | None = None
         self.engine = task.engine if task.library is None else COMPILED
@@ -462,17 +462,29 @@ class ChartStage:
         # where it does not close the rates are NaN as well, and the step is taken back
         return np.nan_to_num(np.pad(J, ((0, 0), (0, 2))), copy=False)
 
-    def by_time(self, t: float, y: Array) -> tuple[Callable[[Array], Array], Array] | None:
+    def unsmooth(
+        self, t: float, y: Array, dense: Callable[[Any], Array]
+    ) -> tuple[Callable[[Array], Array], Array] | None:
         """See ``Stage``."""
-        loads = self._of_time
-        if not (loads or len(self.task.columns)) or (loads and not self._evaluated(t, y)):
+        if not (self._unsmooth or len(self.task.columns)):
             return None
         rates = np.concatenate([y[self.n : -2], self.task.prescribed_at(np.array([t]))[1, :, 0]])
-        return (partial(_by_time, self.task, self._moved, loads) if loads else self._of_prescribed), rates
+        return partial(self._along, dense), rates
 
-    def _of_prescribed(self, t: Array) -> Array:
-        """Accelerations ``(n + p, T)`` that depend on time by themselves where no loads do."""
-        return np.concatenate([np.zeros((len(self.chart.moving), len(t))), self.task.prescribed_at(t)[2]])
+    def _along(self, dense: Callable[[Any], Array], t: Array) -> Array:
+        """Accelerations ``(n + p, T)`` at times of a step, see ``unsmooth``; those by the kernel are of all loads."""
+        y, own = dense(t), np.zeros((len(self.chart.moving), len(t)))
+        known = self.by_kernel(t, y) if self._unsmooth else None
+        if known is not None:
+            own = known[-self._sizes[1] :][self.chart.moving]
+        elif self._unsmooth:
+            for some in in_blocks(np.arange(len(t)), positions_together(self.task.system, self.n)):
+                closed, v = self.states(t[some], y[:, some])
+                columns = Columns(closed.here, closed.f, self.n, closed.held)
+                rates = (columns.Z * v).sum(axis=1) + (columns.Zp * self.task.prescribed_at(t[some])[1]).sum(axis=1)
+                found = applied(closed.here, self._unsmooth, Velocities(closed.here, rates), t[some])
+                own[:, some] = np.where(closed.done, columns.accelerations(*found)[0], np.nan)
+        return np.concatenate([own, self.task.prescribed_at(t)[2]])
 
     def _evaluated(self, t: float, y: Array) -> bool:
         """Evaluate at an accepted place, where that was not the last evaluation; whether the loops close there."""
@@ -514,20 +526,8 @@ class ChartStage:
         rates = found.rates
         state = np.concatenate([closed.here.x[:, 0], rates.dq[:, 0], rates.ddq[:, 0]])
         self._last = _Known(t, state, *self._sizes)
-        self._shape, self._y, self._moved = partial(self.chart.shape, closed.f), y[:, 0], found
+        self._shape, self._y = partial(self.chart.shape, closed.f), y[:, 0]
         return found
-
-
-def _by_time(task: Task, at: Moved, loads: tuple[Load, ...], t: Array) -> Array:
-    """Accelerations ``(n + p, T)`` of loads, and of the prescribed freedoms, at times, the state as it is ``at`` one."""
-    columns, here, force = at.columns, at.columns.here, np.zeros((at.columns.n, len(t)))
-    for some in in_blocks(np.arange(len(t)), positions_together(task.system, 1)):
-        many = here.part(np.zeros(len(some), dtype=np.intp))
-        velocities = Velocities(many, np.repeat(at.rates.dq[:, :1], len(some), axis=1))
-        wrenches, efforts = applied(many, loads, velocities, t[some])
-        force[:, some] = (columns.Z[..., :1] * (efforts + many.tree_efforts(wrenches))[:, None]).sum(axis=0)
-    own = accelerations(np.repeat(columns.mass[..., :1], len(t), axis=2), force)[0]
-    return np.concatenate([own, task.prescribed_at(t)[2]])
 
 
 Block = tuple[Index, Task, ClosedChart, Array]

@@ -1,10 +1,10 @@
 """Integration in time: steps and events.
 
-A look between the ends of a step at what depends on time by itself: a pulse between two evaluations leaves no trace in its error.
+A look between the ends of a step at what tables and functions do: a pulse between two evaluations leaves no trace in its error.
 
-Over a step of length ``h`` in which the motion is followed to a tolerance, a force of time is close to the polynomial of degree 15 through
-its values at Chebyshev points, all else held as it is where the step ends. Where it differs somewhere by an acceleration ``e``, the
-step may miss a change ``h e`` of a rate; it is refused where that is far above the tolerance.
+Over a step of length ``h`` in which the motion is followed to a tolerance, a force along it is close to the polynomial of degree 15
+through its values at Chebyshev points. Where it differs somewhere by an acceleration ``e``, the step may miss a change ``h e`` of a
+rate; it is refused where that is far above the tolerance.
 
 The equations of motion integrated in time by the steppers of scipy, stage after stage.
 
@@ -39,27 +39,27 @@ from mechgraph.result.solution import Solution
 POINTS_OF_STEP = 16
 """Chebyshev points of a step."""
 OF_ALL = 2000
-"""Places at which is looked from the beginning of a motion to its end: a pulse longer than this part of it is seen."""
+"""Places at which is looked from the beginning of a motion to its end: a pulse that takes a longer part of it is seen."""
 
 _AT = np.cos(np.pi * (np.arange(POINTS_OF_STEP) + 0.5) / POINTS_OF_STEP)
 _SERIES = np.polynomial.chebyshev.chebvander(_AT, POINTS_OF_STEP - 1) * (2.0 / POINTS_OF_STEP)
 _SERIES[:, 0] *= 0.5
 
 
-def overlooked(by_time: Callable[[Array], Array], begin: float, end: float, apart: float, allowed: Array) -> bool:
+def overlooked(along: Callable[[Array], Array], begin: float, end: float, apart: float, allowed: Array) -> bool:
     """Whether a step from ``begin`` to ``end`` may have missed something.
 
-    ``by_time(t (T,))``: accelerations ``(k, T)`` that depend on time by themselves; ``apart``: greatest distance of looks; ``allowed
+    ``along(t (T,))``: accelerations ``(k, T)`` of what need not be smooth, NaN where they are not known; ``apart``: greatest distance of looks; ``allowed
     (k,)``: changes of the rates within the tolerance.
     """
     h = end - begin
     # fewest places between them at which is looked
     places = np.linspace(-1.0, 1.0, max(64, int(np.ceil(h / apart))) + 1)
-    found = by_time(begin + 0.5 * h * (1.0 + np.concatenate([_AT, places])))
+    found = along(begin + 0.5 * h * (1.0 + np.concatenate([_AT, places])))
     smooth = (found[:, :POINTS_OF_STEP] @ _SERIES) @ np.polynomial.chebyshev.chebvander(places, POINTS_OF_STEP - 1).T
     missed = h * np.abs(found[:, POINTS_OF_STEP:] - smooth).max(axis=1)
     # change of a rate, against the tolerance of a step, up to which a difference is left to the error estimate of the step
-    return bool((missed > 100.0 * allowed).any())
+    return not bool((missed <= 100.0 * allowed).all())
 
 
 WATCHED_IN_STEP = np.union1d(np.linspace(0.0, 1.0, 9), [1e-5, 1.0 - 1e-5])
@@ -191,10 +191,11 @@ class Stage(Protocol):
     def jacobian(self) -> Callable[[float, Array], Array] | None:
         """Derivatives ``(k, k)`` of ``y'`` by ``y`` for implicit steppers; None to have them found by single evaluations."""
 
-    def by_time(self, t: float, y: Array) -> tuple[Callable[[Array], Array], Array] | None:
-        """Accelerations ``(k, T)`` at times ``(T,)`` of all that depends on time by itself, the rest as it is at one time with ``y``.
+    def unsmooth(self, t: float, y: Array, dense: Callable[[Any], Array]) -> tuple[Callable[[Array], Array], Array] | None:
+        """Accelerations ``(k, T)`` at times ``(T,)`` of a step by the loads that need not be smooth along it; NaN where not known.
 
-        Those of ``v``, then of the prescribed freedoms; and the rates ``(k,)`` that they change. None where nothing does.
+        Those of ``v``, then of the prescribed freedoms; and the rates ``(k,)`` that they change at its end ``t`` with ``y``. None where all
+        is smooth.
         """
 
     def accepted(self, t: float, y: Array) -> bool:
@@ -298,7 +299,7 @@ class Integration:
                             f"{message or ''} Steps collapse where loads are stiff or jump, and at positions where the mechanism locks or "
                             "only links without inertia move; for stiff loads use method='Radau'".strip()
                         )
-                    if not known or (not rounding and self._missed(stage, t, stepper)):
+                    if not known or (not rounding and self._missed(stage, t, stepper, dense)):
                         # part of a step that was refused with which the next is tried
                         h = 0.25 * (stepper.t - t)
                         break
@@ -332,13 +333,13 @@ class Integration:
         make = getattr(scipy.integrate, self.method)
         return make(between(stage.rates), t, y, end, rtol=self.rtol, atol=atol, max_step=self.max_step, **more)
 
-    def _missed(self, stage: Stage, begin: float, stepper: Any) -> bool:
-        """Whether a step that the stepper has just taken may have missed what depends on time by itself."""
-        end, y = stepper.t, stepper.y
-        by_time = stage.by_time(end, y)
-        if by_time is None:
+    def _missed(self, stage: Stage, begin: float, stepper: Any, dense: Callable[[Any], Array]) -> bool:
+        """Whether a step that the stepper has just taken may have missed what tables and functions do within it."""
+        end = stepper.t
+        unsmooth = stage.unsmooth(end, stepper.y, dense)
+        if unsmooth is None:
             return False
-        accelerations, rates = by_time
+        accelerations, rates = unsmooth
         inside = np.nextafter(begin, end), np.nextafter(end, begin)
         return overlooked(accelerations, *inside, self.apart, self.rtol * np.abs(rates) + self.atol)
 

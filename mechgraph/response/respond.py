@@ -634,8 +634,8 @@ def respond(
     method : str
         Integrator: explicit ``"RK23"``, ``"RK45"``, ``"DOP853"`` (default), for stiff loads ``"Radau"``, ``"BDF"``, ``"LSODA"``.
     max_step : float, optional
-        Longest step. Steps end at the ``breaks`` of loads. A look at 2,000 times between begin and end finds loads that steps missed; a
-        shorter pulse needs its ``breaks``, or ``max_step``.
+        Longest step. Steps end at the ``breaks`` of loads. A look at 2,000 times between begin and end finds pulses, and humps of tables
+        and functions of place or rate, that steps missed; shorter ones need ``breaks``, or ``max_step``.
     engine : {"auto", "dense", "sparse", "compiled"}
         As in ``solve``; the kernel finds the accelerations of independent freedoms, and tabulates the path of a single one.
     events : Event or iterable of Event, optional

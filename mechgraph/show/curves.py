@@ -36,6 +36,12 @@ class Abscissa:
     label: str
     degrees: bool = False
 
+    def at(self, marked: int, values: Array) -> tuple[float, float]:
+        """The point of a curve at the flat index of a position."""
+        if not -values.size <= marked < values.size:
+            raise DeclarationError("curve", [wrong(marked, "marked", f"the index of one of {values.size} positions")])
+        return self.values.reshape(-1)[marked], values.reshape(-1)[marked]
+
 
 def abscissa(s: Solution, over: str | None = None) -> Abscissa:
     """Values over which a solution is drawn, one for every position.
@@ -184,8 +190,7 @@ def effort_curve(
             draw_curve(side, x, effort.applied, label, color=colour if several else MUTED, ls=(0, (4, 2)))
         entries += 1 + effort.loaded
         if marked is not None:
-            at = x.values.reshape(-1)[marked], effort.known.reshape(-1)[marked]
-            side.plot(*at, "o", ms=8, mfc="white", mec=PALETTE[1], mew=2.2, zorder=5, label="_")
+            side.plot(*x.at(marked, effort.known), "o", ms=8, mfc="white", mec=PALETTE[1], mew=2.2, zorder=5, label="_")
     for couple, side in sides.items():
         side.axhline(0.0, color=MUTED, lw=0.8, zorder=0)
         own = [name for name, effort in found.items() if effort.couple == couple]
@@ -309,8 +314,7 @@ def reaction_curve(
             span = f"{np.nanmin(known):.4g} to {np.nanmax(known):.4g}"
             draw_curve(ax, x, known, f"{name}: {span} {unit}".rstrip(), color=colour)
             if marked is not None:
-                at = x.values.reshape(-1)[marked], known.reshape(-1)[marked]
-                ax.plot(*at, "o", ms=7, mfc="white", mec=colour, mew=2)
+                ax.plot(*x.at(marked, known), "o", ms=7, mfc="white", mec=colour, mew=2)
     ax.axhline(0.0, color=MUTED, lw=0.8, zorder=0)
     owner = m.pair(pair)
     lay_out(ax, x, axis_label(f"{what} of {owner.a} on {owner.b} in {pair}", unit))

@@ -225,7 +225,7 @@ class Drawing:
     def traces(self, traces: bool | Sequence[str], course: Scene) -> None:
         """Paths of pair points on link b, or on link a where b is the frame, and of named points: of all, of none, or of some by name."""
         known = traceable(course)
-        for name in known if traces is True else traces or ():
+        for name in () if traces is False else known if traces is True else traces:
             mover, path = known[name]
             if np.ptp(path, axis=0).max() > 1e-3 * self.scene.size:
                 pieces = _pieces(course, path)
