@@ -215,7 +215,7 @@ class FollowedPositions(Outcome):
             # the branch that was followed first, by its rates for unit rates of the drivers
             own = crossing.sides.Z.sum(axis=1) @ crossing.weights(np.array([place]))[:, 0]
             own *= np.where(line.system.is_length, line.system.par.L, 1.0) / unit[0]
-            ways = branches(line.system, x, line.leading, line.passive)
+            ways = branches(line.system, x, line.leading, line.passive, crossing.miss)
             off = [np.abs(np.array([*way.values()]) - own).max() for way in ways]
             yield PassedCrossing(at, crossing.miss, tuple(ways[i] for i in np.argsort(off)))
 

@@ -335,16 +335,18 @@ def _unit(a: Array) -> Array:
 
 
 def branches(
-    system: System, x: Array, columns: Index, passive: Sequence[PassiveMotion] = ()
+    system: System, x: Array, columns: Index, passive: Sequence[PassiveMotion] = (), miss: float = 0.0
 ) -> tuple[dict[str, float], ...]:
     """The branches that meet at a closed state ``x (nx,)``: rates of all freedoms by name, for unit rates of the drivers ``columns``.
 
     Of branches along which the drivers stand still the largest rate is one.
     Empty where there is one alone (without self-stresses there is no other), where more than ``BRANCHING_MOTIONS`` motions are possible,
     or where more than ``MOST_BRANCHES`` directions are: then a freedom is left free. The rank is decided
-    to the accuracy with which closing meets a singular position (``RANKS.nearby``). Passive motions are at rest.
+    to the accuracy with which closing meets a singular position (``RANKS.nearby``), and one that ``miss`` opens is found at all: branches
+    that pass each other at a distance leave its square. Passive motions are at rest.
     """
-    found = rank_of_rows(ClosureRows.at(Configuration(system, x[:, None])), tolerance=RANKS.nearby)
+    near = max(RANKS.nearby, 10.0 * np.sqrt(miss))
+    found = rank_of_rows(ClosureRows.at(Configuration(system, x[:, None])), tolerance=near)
     N = found.motions
     if passive:
         idle, _ = np.linalg.qr(np.stack([p.rates for p in passive], axis=1))

@@ -305,3 +305,21 @@ def test_a_narrow_gap_is_followed_or_told_whatever_stands_beside(engine, size, g
         (told,) = s.warnings
         assert told.miss == pytest.approx(gap, rel=1.0)
         assert len(told.branches) == 2
+
+
+@pytest.mark.parametrize("short", [1e-10, 4e-11, 1e-12])
+def test_what_passes_a_gap_that_is_crossed_is_told_with_both_branches(short):
+    """The slider of a rod as long as the crank goes on as 2 cos t, or stands still behind t = pi / 2."""
+    start, rod = 0.3, 1.0 - short
+    out = np.cos(start) + np.sqrt((rod - np.sin(start)) * (rod + np.sin(start)))
+    pairs = [
+        mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=Z),
+        mg.Pair("B", "R", "crank", "rod", point=(np.cos(start), np.sin(start), 0), axis=Z),
+        mg.Pair("C", "R", "rod", "slider", point=(out, 0, 0), axis=Z),
+        mg.Pair("D", "P", "frame", "slider", point=(out, 0, 0), axis=(1, 0, 0)),
+    ]
+    s = mg.kinematics(mg.Mechanism("slider", None, pairs, ["A"]), {"A": [1.0, 2.0]}, on_reach="flag")
+    for told in s.warnings if (s.status == "ok").all() else ():
+        assert told.miss == pytest.approx(short, rel=1.0)
+        assert [way["D.Tz"] for way in told.branches] == pytest.approx([-2.0, 0.0], abs=1e-3)
+    assert s.warnings
