@@ -261,6 +261,20 @@ def test_a_throw_that_just_passes_a_height_passes_it_twice(of, value):
     assert not r.events
 
 
+def test_what_an_event_passes_many_times_in_a_step_is_passed_each_time():
+    """At a constant rate, in few long steps: a wave of the place, and a hump a six hundredth of the way wide."""
+    events = [
+        mg.Event(lambda s: np.sin(2 * s["P"].position[0]), 0.5),
+        mg.Event(lambda s: np.exp(-np.square((s["P"].position[0] - 53.3) / 0.1)), 0.5),
+    ]
+    r = mg.respond(block(), (0, 100), rates={"P": 1.0}, events=events)
+    assert r.work.steps < 20
+    first = (np.pi * np.arange(64) + np.arcsin(0.5) * (-1.0) ** np.arange(64)) / 2
+    np.testing.assert_allclose([one.t for one in r.events if one.event is events[0]], first, atol=1e-8)
+    half = 0.1 * np.sqrt(np.log(2))
+    np.testing.assert_allclose([one.t for one in r.events if one.event is events[1]], [53.3 - half, 53.3 + half], atol=1e-8)
+
+
 @pytest.mark.parametrize("limit", [0.9, 0.999, 1 - 1e-6])
 def test_a_stop_that_is_just_grazed_is_met(limit):
     """An amplitude of 1 against a stop: met where -cos t reaches it, not where it does not."""

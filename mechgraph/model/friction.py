@@ -100,7 +100,8 @@ class Friction(Load):
             raise DeclarationError(
                 self.where.removesuffix(": "),
                 [
-                    "friction follows the reactions, and is solved with them in solve, study and respond; pass loads= without it here"
+                    "friction follows the reactions, and is solved with them in solve, study and respond; leave it out here, "
+                    "m.replace(loads=...)"
                 ],
             )
         for name in site.freedoms_of(self.of) if self.viscous else ():

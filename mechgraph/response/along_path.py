@@ -581,23 +581,46 @@ class PathStage:
 
     def _terms(self, u: float) -> Array:
         """Values of the series at a place; those of freedoms and links in the user's units."""
-        piece, turns = self._piece, self._turns
-        w = u - self.arc.turn * turns
-        if piece is None or not min(piece.begin, piece.end) <= w <= max(piece.begin, piece.end):
+        z = self._in_piece(u)
+        if self._piece is None or not -1.0 <= z <= 1.0:
             found = self.arc.piece(u)
             if found is None:
                 return np.full(OF_LOADS + len(self.arc.terms.sizes), np.nan)
-            self._piece, self._turns = piece, turns = found
-            w = u - self.arc.turn * turns
-        z = (2.0 * w - piece.begin - piece.end) / (piece.end - piece.begin)
+            self._piece, self._turns = found
+            z = self._in_piece(u)
         # Chebyshev polynomials by their angles: one cosine each
         angle = math.acos(min(1.0, max(-1.0, z)))
-        terms = np.cos(_ORDERS * angle) @ piece.series
-        if len(terms) > OF_LOADS:
-            terms[OF_LOADS:] *= self.arc.terms.sizes
-            if turns and self.arc.advance is not None:
-                terms[OF_LOADS:] += self.arc.terms.after_turns(self.arc.advance, turns)
+        return self._in_units(np.cos(_ORDERS * angle) @ self._piece.series)
+
+    def _in_piece(self, u: Any) -> Any:
+        """Places from -1 to 1 in the piece last used."""
+        if self._piece is None:
+            return np.nan
+        w = u - self.arc.turn * self._turns
+        return (2.0 * w - self._piece.begin - self._piece.end) / (self._piece.end - self._piece.begin)
+
+    def _in_units(self, terms: Array) -> Array:
+        """Values ``(..., 4 + m)`` of the series, those of freedoms and links in the user's units."""
+        if terms.shape[-1] > OF_LOADS:
+            terms[..., OF_LOADS:] *= self.arc.terms.sizes
+            if self._turns and self.arc.advance is not None:
+                terms[..., OF_LOADS:] += self.arc.terms.after_turns(self.arc.advance, self._turns)
         return terms
+
+    def _terms_at(self, u: Array) -> Array:
+        """Values ``(4 + m, T)`` of the series at places ``(T,)``, piece by piece."""
+        out = np.empty((OF_LOADS + len(self.arc.terms.sizes), len(u)))
+        left = np.ones(len(u), dtype=bool)
+        while left.any():
+            first = int(np.argmax(left))
+            out[:, first], left[first] = self._terms(float(u[first])), False
+            z = self._in_piece(u)
+            here = left & (np.abs(z) <= 1.0)
+            if here.any() and self._piece is not None:
+                angles = np.arccos(z[here])
+                out[:, here] = self._in_units(np.cos(angles[:, None] * _ORDERS) @ self._piece.series).T
+                left &= ~here
+        return out
 
     def rates(self, t: float, y: Array) -> Array:
         """See ``Stage``."""
@@ -624,7 +647,7 @@ class PathStage:
 
         def accelerations(times: Array) -> Array:
             u, w = dense(times)[:2]
-            terms = np.stack([self._terms(one) for one in u.tolist()], axis=1)
+            terms = self._terms_at(u)
             if not (terms[0] > 0.0).all():
                 return np.full((1, len(times)), np.nan)
             size = np.sqrt(terms[0] / self._mass)

@@ -80,10 +80,11 @@ class Watched(Protocol):
 
 @dataclass
 class Watch:
-    """Events watched along a motion."""
+    """Events watched along a motion, looked at in times no further ``apart``."""
 
     events: Sequence[Event]
     motion: Watched
+    apart: float = np.inf
     _before: dict[int, float] = field(default_factory=dict)
 
     def passed(self, begin: float, end: float) -> Iterator[Occurrence]:
@@ -91,7 +92,8 @@ class Watch:
         found = []
         for which, event in enumerate(self.events):
             height = partial(_heights, event, self.motion)
-            t = begin + (end - begin) * WATCHED_IN_STEP
+            even = np.linspace(0.0, 1.0, int(np.ceil((end - begin) / self.apart)) + 1)
+            t = begin + (end - begin) * np.union1d(WATCHED_IN_STEP, even)
             known = [self._before[which]] if which in self._before else []
             h = np.concatenate([known, height(t[len(known) :])])
             self._before[which] = float(h[-1])

@@ -766,7 +766,7 @@ def _followed(
     happened: list[Occurrence] = []
     last, why = None, ""
     try:
-        for one in _occurrences(course, stops, Watch(watched, course), x, dq, progress):
+        for one in _occurrences(course, stops, Watch(watched, course, course.integration.apart), x, dq, progress):
             happened.append(one)
             if one.event.terminal:
                 last, why = one.t, str(one)
