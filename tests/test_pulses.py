@@ -54,7 +54,9 @@ NARROW = {
     "distance": lambda: mg.ForceLaw(
         ("frame", "body", (-9, 0, 0), (0, 0, 0)), law=mg.ForceTable(x=[0, 36.6, 36.7, 36.8, 1e3], **HUMP)
     ),
-    "effort": lambda: mg.Effort("P", lambda pose, twist, t: 40 * np.clip(1 - 10 * np.abs(pose[..., 0, 3] - 27.7), 0, None)),
+    "effort": lambda: mg.Effort(
+        "P", lambda pose, twist, t: 40 * np.clip(1 - 10 * np.abs(pose[..., 0, 3] - 27.7), 0, None)
+    ),
 }
 
 
@@ -272,7 +274,9 @@ def test_what_an_event_passes_many_times_in_a_step_is_passed_each_time():
     first = (np.pi * np.arange(64) + np.arcsin(0.5) * (-1.0) ** np.arange(64)) / 2
     np.testing.assert_allclose([one.t for one in r.events if one.event is events[0]], first, atol=1e-8)
     half = 0.1 * np.sqrt(np.log(2))
-    np.testing.assert_allclose([one.t for one in r.events if one.event is events[1]], [53.3 - half, 53.3 + half], atol=1e-8)
+    np.testing.assert_allclose(
+        [one.t for one in r.events if one.event is events[1]], [53.3 - half, 53.3 + half], atol=1e-8
+    )
 
 
 @pytest.mark.parametrize("limit", [0.9, 0.999, 1 - 1e-6])

@@ -172,7 +172,8 @@ class Friction(Load):
             yield "mu: is missing; give the coefficient of friction"
         # what is no number, or below zero, is a fault of its own
         mu, static, part = (
-            of if isinstance(of, int | float) and 0 <= of < np.inf else np.nan for of in (self._mu, self.static, self.efficiency)
+            of if isinstance(of, int | float) and 0 <= of < np.inf else np.nan
+            for of in (self._mu, self.static, self.efficiency)
         )
         if static < mu:
             yield wrong(self.static, "static", f"mu = {mu:g} or more")

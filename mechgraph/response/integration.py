@@ -193,7 +193,9 @@ class Stage(Protocol):
     def jacobian(self) -> Callable[[float, Array], Array] | None:
         """Derivatives ``(k, k)`` of ``y'`` by ``y`` for implicit steppers; None to have them found by single evaluations."""
 
-    def unsmooth(self, t: float, y: Array, dense: Callable[[Any], Array]) -> tuple[Callable[[Array], Array], Array] | None:
+    def unsmooth(
+        self, t: float, y: Array, dense: Callable[[Any], Array]
+    ) -> tuple[Callable[[Array], Array], Array] | None:
         """Accelerations ``(k, T)`` at times ``(T,)`` of a step by the loads that need not be smooth along it; NaN where not known.
 
         Those of ``v``, then of the prescribed freedoms; and the rates ``(k,)`` that they change at its end ``t`` with ``y``. None where all
