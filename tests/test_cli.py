@@ -131,6 +131,8 @@ def test_files_as_the_suffix_says(tmp_path: Path) -> None:
     assert "unknown file extension '.zzz'; known: .toml (TOML), .xml" in bad(
         "save", "rcsr", "--out", tmp_path / "m.zzz"
     )
+    assert ".pdf (document), .gif (animated GIF), .mp4 (film)" in bad("plot", "rcsr", "--out", tmp_path / "m.foo")
+    assert ".gif" not in bad("plot", "rcsr", "effort", "--out", tmp_path / "m.foo")
     assert "unknown file extension '.pdf'; known: .html" in bad("report", "rcsr", "--out", tmp_path / "m.pdf")
     with pytest.raises(mg.FileError, match=r"known: \.html"):
         mg.write_report(mg.load("rcsr"), path=tmp_path / "m.pdf")

@@ -556,10 +556,11 @@ def plot(
         opt.refuse(f"WHAT {what!r}", f"expected one of {', '.join(KINDS)}")
     kind, m = KINDS[what], opt.loaded(mechanism, friction)
     target = Path(f"{Path(mechanism).stem}.png") if out is None else out
+    films = FILMS[:2] if what == "skeleton" else ()
     film = what == "skeleton" and (
-        frames is not None or target.suffix.lower() in (s for one in FILMS[:2] for s in one.suffixes)
+        frames is not None or target.suffix.lower() in (s for one in films for s in one.suffixes)
     )
-    opt.check_out(target, mechanism, FILMS if film else PICTURES)
+    opt.check_out(target, mechanism, FILMS if film else (*PICTURES, *films))
     asked = _PictureOptions(tuple(of or ()), over, position, forces, moment)
     still = what == "skeleton" and not (film or drive or any(d.motion is not None for d in m.drives))
     moves = kind.moves and not still
