@@ -120,6 +120,107 @@ int mgk_along(const int *I, const double *P, void *memory, int count, int stored
   return MGK_OK;
 }
 
+/* A path of mobility 1 tabulated in pieces: series of `points` Chebyshev polynomials of the four terms of its equation of motion, behind both
+ * ends of a piece; about: places up to which it is tabulated, and between which a table may be asked for, where it begins, whole turn after
+ * which all comes back (0: none), its sense, mass at which rates are told. */
+enum { LOW, HIGH, LEAST, MOST, BEGIN, TURN, SENSE, MASS };
+typedef struct { int pieces, points; const double *piece, *about; double *asked; } Table;
+
+/* y' of y = (u, w, lost, work); 1 where it is not tabulated yet, the place `asked` for. */
+static int rates_along(const Table *s, const double *y, double *out) {
+  const double *about = s->about, turn = about[TURN], sense = about[SENSE];
+  const double u = turn > 0.0 ? y[0] - turn * (sense * floor(sense * (y[0] - about[BEGIN]) / turn)) : y[0];
+  double term[4] = {NAN, NAN, NAN, NAN};
+  if (u >= about[LOW] && u <= about[HIGH] && s->pieces) {
+    int first = 0, behind = s->pieces;
+    const size_t width = 2 + 4 * s->points;
+    while (behind - first > 1) {
+      const int middle = (first + behind) / 2;
+      if (fmin(s->piece[middle * width], s->piece[middle * width + 1]) <= u) first = middle;
+      else behind = middle;
+    }
+    const double *p = s->piece + first * width, z = (2.0 * u - p[0] - p[1]) / (p[1] - p[0]);
+    FOR(k, 4) {
+      double one = 0.0, two = 0.0;
+      for (int i = s->points - 1; i > 0; i--) {
+        const double next = p[2 + 4 * i + k] + 2.0 * z * one - two;
+        two = one, one = next;
+      }
+      term[k] = p[2 + k] + z * one - two;
+    }
+  } else if (u > about[LEAST] && u < about[MOST]) return *s->asked = y[0], 1;
+  const double size = sqrt(term[0] / about[MASS]), v = y[1] / size, rest = term[2] + v * term[3];
+  out[0] = v, out[1] = (term[1] + rest) / (size * about[MASS]), out[2] = 0.0 * v, out[3] = v * rest;
+  if (!(term[0] > 0.0)) FOR(i, 4) out[i] = NAN;
+  return 0;
+}
+
+/* Stages `first` to `last` of an explicit Runge-Kutta method with coefficients A[last - first][width] into slope[last][4]. */
+static int stages_along(const Table *s, int first, int last, int width, const double *A, double h, const double *begin, double *slope) {
+  for (int i = first; i < last; i++, A += width) {
+    double y[4];
+    FOR(k, 4) {
+      y[k] = 0.0;
+      FOR(j, i) y[k] += A[j] * slope[4 * j + k];
+      y[k] = begin[k] + h * y[k];
+    }
+    if (rates_along(s, y, slope + 4 * i)) return 1;
+  }
+  return 0;
+}
+
+/* A step of the method of Dormand and Prince of order 8 along a table, by the rules of scipy's DOP853, of which rule[] has A, B, E3, E5,
+ * A_EXTRA and D, from at[] = time, length, and y with its slope, which become those at its end, towards `bound`. dense[7][4]: the
+ * polynomial over the step. 0, or 1 where it is shorter than rounding, 2 where it leads to a place at[2] that is not tabulated: nothing else is changed. */
+int mgk_step_along(int pieces, int points, const double *piece, const double *about, const double *rule, double bound, double longest,
+                   double relative, const double *absolute, double *at, double *y, double *slope, double *dense, int *evaluations) {
+  enum { N = 12, ALL = 16 };
+  const Table table = {pieces, points, piece, about, at + 2};
+  const double *A = rule, *B = A + N * N, *E3 = B + N, *E5 = E3 + N + 1, *A_EXTRA = E5 + N + 1, *D = A_EXTRA + 3 * ALL;
+  const double least = 10.0 * (nextafter(at[0], INFINITY) - at[0]);
+  double K[4 * ALL], end[4], length = fmax(fmin(at[1], longest), least), error, there, h;
+  int evaluated = 3;
+  memcpy(K, slope, 4 * sizeof(double));
+  for (int refused = 0;; refused = 1) {
+    if (length < least) return 1;
+    there = fmin(at[0] + length, bound), h = there - at[0];
+    evaluated += N;
+    if (stages_along(&table, 1, N, N, A + N, h, y, K)) return 2;
+    double fifth = 0.0, third = 0.0;
+    FOR(k, 4) {
+      end[k] = 0.0;
+      FOR(j, N) end[k] += B[j] * K[4 * j + k];
+      end[k] = y[k] + h * end[k];
+    }
+    if (rates_along(&table, end, K + 4 * N)) return 2;
+    FOR(k, 4) {
+      double e5 = 0.0, e3 = 0.0;
+      const double scale = absolute[k] + relative * fmax(fabs(y[k]), fabs(end[k]));
+      FOR(j, N + 1) e5 += E5[j] * K[4 * j + k], e3 += E3[j] * K[4 * j + k];
+      fifth += e5 * e5 / (scale * scale), third += e3 * e3 / (scale * scale);
+    }
+    error = fifth == 0.0 && third == 0.0 ? 0.0 : h * fifth / sqrt(4.0 * (fifth + 0.01 * third));
+    const double grown = 0.9 * pow(error, -0.125);
+    if (error < 1.0) {
+      length = h * (refused ? fmin(1.0, grown) : fmin(10.0, grown));
+      break;
+    }
+    length = h * fmax(0.2, grown);
+  }
+  if (stages_along(&table, N + 1, ALL, ALL, A_EXTRA, h, y, K)) return 2;
+  FOR(k, 4) {
+    double *F = dense + k;
+    F[0] = end[k] - y[k], F[4] = h * K[k] - F[0], F[8] = 2.0 * F[0] - h * (K[4 * N + k] + K[k]);
+    FOR(i, 4) {
+      F[12 + 4 * i] = 0.0;
+      FOR(j, ALL) F[12 + 4 * i] += h * D[i * ALL + j] * K[4 * j + k];
+    }
+  }
+  at[0] = there, at[1] = length, *evaluations += evaluated;
+  memcpy(y, end, 4 * sizeof(double)), memcpy(slope, K + 4 * N, 4 * sizeof(double));
+  return 0;
+}
+
 /* One step from a mechanism of tables m[0], closed in node a, by m[1] at `part` of it to m[2]: whether node b there is on the same regular
  * branch.
  *

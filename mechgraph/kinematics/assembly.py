@@ -390,6 +390,9 @@ def assembled_at(
         return _state(here)
     system, x = assembled(m, values)
     columns, goal = named_columns(m, system, values)
+    if (x[system.single_rows[columns]] == goal).all():
+        _refuse_beyond_ends(m, system, x, values)
+        return system, x
     _refuse_far(
         m, values, goal - x[system.single_rows[columns]], np.where(system.is_length[columns], system.par.L, 1.0)
     )

@@ -225,7 +225,7 @@ class Way:
         self.crossings: list[Crossing] = []
         # length of path that is tabulated first (radians, or lengths / L); every further part is twice as long as the one before
         self._next, self._ended = 0.8, False
-        self._pieces: list[SeriesPiece] = []
+        self.pieces: list[SeriesPiece] = []
         self._starts: list[float] = []
         here = Paths([self._drives(np.zeros(2))])
         self._nodes = self.follower.follow(x[:, None], here).nodes
@@ -236,7 +236,7 @@ class Way:
 
     def piece(self, at: float) -> SeriesPiece:
         """The piece in which a place lies."""
-        return self._pieces[max(0, bisect_right(self._starts, at) - 1)]
+        return self.pieces[max(0, bisect_right(self._starts, at) - 1)]
 
     def extend(self, most: float) -> None:
         """Tabulate the next part, up to ``most`` at first."""
@@ -257,7 +257,7 @@ class Way:
         self._interpolation = Interpolation(self.path, self._nodes)
         if place > self.length:
             pieces = self._tabulated(self.length, place)
-            self._pieces += pieces
+            self.pieces += pieces
             self._starts += [self.sense * (p.begin - self.begin) for p in pieces]
             self.length = place
 
@@ -508,6 +508,23 @@ class Arc:
                 return self.piece(u)
         return None if at > way.length or not way.length else (way.piece(at), turns)
 
+    def tabulated(self) -> tuple[Array, Array]:
+        """All pieces in order, their ends and series ``(n, 2 + 4 POINTS)``; places between which they lie, and between which more may be
+        asked for; begin, turn and its sense.
+        """
+        low, high = (self._ways.get(sense) for sense in (-1, 1))
+        pieces = sorted(
+            (p for way in (low, high) if way is not None for p in way.pieces), key=lambda p: min(p.begin, p.end)
+        )
+        lengths = [0.0 if way is None else way.length for way in (low, high)]
+        further = [FURTHEST * (way is None or not way.closed) for way in (low, high)]
+        about = [self.begin - lengths[0], self.begin + lengths[1]]
+        turn = 0.0 if self.advance is None else self.turn
+        about += [about[0] - further[0], about[1] + further[1], self.begin, turn, self._sense]
+        return np.array([[p.begin, p.end, *p.series.ravel()] for p in pieces]).reshape(
+            len(pieces), 2 + OF_LOADS * POINTS
+        ), np.array(about)
+
     def _turns(self, u: Array) -> Array:
         """Whole turns by which places ``u (T,)`` are further on than where they are tabulated."""
         if self.advance is None:
@@ -578,6 +595,15 @@ class PathStage:
     def begin(self) -> Array:
         """See ``Stage``."""
         return self._first
+
+    def table(self, place: float | None = None) -> tuple[Any, Array, Array] | None:
+        """See ``Stage``."""
+        if self.task.library is None or self.arc.terms.stored or self.arc.terms.rest:
+            return None
+        if place is not None:
+            self.arc.piece(place)
+        pieces, about = self.arc.tabulated()
+        return self.task.library, pieces, np.append(about, self._mass)
 
     def _terms(self, u: float) -> Array:
         """Values of the series at a place; those of freedoms and links in the user's units."""

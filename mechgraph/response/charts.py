@@ -382,6 +382,9 @@ class ChartStage:
         """See ``Stage``."""
         return self._first
 
+    def table(self, place: float | None = None) -> None:
+        """See ``Stage``: charts have none."""
+
     def rates(self, t: float, y: Array) -> Array:
         """See ``Stage``."""
         here = self._by_kernel(t, y)

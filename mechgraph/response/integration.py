@@ -16,6 +16,7 @@ done since the start.
 
 from __future__ import annotations
 
+import ctypes
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import field, replace
@@ -26,6 +27,7 @@ import numpy as np
 import scipy
 
 from mechgraph.errors import MechgraphWarning, counted
+from mechgraph.kernel.tables import pointer
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import RESPONSE
 from mechgraph.memo import dataclass
@@ -186,6 +188,11 @@ class Stage(Protocol):
     def begin(self) -> Array:
         """The coordinates ``y`` where the stage begins; its last two, what friction took and the work, are 0."""
 
+    def table(self, place: float | None = None) -> tuple[Any, Array, Array] | None:
+        """The library of the kernel with the tables of all that ``rates`` needs (``mgk_step_along``), as far as known or, if it can be,
+        to a ``place`` asked for; None where ``rates`` are to be asked.
+        """
+
     def rates(self, t: float, y: Array) -> Array:
         """``y'``; NaN where the coordinates do not reach (the stepper takes a shorter step)."""
 
@@ -218,6 +225,74 @@ class Stage(Protocol):
 
     def by_kernel(self, t: Array, y: Array) -> Array | None:
         """States, rates and accelerations ``(nx + 2 F, T)`` at such places by the kernel; None where it does not serve."""
+
+
+@dataclass(frozen=True)
+class StepPolynomial:
+    """The polynomial of DOP853 over a step from ``y (k,)`` at a time ``begin`` on, with coefficients ``F (7, k)``."""
+
+    begin: float
+    length: float
+    y: Array
+    F: Array
+
+    def __call__(self, t: Any) -> Array:
+        """``y (k, ...)`` at times."""
+        x = ((np.asarray(t) - self.begin) / self.length)[..., None]
+        out = np.zeros_like(self.y)
+        for i, f in enumerate(self.F[::-1]):
+            out = (out + f) * (1.0 - x if i % 2 else x)
+        return np.asarray((out + self.y).T)
+
+
+class StepsInKernel:
+    """The stepper DOP853 of scipy, its first step and coefficients, with steps taken by the kernel along the tables of a stage."""
+
+    def __init__(
+        self, stage: Stage, rates: Callable[[float, Array], Array], t: float, y: Array, end: float, **how: Any
+    ) -> None:
+        first = scipy.integrate.DOP853(rates, t, y, end, **how)
+        parts = [getattr(first, name).ravel() for name in ("A", "B", "E3", "E5", "A_EXTRA", "D")]
+        self._given = np.concatenate(parts), how["atol"]
+        self._bounds = [ctypes.c_double(value) for value in (end, how["max_step"], how["rtol"])]
+        self._at, self._slope = np.array([t, first.h_abs, 0.0]), first.f.copy()
+        self._evaluations, self._end = np.array([first.nfev], dtype=np.intc), end
+        self._stage, self._table = stage, stage.table()
+        self.t, self.y, self.status = t, y, "running"
+
+    @property
+    def nfev(self) -> int:
+        """Number of evaluations."""
+        return int(self._evaluations[0])
+
+    def step(self) -> str | None:
+        """Take a step; why it failed."""
+        y, dense, (rule, atol) = self.y.copy(), np.empty((7, len(self.y))), self._given
+        found = 2
+        while found == 2:
+            assert self._table is not None
+            library, pieces, about = self._table
+            sizes = map(ctypes.c_int, (len(pieces), (pieces.shape[-1] - 2) // 4))
+            begun = (
+                *map(pointer, (pieces, about, rule)),
+                *self._bounds,
+                *map(pointer, (atol, self._at, y, self._slope, dense)),
+            )
+            found = library.mgk_step_along(*sizes, *begun, pointer(self._evaluations))
+            if found == 2:
+                self._table = self._stage.table(float(self._at[2]))
+        if found:
+            self.status = "failed"
+            return "Required step size is less than spacing between numbers."
+        length = float(self._at[0]) - self.t
+        self._polynomial = StepPolynomial(self.t, length, self.y, dense)
+        self.t, self.y = float(self._at[0]), y
+        self.status = "finished" if self.t >= self._end else "running"
+        return None
+
+    def dense_output(self) -> StepPolynomial:
+        """The polynomial over the last step."""
+        return self._polynomial
 
 
 @dataclass(frozen=True)
@@ -334,7 +409,9 @@ class Integration:
         more: dict[str, Any] = {} if first is None else {"first_step": min(first, end - t)}
         if self.method not in EXPLICIT:
             more["jac"] = stage.jacobian and between(stage.jacobian)
-        make = getattr(scipy.integrate, self.method)
+        make: Any = getattr(scipy.integrate, self.method)
+        if self.method == "DOP853" and stage.table() is not None:
+            make = partial(StepsInKernel, stage)
         return make(between(stage.rates), t, y, end, rtol=self.rtol, atol=atol, max_step=self.max_step, **more)
 
     def _missed(self, stage: Stage, begin: float, stepper: Any, dense: Callable[[Any], Array]) -> bool:
