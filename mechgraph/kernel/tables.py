@@ -557,18 +557,18 @@ def why_not_load(load: Load, m: Mechanism) -> str | None:
     """What of a load on a mechanism the kernel cannot carry; None where it is numbers of the tables."""
     values = [getattr(load, name) for name in load.formats]
     given = [name for name in load.over_positions if not isinstance(getattr(load, name), PerCase)]
-    where = f"load {load.where.removesuffix(': ')}"
+    why = ""
     if type(load) not in KINDS or given or any(callable(value) for value in values):
-        return f"{where} is a function, or varies over positions"
-    if isinstance(load, ForceLaw) and (not isinstance(load.law, ForceTable) or load.law.pieces is None):
-        return f"{where} is a function, or a table over coordinate and rate"
-    if isinstance(load, Law) and load.in_freedom is None and load.freedoms:
-        return f"{where} acts between points and reads the freedom {load.reads_freedom!r}"
-    if isinstance(load, Law) and load.in_freedom is None and load.along is not None:
-        return f"{where} acts along a fixed direction"
-    if isinstance(load, Friction) and load.of in m.pair_index and m.pair(load.of).type.opens:
-        return f"{where} is friction of a pair that may open"
-    return None
+        why = "is a function, or varies over positions"
+    elif isinstance(load, ForceLaw) and (not isinstance(load.law, ForceTable) or load.law.pieces is None):
+        why = "is a function, or a table over coordinate and rate"
+    elif isinstance(load, Law) and load.in_freedom is None and load.freedoms:
+        why = f"acts between points and reads the freedom {load.reads_freedom!r}"
+    elif isinstance(load, Law) and load.in_freedom is None and load.along is not None:
+        why = "acts along a fixed direction"
+    elif isinstance(load, Friction) and load.of in m.pair_index and m.pair(load.of).type.opens:
+        why = "is friction of a pair that may open"
+    return f"load {load.where.removesuffix(': ')} {why}" if why else None
 
 
 def rows(value: Any, width: int = 1) -> Array:

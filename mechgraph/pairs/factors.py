@@ -15,6 +15,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import TypeVar, cast
 
 import numpy as np
@@ -434,13 +435,21 @@ class ScrewStack(Stack):
 
     def coefficients(self, pitch: Array, back: Flags) -> Array:
         """``screw_terms``; ``exp(-q s)`` changes the sign of the odd values, ``sin q`` and ``q``."""
-        out = screw_terms(self.constant_twists(pitch)[:, 0])
+        out = screw_terms(self.constant_twists(pitch)[:, 0]) if self._plain is None else self._plain[1].copy()
         out[:, :, 1::2, back] *= -1.0
         return out
 
     def constant_twists(self, pitch: Array) -> Array:
         """The unit twists."""
-        return _unit_twists(self.factors, self.counts, pitch)
+        return _unit_twists(self.factors, self.counts, pitch) if self._plain is None else self._plain[0]
+
+    @cached_property
+    def _plain(self) -> tuple[Array, Array] | None:
+        """Unit twists and ``screw_terms`` where no pitch is in them: those of all mechanisms of a graph."""
+        if any(any(f.freedom.per_pitch) for f in self.factors):
+            return None
+        twists = _unit_twists(self.factors, self.counts, np.zeros((0, 1)))
+        return twists, screw_terms(twists[:, 0])
 
 
 @dataclass(frozen=True)
