@@ -30,7 +30,7 @@ from mechgraph.kinematics.touching import ContactLines
 from mechgraph.maths.se3 import Array, Index, cross, skew
 from mechgraph.maths.tolerances import MOTIONS, STRESSES
 from mechgraph.memo import dataclass
-from mechgraph.model.friction import Friction, Rubs, places_in
+from mechgraph.model.friction import Friction, Rubs, place_of_coupling, places_in, way_of
 from mechgraph.model.gear_facts import mean_sliding
 from mechgraph.pairs.contact_types import pressing
 
@@ -312,9 +312,9 @@ def _between_teeth(
     """Teeth on the flanks of signs ``(n, T)``: ``mu N`` against the sliding at the pitch point, or the couple ``mu N arm`` against the
     relative turn; with an efficiency as much of it as leaves that.
     """
-    s, g = here.system, _coupling(here, load)
+    s, g = here.system, place_of_coupling(here.system.m, load)
     push, P = lines.push(g, flank)
-    way = _way(here, load)
+    way = way_of(here.system.m, load)
     twist = _passed_by(here, dq, way)
     rounding, arm = MOTIONS.rounding * np.abs(twist).max(axis=0), mean_sliding(s.m, s.m.couplings[g])
     if arm is None:
@@ -332,19 +332,6 @@ def _between_teeth(
     A = np.concatenate([np.zeros((3, here.T)), across])[None]
     preload = np.broadcast_to(load.preload / s.par.L, here.T)
     return Place(load.of, len(s.m.pairs) + g, way, A, -part * U, np.zeros((6, 1, here.T)), preload, speed)
-
-
-def _coupling(here: Configuration, load: Friction) -> int:
-    """The number of the coupling that rubs."""
-    return next(g for g, c in enumerate(here.system.m.couplings) if c.name == load.of)
-
-
-def _way(here: Configuration, load: Friction) -> tuple[tuple[int, float], ...]:
-    """The pairs that friction would pass through, in these senses: the pair that rubs, or those on the way between gears."""
-    m = here.system.m
-    if load.of in m.pair_index:
-        return ((m.pair_index[load.of], 1.0),)
-    return tuple((step.pair, step.sense) for step in m.couplings[_coupling(here, load)].steps)
 
 
 @dataclass(frozen=True)
@@ -366,9 +353,9 @@ class Grip:
     def of(cls, here: Configuration, load: Friction) -> Grip:
         """Where a pair touches, the forces along its tangents; of teeth couples, or forces at the pitch point."""
         m, T = here.system.m, here.T
-        way, none = _way(here, load), np.zeros((here.system.n_freedoms, T))
+        way, none = way_of(m, load), np.zeros((here.system.n_freedoms, T))
         if load.of not in m.pair_index:
-            g, directions = _coupling(here, load), np.broadcast_to(np.eye(3)[:, :, None], (3, 3, T))
+            g, directions = place_of_coupling(m, load), np.broadcast_to(np.eye(3)[:, :, None], (3, 3, T))
             gears = m.couplings[g].gears(m)
             links = m.link_index[gears[0]], m.link_index[gears[1]]
             if mean_sliding(m, m.couplings[g]) is not None:
@@ -456,7 +443,7 @@ class Rubbed:
 
     def with_grip(self, here: Configuration, grip: Grip, sizes: Array) -> Rubbed:
         """With forces of sizes ``(d, T)`` that keep bodies from sliding beside it."""
-        g = None if grip.load.of in here.system.m.pair_index else _coupling(here, grip.load)
+        g = None if grip.load.of in here.system.m.pair_index else place_of_coupling(here.system.m, grip.load)
         wrench = np.einsum("cdt,dt->ct", grip.W, sizes)
         out = replace(self, **{name: getattr(self, name).copy() for name in _SUMS})
         out._pass(_passed_on(here, grip.way, wrench[:, None]), np.ones((1, here.T)), g is not None)

@@ -26,7 +26,7 @@ from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Array, Index, compose, cross, identity, inverse, rotate
 from mechgraph.memo import carried, dataclass
 from mechgraph.model.belts import pretensions
-from mechgraph.model.friction import Friction, places_in, rubbing_loads
+from mechgraph.model.friction import Friction, place_of_coupling, places_in, rubbing_loads
 from mechgraph.model.gear_facts import mean_sliding
 from mechgraph.model.gears import moving_lines
 from mechgraph.model.loads import (
@@ -665,7 +665,7 @@ def _friction_of_teeth(places: _Places, load: Any, out: Acting) -> None:
     s, L = places.system, places.L
     if not rubbing_loads(s.m, (load,)):
         return
-    g = next(i for i, c in enumerate(s.m.couplings) if c.name == load.of)
+    g = place_of_coupling(s.m, load)
     at = on_carrier(s, g)
     assert at is not None
     arm, line = mean_sliding(s.m, s.m.couplings[g]), sum(bool(c.steps) for c in s.m.couplings[:g])

@@ -225,9 +225,15 @@ class Friction(Load):
                 yield f"mu: a thread with {angles} has no finite force"
 
 
+def place_of_coupling(m: Any, load: Any) -> int:
+    """The place of the coupling that a friction names, of a belt its first span; -1 for one of a pair."""
+    return next((g for g, c in enumerate(m.couplings) if load.of in (c.name, getattr(c, "belt", None))), -1)
+
+
 def coupling_of(m: Any, load: Any) -> Any:
     """The coupling that a friction names, of a belt its first span; None for one of a pair."""
-    return next((c for c in m.couplings if load.of in (c.name, getattr(c, "belt", None))), None)
+    g = place_of_coupling(m, load)
+    return None if g < 0 else m.couplings[g]
 
 
 def rubbing_loads(m: Any, loads: Iterable[Load]) -> list[Friction]:
@@ -236,10 +242,15 @@ def rubbing_loads(m: Any, loads: Iterable[Load]) -> list[Friction]:
     return [load for load in dry if "wrap" not in getattr(coupling_of(m, load), "rubs", ())]
 
 
-def pairs_of(m: Any, load: Friction) -> list[int]:
-    """Places of the pair that rubs, or of those on the way between gears."""
+def way_of(m: Any, load: Friction) -> tuple[tuple[int, float], ...]:
+    """The pair that rubs, or those on the way between gears, each with its sense."""
     coupling = coupling_of(m, load)
-    return [m.place_of_pair(load.of)] if coupling is None else [step.pair for step in coupling.steps]
+    return ((m.pair_index[load.of], 1.0),) if coupling is None else tuple((s.pair, s.sense) for s in coupling.steps)
+
+
+def pairs_of(m: Any, load: Friction) -> list[int]:
+    """Places of these pairs."""
+    return [pair for pair, _ in way_of(m, load)]
 
 
 def rests_on(m: Any, load: Friction) -> tuple[str, ...]:
