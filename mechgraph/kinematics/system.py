@@ -774,8 +774,8 @@ class System(States):
         return self.numbers.components(self.reaction_table)
 
     def cases(self, which: Index) -> System:
-        """The system with the numbers of some variants of its batch, in that order; of a batch of one, itself."""
-        if self.par.batch == 1:
+        """The system with the numbers of some variants of its batch, in that order; of a batch of one, or of all of them, itself."""
+        if self.par.batch == 1 or np.array_equal(which, np.arange(self.par.batch)):
             return self
         out = self.with_parameters(self.par.taken(which))
         if len(which) > 1:  # of one the numbers have another form
