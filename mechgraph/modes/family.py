@@ -18,6 +18,11 @@ Links, pairs, rods and the points at the ends of rods are the nodes of a graph, 
 way round. A pair declared the other way round has its markers exchanged and the inverse of its motion: the coordinates of turns and slides
 that commute change their signs, and so does the vector part of a rotation's quaternion.
 
+Where all loops move in one plane (``Family.plane``), a class keeps of its pairs only how they stand to the normal. Let ``C`` turn the
+normal into ``z``, ``T`` shift both markers of a pair into the plane ``z = 0``, and ``F`` turn them, with ``F exp(q s) F^-1 = exp(+-q s)``.
+As ``T`` and plane motions commute, markers ``T C M F^-1`` have the same closed states up to these signs: one start set serves all
+trusses of a topology.
+
 Assemblies that are not isolated: sought by Newton steps and near singular ends.
 
 What lies about an assembly at which the closure rows are nearly singular: a root alone, two that meet, or a continuum.
@@ -119,6 +124,16 @@ class Family:
             for pair, _ in loop:
                 through[pair].append(algebra)
         return [common(algebras) for algebras in through]
+
+    @cached_property
+    def plane(self) -> Array | None:
+        """Two directions of the plane in which all loops move, and its normal ``(3, 3)``; None where they move otherwise."""
+        shared = common(self.loop_algebras)
+        if shared.shape[1] != 3 or {h.shape[1] for h in self.loop_algebras} != {3}:
+            return None
+        _, turns, Vt = np.linalg.svd(shared[:3])
+        one, other = (shared @ Vt[1:].T)[3:].T
+        return np.stack([one, other, np.cross(one, other)]) if (turns > MODES.span).sum() == 1 else None
 
     @cached_property
     def moving(self) -> list[Array]:
@@ -401,20 +416,63 @@ class Labelling:
 
     @cached_property
     def _still(self) -> Array:
-        """The markers where the class is told, in the global frame, as far as it keeps them."""
+        """The markers where the class is told, in the frame in which they are kept, as far as it keeps them."""
         # decimals of markers, over L, that a class keeps
-        return np.round(compose(self._gauge, self.family.target)[..., 0].real, 9) + 0.0
+        return np.round(self._kept(self.family.target)[..., 0].real, 9) + 0.0
+
+    def _kept(self, markers: Array) -> Array:
+        """Markers as they are kept."""
+        return compose(compose(self._gauge, markers), inverse(self._turns))
+
+    @cached_property
+    def _flat(self) -> bool:
+        """Whether of the geometry only a plane is kept."""
+        family = self.family
+        every = all(algebra.shape[1] == 3 for algebra in family.algebras)
+        return every and not self._n and not family.idle.shape[1] and family.plane is not None
 
     @cached_property
     def _gauge(self) -> Array:
         """Poses ``(3, 4, markers, 1)`` of the frames in which markers are kept: links' own, or the global one where relations are kept."""
         poses = self.family.here.poses[:, :, self.family.bearers, :1]
-        return np.broadcast_to(np.eye(3, 4)[:, :, None, None], poses.shape) if self.family.whole else poses
+        if self.family.whole:
+            return np.broadcast_to(np.eye(3, 4)[:, :, None, None], poses.shape)
+        if not self._flat:
+            return poses
+        poses = compose(np.concatenate([self.family.plane, np.zeros((3, 1))], axis=1)[..., None, None], poses)
+        poses[2, 3] -= np.tile(compose(poses, self.family.target)[2, 3, : self._P].real, (2, 1))
+        return poses
+
+    @cached_property
+    def _turns(self) -> Array:
+        """Turns ``(3, 4, markers, 1)`` after which markers are kept."""
+        out = np.tile(np.eye(3, 4)[:, :, None, None], (1, 1, len(self.family.bearers), 1))
+        out[:, :3, : 2 * self._P] = np.tile(self._sides[0], 2)[..., None]
+        return out
+
+    @cached_property
+    def _sides(self) -> tuple[Array, Array]:
+        """Of every pair the turn ``(3, 3, P)`` after which its markers are kept, and whether that turns its motions back ``(P,)``."""
+        turns, back = np.tile(np.eye(3)[:, :, None], (1, 1, self._P)), np.zeros(self._P, dtype=bool)
+        if not self._flat:
+            return turns, back
+        normals = compose(self._gauge, self.family.target)[2, :3, :, 0].real
+        half = np.array([1.0, -1.0, -1.0])[:, None]
+        for k, pair in enumerate(self._system.m.pairs):
+            (x, y, z), S = normals[:, k], twists_of(pair.type)
+            if np.hypot(x, y) > MODES.span and not cross_twist(np.eye(6)[:, [2]], S).any():
+                turns[:2, :2, k] = np.array([[x, y], [-y, x]]) / np.hypot(x, y)
+            if z < -MODES.span and (np.tile(half, (2, 1)) * S == -S).all():
+                turns[:, :, k] *= half
+                back[k] = True
+        return turns, back
 
     def _geometry(self, marker: int) -> Hashable:
         """What a class keeps of a marker; of a point its place."""
         if self.family.whole:
             return ()
+        if self._flat:
+            return tuple(self._still[2, :3, marker].tolist())
         kept = self._still[:, :, marker] if marker < 2 * self._P else self._still[:, 3, marker]
         return tuple(kept.ravel().tolist())
 
@@ -455,7 +513,7 @@ class Labelling:
         ]
         B = family.algebras[k]
         # decimals that a class keeps of the motions by which markers may be moved
-        algebra = () if family.whole else (np.round(B @ B.T, 6) + 0.0).ravel().tolist()
+        algebra = () if family.whole or self._flat else (np.round(B @ B.T, 6) + 0.0).ravel().tolist()
         given, rest = ([c in of.tolist() for c in columns] for of in (family.columns, family.held))
         return (tuple(freedoms), tuple(given), tuple(rest), tuple(algebra))
 
@@ -483,7 +541,7 @@ class Labelling:
         """For every state row in canonical order its number in the class, and its sign there."""
         s = self._system
         sign = np.ones(s.n_state)
-        for k in np.flatnonzero(self._turned).tolist():
+        for k in np.flatnonzero(self._turned != self._sides[1]).tolist():
             sign[s.first_row[k] : s.first_row[k + 1]] = -1.0
         if s.rotations is not None:
             sign[s.rotations[1][0]] = 1.0
@@ -495,7 +553,7 @@ class Labelling:
         """Markers, squares of lengths and states ``(nx, N)`` of a member in canonical order; values of drivers are in the states."""
         rows, sign = self._rows
         return {
-            "markers": compose(self._gauge, member.markers)[:, :, self._markers],
+            "markers": self._kept(member.markers)[:, :, self._markers],
             "squares": member.drive[len(member.drive) - self._n :][self.rods],
             "x": sign[:, None] * x[rows],
         }
@@ -505,18 +563,23 @@ class Labelling:
         rows, sign = self._rows
         own, out, drive = np.empty_like(markers), np.empty_like(x), np.empty_like(squares)
         own[:, :, self._markers] = markers
-        own = compose(inverse(self._gauge), own)
+        own = compose(compose(inverse(self._gauge), own), self._turns)
         own[:, :3, 2 * self._P :] = np.eye(3)[:, :, None, None]
         out[rows] = sign[:, None] * x
         drive[self.rods] = squares
         return Member(own, np.concatenate([out[self.family.rows, :1], drive])), out
 
 
+def twists_of(row: PairType) -> Array:
+    """The twists ``(6, n)`` of a pair, one after the other."""
+    return np.array([f.twist for f in row.freedoms]).reshape(-1, 6).T
+
+
 def same_back(row: PairType) -> bool:
     """Whether a pair is the same with its links exchanged: turns and slides that commute, or a rotation and nothing else."""
     if len(row.steps) == 1 and row.steps[0].holds_rotation:
         return True
-    S = np.array([f.twist for f in row.freedoms]).reshape(-1, 6).T
+    S = twists_of(row)
     n = S.shape[1]
     return bool(np.abs(cross_twist(np.repeat(S, n, axis=1), np.tile(S, (1, n)))).max(initial=0.0) < MODES.span)
 

@@ -40,7 +40,7 @@ Anal. 39, 2019; Sommese and Wampler, The Numerical Solution of Systems of Polyno
 Start sets kept in a folder of the user, one file for each class of mechanisms; a file is written whole or not at all.
 
 The folder is ``writing.cache_folder``. Where it cannot be read or written, start sets are worked out anew. Those of the library's
-mechanisms and of common topologies come with the package (``PACKED``, made by ``tests/benchmarks/make_start_sets.py``).
+mechanisms, of common topologies and of trusses in a plane come with the package (``PACKED``, made by ``tests/benchmarks/make_start_sets.py``).
 """
 
 from __future__ import annotations
@@ -55,13 +55,14 @@ import numpy as np
 
 from mechgraph.errors import MechgraphError, counted
 from mechgraph.files import cache_folder, whole_file
+from mechgraph.graph.chains import Code, code_of
 from mechgraph.graph.linkgraph import components_of_edges
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import compose, pose_exp
 from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
-from mechgraph.modes.family import Array, Family, Labelling, Member, common, span
+from mechgraph.modes.family import Array, Family, Labelling, Member
 from mechgraph.modes.form import RodFamily, is_one_group
 from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, Equated, Equations, Leg, Linear, follow
 
@@ -97,8 +98,21 @@ PLATFORMS: tuple[tuple[str, int, tuple[int, ...], int, str], ...] = (
 )
 """What lets one body move against another (R turns, T slides, S is a ball), and rods between them: their number, how many have each joint
 of the one body in common, whatever their joints on the other (nothing where it does not matter), the bound, and its source."""
-TRIADS = (6, "a coupler curve, of degree six and threefold in the circular points, meets a circle in 12 - 6 others")
-"""The bound of two bodies in a plane joined by three links, and its source."""
+SEVEN_LINKS = (
+    "Rojas and Thomas, Distance-based position analysis of the three seven-link Assur kinematic chains, Mech. Mach. Theory 46, 2011: "
+    "characteristic polynomials of degrees 14, 16 and 18"
+)
+TRUSSES = (
+    (
+        "02 12 03 13 04 14",
+        6,
+        "a coupler curve, of degree six and threefold in the circular points, meets a circle in 12 - 6 others",
+    ),
+    ("01 05 06 12 23 26 34 45 46", 14, SEVEN_LINKS),
+    ("01 03 06 12 14 23 35 45 46", 16, SEVEN_LINKS),
+    ("01 02 05 06 14 23 34 36 45", 18, SEVEN_LINKS),
+)
+"""Trusses in a plane of two loops and more, by the links that turn on each other, the bound, and its source."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +125,7 @@ class Bound:
 
 def bound(family: Family) -> Bound | None:
     """The bound for a class, where the tables have one."""
-    return _of_platform(family) if isinstance(family, RodFamily) else _of_triad(family) or _of_loops(family)
+    return _of_platform(family) if isinstance(family, RodFamily) else _of_truss(family) or _of_loops(family)
 
 
 def _of_platform(family: RodFamily) -> Bound | None:
@@ -171,29 +185,23 @@ def _entry(dimension: int, letters: str) -> Bound | None:
     return None
 
 
-def _of_triad(family: Family) -> Bound | None:
-    """The bound of two bodies in a plane joined by three links; links between which all is driven are one."""
+def _of_truss(family: Family) -> Bound | None:
+    """The bound of links that turn on each other in a plane; links between which all is driven are one."""
     s, P = family.system, range(len(family.system.m.pairs))
-    free = set(family.free.tolist())
-    columns = [range(s.first_column[k], s.first_column[k + 1]) for k in P]
-    locked = [k for k in P if free.isdisjoint(columns[k])]
-    body = components_of_edges(len(s.m.links), [s.graph.ends[k] for k in locked])
-    joints: dict[int, list[int]] = {}
-    for k in P:
-        one, other = (int(body[link]) for link in s.graph.ends[k])
-        if k in locked:
-            continue
-        if s.is_length[columns[k]].any() or one == other:
-            return None
-        joints.setdefault(one, []).append(other)
-        joints.setdefault(other, []).append(one)
-    ends = {number for number, others in joints.items() if len(others) > 2}
-    legs = [others for number, others in joints.items() if number not in ends]
-    if len(ends) != 2 or len(legs) != 3 or any(set(others) != ends for others in legs):
+    if family.plane is None or s.is_length[family.free].any():
         return None
-    groups = {(h.shape[1], h.shape[1] - span(h[:3]).shape[1]) for h in family.loop_algebras}
-    # dimensions of the group of plane motions and of its translations
-    return Bound(*TRIADS) if groups == {(3, 2)} else None
+    locked = [k for k in P if not np.isin(np.arange(s.first_column[k], s.first_column[k + 1]), family.free).any()]
+    body = components_of_edges(len(s.m.links), [s.graph.ends[k] for k in locked])
+    code = _truss([(int(body[a]), int(body[b])) for k, (a, b) in enumerate(s.graph.ends) if k not in locked])
+    for joints, count, source in TRUSSES:
+        if code == _truss([(int(ends[0]), int(ends[1])) for ends in joints.split()]):
+            return Bound(count, source)
+    return None
+
+
+def _truss(joints: list[tuple[int, int]]) -> Code:
+    """What trusses have in common that are the same up to the numbers of their links."""
+    return code_of([()] * (1 + max(map(max, joints), default=0)), [(a, b, ()) for a, b in joints])
 
 
 MOST_TRACKS = 24_000
@@ -368,12 +376,9 @@ def _random(rng: np.random.Generator, n: int) -> Array:
 
 def _isotropic(family: Family) -> Array | None:
     """An isotropic direction ``(3,)`` of the plane in which all loops move, and nothing else; None where they have none in common."""
-    algebras = family.loop_algebras
-    shared, plane = common(algebras), {h.shape[1] for h in algebras} == {3}
-    if family.points or family.idle.shape[1] or not plane or shared.shape[1] != 3 or not is_one_group(family):
+    if family.points or family.idle.shape[1] or family.plane is None or not is_one_group(family):
         return None
-    _, turns, Vt = np.linalg.svd(shared[:3])
-    return (shared @ Vt[1:].T)[3:] @ [1.0, 1.0j] if (turns > MODES.span).sum() == 1 else None
+    return np.asarray([1.0, 1.0j] @ family.plane[:2])
 
 
 def _line(algebra: Array, rng: np.random.Generator) -> Array:

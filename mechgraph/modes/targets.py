@@ -441,7 +441,8 @@ def groups_of(family: Family) -> Sequence[Undivided | EquationGroup]:
             if group.family.fault or not group.within:
                 break
         else:
-            if len(found) > 1:
+            # one group alone leaves out what is known at the start
+            if sum(len(group.pairs) for group in found) < len(graph.ends) or len(found) > 1:
                 return found
     return [Undivided(family)]
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,8 @@ from mechgraph.modes.targets import groups_of
 
 LOOPS = ("RSSR", "RCSR", "RRSC", "RSCR", "RCCC", "RCRCR", "RCRRC", "RRRRRRR", "RRRRRRP")
 """Loops of pairs that stand anywhere, driven at the first."""
+TRUSSES = (("01 12 20", 2), (start_sets.TRUSSES[0][0], 2), *((joints, 1) for joints, *_ in start_sets.TRUSSES[1:]))
+"""Trusses in a plane by the links of their joints, and how many of these slide at most."""
 MOST = 64
 """Assemblies of a set, at most: larger ones take long and fill the file."""
 
@@ -55,6 +58,16 @@ def wanted() -> Iterator[tuple[mg.Mechanism, dict[str, Any]]]:
             ]
         m = mg.Mechanism(f"platform {feet}-{heads}", pairs=pairs, frame="base")
         yield m, {f"P{i}": 0.0 for i in range(6)}
+    for joints, most in TRUSSES:
+        ends = joints.split()
+        for slides in (those for n in range(most + 1) for those in combinations(range(len(ends)), n)):
+            pairs = [
+                mg.Pair(f"J{k}", "P", *on, point=[*rng.normal(size=2), 0.0], axis=[*rng.normal(size=2), 0.0])
+                if k in slides
+                else mg.Pair(f"J{k}", "R", *on, point=[*rng.normal(size=2), 0.0], axis=(0, 0, 1))
+                for k, on in enumerate(ends)
+            ]
+            yield mg.Mechanism(f"truss {joints}, slides {slides}", pairs=pairs, frame=ends[0][0]), {}
     pairs = [
         mg.Pair(f"A{i}", "R", f"L{i}", f"L{i + 1}", point=rng.normal(size=3), axis=rng.normal(size=3)) for i in range(6)
     ]
