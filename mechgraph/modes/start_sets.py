@@ -40,7 +40,7 @@ Anal. 39, 2019; Sommese and Wampler, The Numerical Solution of Systems of Polyno
 Start sets kept in a folder of the user, one file for each class of mechanisms; a file is written whole or not at all.
 
 The folder is ``writing.cache_folder``. Where it cannot be read or written, start sets are worked out anew. Those of the library's
-mechanisms, of common topologies and of trusses in a plane come with the package (``PACKED``, made by ``tests/benchmarks/make_start_sets.py``).
+mechanisms, of common topologies and of trusses in a plane come with the package (``PACKED``, see ``tests/benchmarks/make_start_sets.py``).
 """
 
 from __future__ import annotations
