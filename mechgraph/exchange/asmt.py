@@ -163,8 +163,8 @@ JOINTS: dict[str, JointRow] = {
 """Joints that have a pair."""
 
 REFUSED = {
-    "CurveCurveContact": "its curves stand in sketches of the parts, which are not read; declare them in Python: mg.Pair(..., 'Kc', curve=, "
-    "curve_b=, closed='force', restitution=)",
+    "CurveCurveContact": "its curves stand in sketches of the parts, which are not read; declare them in Python: "
+    "mg.Pair(..., 'Kc', curve=, curve_b=, closed='force', restitution=)",
 }
 """Joints that have none, and what to do."""
 

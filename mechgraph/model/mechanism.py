@@ -290,7 +290,7 @@ class Mechanism(DeclaredParts, Shown):
         self._set(couplings=tuple(one for c in self.couplings for one in c.written(self)))
         self._doubt()
         if self.gears and self.has_geometry and "_changed_from" not in vars(self):
-            kinds = dict.fromkeys(map(type, self.couplings))
+            kinds = dict.fromkeys(type(c) for c in self.couplings)
             for fault in (*off_axis(self), *(fault for kind in kinds for fault in kind.doubts(self))):
                 warnings.warn(f"mechanism {self.name!r}: {fault}", MechgraphWarning, stacklevel=3)
 

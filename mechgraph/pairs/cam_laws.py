@@ -745,7 +745,7 @@ class CamLaws(RowsByName[LawFactors]):
     """The factors of the standard laws by name; prints as a table."""
 
     @cached_property
-    def _rows(self) -> dict[str, LawFactors]:
+    def _rows(self) -> dict[str, LawFactors]:  # type: ignore[override]  # made at the first reading
         shapes = {name: rise_of(name) for name in (*SCCA, *RISES)}
         shapes["scca (1/3, 1/3, 1/3)"] = of_scca(1 / 3, 1 / 3, 1 / 3)
         shapes["scca (1/5, 0, 3/5)"] = of_scca(0.2, 0.0, 0.6)

@@ -37,7 +37,6 @@ from mechgraph.kinematics.touching import strayed
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import RESPONSE
 from mechgraph.memo import dataclass
-from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.response.motion_equations import (
@@ -49,7 +48,6 @@ from mechgraph.response.motion_equations import (
     Loads,
     Moved,
     Stopped,
-    accelerations,
     applied,
     moved,
     positions_together,

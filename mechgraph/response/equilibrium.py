@@ -448,7 +448,7 @@ class Linearized(Shown):
         """The freedoms that tell a mode: those of which the declaration says something, then the largest; no two that move alike."""
         m, names = self.mechanism, self.mechanism.freedom_names()
         said = {*m.start, *(d.freedom for d in m.drives), *(name for one in m.loads for name in one.freedoms)}
-        said |= m.response.freedoms if m.response else set()
+        said.update(m.response.freedoms if m.response else ())
         said = {m.full_name(name) for name in said}
         largest = max(map(abs, shape.values()))
         moving = [name for name in names if abs(shape[name]) > 1e-3 * largest]
