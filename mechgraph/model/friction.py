@@ -16,7 +16,7 @@ from mechgraph.memo import dataclass
 from mechgraph.model.loads import BASIC_LOADS, Load, LoadSite
 from mechgraph.pairs.factors import UNIT_TWISTS
 from mechgraph.pairs.pair_type import PairType
-from mechgraph.quantities import FORCE, FORCE_PER_VELOCITY, LENGTH, MOMENT_PER_RATE, unknown, wrong
+from mechgraph.quantities import FORCE, FORCE_PER_VELOCITY, LENGTH, MOMENT_PER_RATE, is_numeric, unknown, wrong
 
 SINGLE = frozenset(UNIT_TWISTS.values())
 """Twists of freedoms that turn about or slide along an axis of the frame before them."""
@@ -172,8 +172,7 @@ class Friction(Load):
             yield "mu: is missing; give the coefficient of friction"
         # what is no number, or below zero, is a fault of its own
         mu, static, part = (
-            of if isinstance(of, int | float) and 0 <= of < np.inf else np.nan
-            for of in (self._mu, self.static, self.efficiency)
+            float(of) if is_numeric(of, ()) and of >= 0 else np.nan for of in (self._mu, self.static, self.efficiency)
         )
         if static < mu:
             yield wrong(self.static, "static", f"mu = {mu:g} or more")
