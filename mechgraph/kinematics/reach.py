@@ -398,6 +398,8 @@ def _ways_back(path: DriverPath, found: Positions, polygons: list[_Polygon]) -> 
 
 def _left(path: DriverPath, found: Positions, ways: list[_Way]) -> Array:
     """How much of every way was not reached, in steps of fair size."""
+    if not ways:
+        return np.zeros(0)
     tracks, at = np.array([way.track for way in ways]), np.array([way.place for way in ways])
     lines = [way.line for way in ways]
     x, which = _states(path, found, tracks, at, np.stack([line[:, 0] for line in lines], axis=1))
