@@ -24,7 +24,7 @@ import unicodedata
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
-from typing import ClassVar, TypeVar, assert_never
+from typing import ClassVar, TypeVar
 
 from mechgraph.errors import TellsNames, visible
 from mechgraph.memo import Remembers, dataclass
@@ -225,8 +225,6 @@ def _block_text(block: Block, width: int) -> str:
             return "\n".join(_equation_line(line, width) for line in kept_lines(text) or kept_lines(latex))
         case Code(text):
             return "\n".join(kept_lines(text))
-        case _:
-            assert_never(block)
 
 
 def _wrapped(text: str, width: int, mark: str = "") -> list[str]:
@@ -362,8 +360,6 @@ def _block_markdown(block: Block) -> str:
             return "\n".join(["$$", *lines, "$$"]) if lines else _fenced(kept_lines(text))
         case Code(text):
             return _fenced(kept_lines(text))
-        case _:
-            assert_never(block)
 
 
 def _table_markdown(table: Table) -> str:
@@ -424,8 +420,6 @@ def _block_html(block: Block) -> str:
             return _preformatted(kept_lines(text) or kept_lines(latex), attributes)
         case Code(text):
             return _preformatted(kept_lines(text))
-        case _:
-            assert_never(block)
 
 
 def _bullets_html(block: Bullets) -> str:
@@ -511,8 +505,6 @@ def block_latex(block: Block) -> str:
             return "\n".join([r"\[", *lines, r"\]"]) if lines else _verbatim(kept_lines(text))
         case Code(text):
             return _verbatim(kept_lines(text))
-        case _:
-            assert_never(block)
 
 
 def _itemize(lines: list[str]) -> list[str]:

@@ -15,7 +15,7 @@ from dataclasses import MISSING, Field, field, fields
 from functools import lru_cache, partial
 from operator import methodcaller
 from types import MappingProxyType
-from typing import Any, ClassVar, Protocol, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,33 +144,6 @@ def same(a: Any, b: Any) -> bool:
 def same_fields(a: Any, b: Any) -> bool:
     """Field by field equality of two dataclasses of one type, arrays included."""
     return type(a) is type(b) and all(same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a) if f.compare)
-
-
-class Nameable(Protocol):
-    """Links and freedoms of a mechanism, by name."""
-
-    @property
-    def link_index(self) -> Mapping[str, int]:
-        """Place of every link, by name."""
-
-    @property
-    def planar(self) -> bool:
-        """Whether it is a planar one."""
-
-    def freedom_fault(self, name: Any, *, single: bool) -> str | None:
-        """Why ``name`` is no freedom (with ``single``: no single freedom), or None."""
-
-    def massive_links(self) -> tuple[str, ...]:
-        """Links that have mass."""
-
-    def link(self, name: str) -> Any:
-        """The link of that name."""
-
-    def ends_of(self, freedom: str) -> tuple[str, str]:
-        """Links a and b of the pair of a freedom."""
-
-    def full_name(self, name: str) -> str:
-        """The full spelling ``"B.Tz"`` of a freedom."""
 
 
 XYZ = "xyz"
@@ -491,7 +464,7 @@ class Described(Formatted):
         def change(name: str, about: FieldFormat, value: Any) -> Any:
             return full_name(value) if about.kind is FREEDOM_NAME and isinstance(value, str) and value else value
 
-        return self.changed(change, _as_it_is)
+        return self.changed(change, as_it_is)
 
     def numbers_turn(self, turns: Callable[[Any], bool]) -> bool:
         """Whether its numbers are those of a turn; ``turns(freedom)`` says so of a freedom."""
@@ -506,7 +479,8 @@ class Described(Formatted):
         return self.in_units(base, self.numbers_turn(turns))
 
 
-def _as_it_is(value: Any) -> Any:
+def as_it_is(value: Any) -> Any:
+    """What stays."""
     return value
 
 

@@ -14,7 +14,6 @@ from mechgraph.fields import (
     TEXT,
     Described,
     FieldFormat,
-    Nameable,
     number_fault,
     plain,
     sound_tol,
@@ -155,7 +154,7 @@ class Coupling(BaseCoupling):
         object.__setattr__(self, "terms", _read_terms(terms))
         object.__setattr__(self, "constant", plain(constant))
 
-    def placed(self, m: Nameable) -> Self:
+    def placed(self, m: Any) -> Self:
         """See ``BaseCoupling``."""
         return self.replace(terms=[(m.full_name(freedom), value) for freedom, value in self.terms])
 
@@ -164,7 +163,7 @@ class Coupling(BaseCoupling):
         terms = tuple(zip(self.freedoms, coefficients, strict=True))
         return self.replace(terms=terms, constant=None if self.constant is None else constant)
 
-    def faults(self, m: Nameable) -> list[str]:
+    def faults(self, m: Any) -> list[str]:
         """What is wrong with this coupling in a mechanism, one line each."""
         where = f"coupling {shown(self.name)}: "
         if not isinstance(self.name, str):

@@ -398,8 +398,8 @@ def declaration_faults(m: DeclaredParts) -> list[str]:
     before = vars(m).get("_changed_from")  # what is sound of that mechanism is so in this one
     if (links := _others(m.links, before and before.links)) and not _links_are_sound(links):
         faults += [fault for link in links for fault in link.faults()]
-    if m.planar is not True and m.planar is not False:
-        faults.append(wrong(m.planar, "planar", "true or false"))
+    plain = (m.formats[what].fault(getattr(m, what), what) for what in ("planar", "source", "description"))
+    faults += filter(None, plain)
     if m.planar is True:
         faults += plane_faults(m.links, m.pairs, m.loads, m.gears)
     names, pair_names = _texts(m.link_names()), _texts([pair.name for pair in m.pairs])
@@ -417,11 +417,6 @@ def declaration_faults(m: DeclaredParts) -> list[str]:
     ]
     if m.tol is not None:
         faults += filter(None, [tolerance_fault(m.tol)])
-    faults += [
-        wrong(value, what, "a text")
-        for what, value in (("source", m.source), ("description", m.description))
-        if not isinstance(value, str)
-    ]
     return faults + _symbol_faults(m) + _reference_faults(m) + m.once(gear_faults) + _coupling_faults(m)
 
 

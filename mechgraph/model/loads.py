@@ -33,7 +33,6 @@ from mechgraph.fields import (
     VECTOR,
     VECTOR_SERIES,
     Described,
-    Nameable,
 )
 from mechgraph.maths.se3 import Array, rotate
 from mechgraph.memo import dataclass
@@ -133,7 +132,7 @@ class Load(Described, ABC):
         names = {name: shown(getattr(self, name)) for name in self.formats}
         return f"{self.subject.format(**names)}: "
 
-    def faults(self, names: Nameable) -> list[str]:
+    def faults(self, names: Any) -> list[str]:
         """What is wrong with this load."""
         found: list[str | None] = []
         for name, about in self.formats.items():
@@ -211,7 +210,7 @@ class Load(Described, ABC):
         """Potential energy ``(T,)`` of a load that has one."""
         return 0.0
 
-    def links(self, names: Nameable) -> tuple[str, ...]:
+    def links(self, names: Any) -> tuple[str, ...]:
         """Links that this load acts on: those that it names, or those of the pair of its freedom."""
         if self.in_freedom is not None:
             return names.ends_of(self.in_freedom)
@@ -418,7 +417,7 @@ class _ByPlace(Law):
         place = links if self.freedom is None else f"in {shown(self.freedom)}"
         return f"{self.subject} {place}".rstrip() + ": "
 
-    def faults(self, names: Nameable) -> list[str]:
+    def faults(self, names: Any) -> list[str]:
         """What is wrong with this load."""
         given = [name for name in "abpq" if getattr(self, name) is not None]
         expected = "expected a freedom alone, e.g. 'D', or two links with a point of each, ('a', 'b', p, q)"
@@ -506,7 +505,7 @@ class Spring(_ByPlace, Elastic):
             self._take_place(self.a, self.b, self.p, self.q)
         super().__post_init__()
 
-    def faults(self, names: Nameable) -> list[str]:
+    def faults(self, names: Any) -> list[str]:
         """What is wrong with this load."""
         found = super().faults(names)
         if self.stiffness is None:
@@ -613,7 +612,7 @@ class ForceLaw(_Placed):
     ] = None
     breaks: Breaks = ()
 
-    def faults(self, names: Nameable) -> list[str]:
+    def faults(self, names: Any) -> list[str]:
         """What is wrong with this load."""
         found = super().faults(names)
         if isinstance(self.law, ForceTable):
@@ -708,7 +707,7 @@ class Gravity(Load):
     subject: ClassVar[str] = "gravity"
     acceleration: Annotated[Any, VECTOR("the vector g, global", ACCELERATION)]
 
-    def links(self, names: Nameable) -> tuple[str, ...]:
+    def links(self, names: Any) -> tuple[str, ...]:
         """Links that this load acts on: all that have mass."""
         return names.massive_links()
 
@@ -761,7 +760,7 @@ class Wrench(Load):
     ] = "global"
     breaks: Breaks = field(default=(), kw_only=True)
 
-    def faults(self, names: Nameable) -> list[str]:
+    def faults(self, names: Any) -> list[str]:
         """What is wrong with this load."""
         found = super().faults(names)
         if self.force is None and self.moment is None:

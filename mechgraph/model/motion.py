@@ -31,9 +31,6 @@ CHEBYSHEV_POINTS = 32
 CHEBYSHEV_NOISE = 8.0 * float(np.finfo(np.float64).eps)
 """Relative size below which a Chebyshev coefficient of a callable is taken for rounding."""
 
-DERIVATIVE_TOLERANCE = 1e-6
-"""Largest estimated error of s'' of a callable, relative to max |s''| or 4 max |s| / range^2."""
-
 
 class NotSmooth(ArithmeticError):
     """A function whose derivatives cannot be found near ``t``."""
@@ -101,8 +98,10 @@ def derivatives(
             raise NotSmooth(float(t[here][missed][0]))
     size = max(float(np.abs(panel.coefficients).sum()) for panel in panels)
     span = high - low
-    fast = DERIVATIVE_TOLERANCE * max(float(np.abs(velocity).max()), 2.0 * size / span)
-    steep = DERIVATIVE_TOLERANCE * max(float(np.abs(acceleration).max()), 4.0 * size / span**2)
+    # largest estimated error of s'' relative to max |s''| or 4 max |s| / range^2, and likewise of s'
+    most = 1e-6
+    fast = most * max(float(np.abs(velocity).max()), 2.0 * size / span)
+    steep = most * max(float(np.abs(acceleration).max()), 4.0 * size / span**2)
     for panel in panels:
         if panel.error > steep:
             raise NotSmooth((panel.left + panel.right) / 2.0)

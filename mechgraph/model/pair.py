@@ -161,17 +161,10 @@ def largest_cosine(tol: float) -> float:
     return max(SHAPES.met, 2.0 * tol)
 
 
-@dataclass(frozen=True)
 class SeatNumbers(Described):
     """Numbers of a pair by its reaction components; those left out are None."""
 
     what: ClassVar[str]
-    Fx: float | None = None
-    Fy: float | None = None
-    Fz: float | None = None
-    Mx: float | None = None
-    My: float | None = None
-    Mz: float | None = None
 
     @property
     def by_component(self) -> dict[str, float]:
@@ -179,7 +172,7 @@ class SeatNumbers(Described):
         return {name: value for name in self.formats if (value := getattr(self, name)) is not None}
 
 
-_K, _KM = ({"minimum": 0.0, "default": "rigid"},) * 2
+_RIGID: dict[str, Any] = {"minimum": 0.0, "default": "rigid"}
 
 
 @dataclass(frozen=True)
@@ -197,12 +190,12 @@ class Stiffness(SeatNumbers):
     """
 
     what: ClassVar[str] = "stiffness"
-    Fx: Annotated[float | None, NUMBER("along x", FORCE_PER_LENGTH, **_K)] = None
-    Fy: Annotated[float | None, NUMBER("along y", FORCE_PER_LENGTH, **_K)] = None
-    Fz: Annotated[float | None, NUMBER("along z", FORCE_PER_LENGTH, **_K)] = None
-    Mx: Annotated[float | None, NUMBER("about x", MOMENT, **_KM)] = None
-    My: Annotated[float | None, NUMBER("about y", MOMENT, **_KM)] = None
-    Mz: Annotated[float | None, NUMBER("about z", MOMENT, **_KM)] = None
+    Fx: Annotated[float | None, NUMBER("along x", FORCE_PER_LENGTH, **_RIGID)] = None
+    Fy: Annotated[float | None, NUMBER("along y", FORCE_PER_LENGTH, **_RIGID)] = None
+    Fz: Annotated[float | None, NUMBER("along z", FORCE_PER_LENGTH, **_RIGID)] = None
+    Mx: Annotated[float | None, NUMBER("about x", MOMENT, **_RIGID)] = None
+    My: Annotated[float | None, NUMBER("about y", MOMENT, **_RIGID)] = None
+    Mz: Annotated[float | None, NUMBER("about z", MOMENT, **_RIGID)] = None
 
 
 @dataclass(frozen=True)

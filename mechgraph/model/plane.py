@@ -32,6 +32,7 @@ from mechgraph.fields import (
     VECTOR_SERIES,
     Described,
     FieldFormat,
+    as_it_is,
     axes_of,
     filled_second,
     plain,
@@ -40,7 +41,7 @@ from mechgraph.fields import (
 from mechgraph.maths.se3 import IN_PLANE, Array
 from mechgraph.model.pair import NO_POINTS, Link, Marker, Pair
 from mechgraph.pairs import pair_type as evaluation
-from mechgraph.pairs.contact_types import ROWS, travels
+from mechgraph.pairs.contact_types import ROWS, travels, tried_coordinates
 from mechgraph.pairs.factors import Component, ConstantScrew, Factor, Freedom
 from mechgraph.pairs.pair_type import TABLE, PairType
 from mechgraph.quantities import is_numeric, real_array, shown
@@ -55,16 +56,10 @@ Item = TypeVar("Item", bound=Described)
 
 def in_space(item: Item) -> Item:
     """A declared thing with vectors of three numbers; what is no number, or has three that leave the plane, stays as it is."""
-    changes: dict[str, Any] = {}
-    for name, about in item.formats.items():
-        value = getattr(item, name)
-        made: Any = in_space(value) if isinstance(value, Described) else _in_space(value, about)
-        if made is not value:
-            changes[name] = made
-    return item.replace(**changes) if changes else item
+    return item.changed(_in_space, in_space)
 
 
-def _in_space(value: Any, about: FieldFormat) -> Any:
+def _in_space(name: str, about: FieldFormat, value: Any) -> Any:
     if value is None and about.normal and about.kind is DIRECTION:
         return NORMAL
     if value is None or isinstance(value, str) or callable(value):
@@ -243,16 +238,15 @@ def dropped(item: Item) -> tuple[Item, list[str]]:
 
 def lifted(item: Item, height: float, only: str = "") -> Item:
     """A declared thing with its points (or one of them) moved along z."""
-    changes: dict[str, Any] = {}
-    for name, about in item.formats.items():
-        value = getattr(item, name)
+
+    def change(name: str, about: FieldFormat, value: Any) -> Any:
         if not height or value is None or isinstance(value, str) or (only and name != only):
-            continue
+            return value
         if about.kind is POINTS:
-            changes[name] = {key: (x, y, z + height) for key, (x, y, z) in value.items()}
-        elif about.kind is POINT or about.kind is NAMED_POINT:
-            changes[name] = (value[0], value[1], value[2] + height)
-    return item.replace(**changes) if changes else item
+            return {key: (x, y, z + height) for key, (x, y, z) in value.items()}
+        return (value[0], value[1], value[2] + height) if about.kind in (POINT, NAMED_POINT) else value
+
+    return item.changed(change, as_it_is)
 
 
 # --- faults ----------------------------------------------------------------------------------------------------------------
@@ -471,7 +465,7 @@ def _rows_of(normal: int) -> list[int]:
 def _stays(row: PairType) -> bool:
     """Whether twists, efforts and components lie in the plane at random positions."""
     assert row.normal is not None
-    x = _tried(row)
+    x = tried_coordinates(row)
     pitch = np.zeros((1, 1))
     frames = evaluation.frames_of(row, pitch, x)
     parts = (evaluation.twists_of, evaluation.efforts_of, evaluation.reactions_of)
@@ -481,16 +475,6 @@ def _stays(row: PairType) -> bool:
     leaves = max(float(np.abs(part[outside]).max(initial=0.0)) for part in (S, E, W))
     work = float(np.abs(np.einsum("ifnt,icnt->fcnt", S, W)).max(initial=0.0))
     return max(leaves, work) <= CLEAR * size
-
-
-def _tried(row: PairType) -> Array:
-    """States at which a row is tried: random ones, along a curve places of it."""
-    x = evaluation.random_coordinates(row, np.random.default_rng(12345), 1, 16)
-    for step, _, numbers in evaluation.placed(row):
-        if travels(row) and not isinstance(step, ConstantScrew):
-            low, high = (end if np.isfinite(end) else np.copysign(1.0, end) for end in step.ranges[0])
-            x[numbers] = np.linspace(low, high, x.shape[-1])
-    return x
 
 
 Held = tuple[int, int]

@@ -21,7 +21,6 @@ from mechgraph.fields import (
     TABLES,
     TEXT,
     Described,
-    Nameable,
     plain,
     remade,
 )
@@ -76,7 +75,7 @@ class Event(Described):
         of = f"{self.what} of {self.of}" if isinstance(self.of, str) else getattr(self.of, "__name__", "function")
         return f"{of} passes {self.value:g}"
 
-    def faults(self, m: Nameable) -> list[str]:
+    def faults(self, m: Any) -> list[str]:
         """What is wrong with it."""
         found = []
         if isinstance(self.of, str):
@@ -241,7 +240,7 @@ class ResponseSetup(Described):
         times = np.array(self.time, dtype=float)
         return times if self.points is None else np.linspace(times[0], times[-1], self.points)
 
-    def faults(self, m: Nameable) -> list[str]:
+    def faults(self, m: Any) -> list[str]:
         """What is wrong with it, one line each."""
         found: list[str] = []
         times, points = read_times(self.time, found), self.points
@@ -323,7 +322,7 @@ def tolerance_faults(rtol: Any, atol: Any, max_step: Any) -> list[str]:
     ]
 
 
-def _value_faults(m: Nameable, what: str, values: Any) -> list[str]:
+def _value_faults(m: Any, what: str, values: Any) -> list[str]:
     """What is wrong with numbers by freedoms."""
     if not isinstance(values, Mapping):
         return [wrong(values, what, "a mapping")]
@@ -337,7 +336,7 @@ def _value_faults(m: Nameable, what: str, values: Any) -> list[str]:
     return found
 
 
-def _motion_faults(m: Nameable, one: Drive) -> list[str]:
+def _motion_faults(m: Any, one: Drive) -> list[str]:
     fault = m.freedom_fault(one.freedom, single=True)
     if fault:
         return [f"motion of {one.freedom!r}: {fault}"]

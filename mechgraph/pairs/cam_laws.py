@@ -239,45 +239,32 @@ class Segment(Described):
 
     def __post_init__(self) -> None:
         self.read_numbers()
+        given = {"conditions": self.conditions, "samples": self.samples}
         if isinstance(self.conditions, Mapping):
-            rows = tuple(
-                sorted(
-                    (*key, value) if isinstance(key, tuple) else (key, value) for key, value in self.conditions.items()
-                )
-            )
-            object.__setattr__(self, "conditions", rows)
-        samples = real_array(self.samples)
-        if (
-            isinstance(self.samples, tuple)
-            and len(self.samples) == 2
-            and samples is not None
-            and samples.shape[1:] != (2,)
-        ):
-            object.__setattr__(self, "samples", samples.T)
-        for name in ("conditions", "samples"):
-            array = real_array(getattr(self, name)) if getattr(self, name) is not None else None
-            if array is not None and array.ndim == 2:
-                object.__setattr__(self, name, tuple(map(tuple, array.tolist())))
+            keyed = ((key if isinstance(key, tuple) else (key,), value) for key, value in self.conditions.items())
+            given["conditions"] = tuple(sorted((*key, value) for key, value in keyed))
+        samples = real_array(self.samples) if isinstance(self.samples, tuple) else None
+        if samples is not None and len(samples) == 2 and samples.shape[1:] != (2,):
+            given["samples"] = samples.T
+        for name, value in given.items():
+            array = real_array(value)
+            rows = value if array is None or array.ndim != 2 else tuple(map(tuple, array.tolist()))
+            object.__setattr__(self, name, rows)
+
+    def _times(self, factor: float) -> dict[str, Any]:
+        """Its conditions and samples with values times a factor."""
+        given = {name: rows for name in ("conditions", "samples") if (rows := getattr(self, name)) is not None}
+        return {name: tuple((*row[:-1], factor * row[-1]) for row in rows) for name, rows in given.items()}
 
     def in_units(self, base: tuple[float, float, float], turns: bool = False) -> Self:
         """See ``Described``; of conditions and samples the lifts."""
         about = self.formats["rise"]
         factor = factor_of(about.turn if turns else about.slide, base)
-        changes = {
-            name: tuple((*row[:-1], row[-1] * factor) for row in value)
-            for name in ("conditions", "samples")
-            if (value := getattr(self, name)) is not None and factor != 1.0
-        }
-        return super().in_units(base, turns).replace(**changes)
+        return super().in_units(base, turns).replace(**self._times(factor))
 
     def __neg__(self) -> Segment:
         """The same downwards."""
-        turned = {
-            name: tuple((*row[:-1], -row[-1]) for row in value)
-            for name in ("conditions", "samples")
-            if (value := getattr(self, name)) is not None
-        }
-        return self.replace(rise=None if self.rise is None else -self.rise, **turned)
+        return self.replace(rise=None if self.rise is None else -self.rise, **self._times(-1.0))
 
     def faults(self, where: str) -> list[str]:
         """What is wrong with it, one line each."""

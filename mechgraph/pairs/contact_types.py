@@ -60,6 +60,12 @@ class OnSurface(Travelling):
     pair: str = field(default="", compare=False)
 
     @property
+    def shape(self) -> Surface:
+        """Its surface; only a row of the table has none."""
+        assert self.surface is not None
+        return self.surface
+
+    @property
     def freedoms(self) -> tuple[Freedom, ...]:
         """Slides along both parameters."""
         return Freedom("Tu", UNIT_TWISTS["Tx"]), Freedom("Tv", UNIT_TWISTS["Ty"])
@@ -67,21 +73,18 @@ class OnSurface(Travelling):
     @cached_property
     def sizes(self) -> Array:
         """Lengths per parameter at home."""
-        assert self.surface is not None
-        return np.linalg.norm(self.surface.at(*np.array(self.home)[:, None])[1:3, :, 0], axis=1)
+        return np.linalg.norm(self.shape.at(*np.array(self.home)[:, None])[1:3, :, 0], axis=1)
 
     @property
     def ranges(self) -> tuple[tuple[float, float], ...]:
         """The ends of the surface."""
-        assert self.surface is not None
-        parts = zip(self.surface.ends, self.home, self.sizes / self.unit, strict=True)
+        parts = zip(self.shape.ends, self.home, self.sizes / self.unit, strict=True)
         return tuple(((low - at) * size, (high - at) * size) for (low, high), at, size in parts)
 
     @property
     def periods(self) -> tuple[float, ...]:
         """Lengths after which the surface returns into itself."""
-        assert self.surface is not None
-        return tuple((np.array(self.surface.periods) * self.sizes / self.unit).tolist())
+        return tuple((np.array(self.shape.periods) * self.sizes / self.unit).tolist())
 
     @property
     def outline(self) -> tuple[Array, ...]:
@@ -98,17 +101,15 @@ class OnSurface(Travelling):
 
     def curvatures(self, x: Array) -> Array:
         """Principal curvatures ``(2, ...)`` towards z of the frame at coordinates ``(2, ...)``."""
-        assert self.surface is not None
-        found = self.surface.curvatures(*self._parameters(x))
+        found = self.shape.curvatures(*self._parameters(x))
         return -found[::-1] if self.turned else found
 
     @cached_property
     def bend(self) -> float:
         """Where the surface is looked at, and at coordinates zero."""
-        assert self.surface is not None
         with self.named():
-            here = np.abs(self.surface.curvatures(*np.array(self.home)[:, None])).max()
-            return self.unit * max(self.surface.bend, float(here))
+            here = np.abs(self.shape.curvatures(*np.array(self.home)[:, None])).max()
+            return self.unit * max(self.shape.bend, float(here))
 
     def _parameters(self, x: Array) -> Array:
         """Parameters ``(2, ...)`` at coordinates ``(2, ...)``."""
@@ -120,20 +121,17 @@ class OnSurface(Travelling):
 
     def from_pole(self, x: Array) -> Array:
         """Ways ``(2, ...)`` from a pole of the parameters at coordinates ``(2, ...)``, over the radius."""
-        assert self.surface is not None
-        return self.surface.from_pole(*self._parameters(x))
+        return self.shape.from_pole(*self._parameters(x))
 
     def coordinates_at(self, p: Array) -> Array:
         """Coordinates ``(2,)`` of the point of the surface that is nearest to ``p (3,)``."""
-        assert self.surface is not None
-        return (np.array(self.surface.nearest(p)) - self.home) * self.sizes / self.unit
+        return (np.array(self.shape.nearest(p)) - self.home) * self.sizes / self.unit
 
     def place_of(self, x: Array) -> tuple[Array, Array, Array]:
         """Position, axes ``(3, 3, ...)`` and twists about the point ``(6, 2, ...)``, in the frame of the link."""
-        assert self.surface is not None
         su, sv = self.sizes
         u, v = self._parameters(x)
-        J, sense = self.surface.at(u, v), self.surface.sense(u, v)
+        J, sense = self.shape.at(u, v), self.shape.sense(u, v)
         x_, xu, xv = J[0], J[1] / su, J[2] / sv
         second = self.unit * np.stack([J[3] / su**2, J[4] / (su * sv), J[5] / sv**2])
         lu, N = sense * np.sqrt((xu * xu).sum(axis=0)), cross(xu, xv)
@@ -197,24 +195,31 @@ def filled(row: PairType, factors: Sequence[AlongCurve | OnSurface], pair: str) 
     """The row with factors in the places for curves and surfaces; components that would do work are combined with efforts."""
     left = (replace(factor, pair=pair) for factor in factors)
     out = row.with_steps([next(left) if isinstance(step, AlongCurve | OnSurface) else step for step in row.steps])
-    places = evaluation.placed(out)
-    held = tuple(columns.start for step, columns, _ in places if isinstance(step, AlongCurve) and step.held)
+    held = tuple(
+        columns.start for step, columns, _ in evaluation.placed(out) if isinstance(step, AlongCurve) and step.held
+    )
     if held:  # no component is constant in a frame that does not turn with the curve
         vars(out).update(pushed=held, reactions=None)
         return out
-    x = evaluation.random_coordinates(out, np.random.default_rng(12345), 1, 16)
-    for step, _, numbers in places:
-        if isinstance(step, AlongCurve):
-            low, high = (end if np.isfinite(end) else np.copysign(step.travel.length, end) for end in step.ranges[0])
-            x[numbers] = np.linspace(low, high, x.shape[-1])
-        elif isinstance(step, OnSurface):
-            x[numbers] = 0.0
+    x = tried_coordinates(out)
     pitch = np.zeros((1, 1))
     frames = evaluation.frames_of(out, pitch, x)
     S, W = evaluation.twists_of(out, pitch, frames, x), evaluation.reactions_of(out, pitch, frames, x)
     work = np.abs(np.einsum("ifnt,icnt->fcnt", S, W)).max(initial=0.0)
     vars(out).update(computed_reactions=bool(work > 1e-12 * max(1.0, np.abs(S).max())))
     return out
+
+
+def tried_coordinates(row: PairType) -> Array:
+    """Random coordinates ``(nx, 1, 16)``, of what travels along a curve from end to end, at which a row is tried."""
+    x = evaluation.random_coordinates(row, np.random.default_rng(12345), 1, 16)
+    for step, _, numbers in evaluation.placed(row):
+        if isinstance(step, AlongCurve):
+            low, high = (end if np.isfinite(end) else np.copysign(step.travel.length, end) for end in step.ranges[0])
+            x[numbers] = np.linspace(low, high, x.shape[-1])
+        elif isinstance(step, OnSurface):
+            x[numbers] = 0.0
+    return x
 
 
 def of_function(faults: Callable[[], list[str]], where: str) -> list[str]:
@@ -532,9 +537,8 @@ def surface_miss(contact: PlacedRow, tol: float, where: str) -> Iterator[str]:
     """A contact that is not on its surface."""
     place = placed_surface(contact.row)
     assert place is not None
-    assert place.surface is not None
     # a miss of 1e-12 is rounding at any size of a mechanism, as of a point in a plane through the origin
-    size = max(extent(place.surface, contact.marker[:, 3]), 1e-12 / SHAPES.met)
+    size = max(extent(place.shape, contact.marker[:, 3]), 1e-12 / SHAPES.met)
     if contact.misses[0] > max(SHAPES.met, tol) * size:
         at = point_text(contact.marker[:, 3])
         yield (

@@ -26,10 +26,6 @@ from mechgraph.memo import dataclass
 from mechgraph.pairs.factors import UNIT_TWISTS
 from mechgraph.quantities import LENGTH, PRESSURE_TIME, is_numeric, real_array, shown, wrong
 
-SHORT = 0.7
-"""Length over diameter from which on a bearing is too long for the short-bearing film (Ocvirk's comparison with tests, report 1157)."""
-
-
 TURN, ACROSS = UNIT_TWISTS["Rz"], ("Fx", "Fy")
 """What the pair of a journal allows, and the forces that its film bears."""
 
@@ -79,8 +75,11 @@ class Journal(Described):
 
     @property
     def is_short(self) -> bool:
-        """Whether the length is below 0.7 of the diameter, so that the film of a short bearing is trusted."""
-        return self.length < SHORT * 2 * self.radius
+        """Whether the length is below 0.7 of the diameter, so that the film of a short bearing is trusted.
+
+        (Ocvirk's comparison with tests, report 1157.)
+        """
+        return self.length < 0.7 * 2 * self.radius
 
     @property
     def resistance(self) -> float:
