@@ -290,7 +290,7 @@ class Mechanism(DeclaredParts, Shown):
         self._set(couplings=tuple(one for c in self.couplings for one in c.written(self)))
         self._doubt()
         if self.gears and self.has_geometry and "_changed_from" not in vars(self):
-            kinds = dict.fromkeys(type(c) for c in self.couplings)
+            kinds = {type(c): None for c in self.couplings}
             for fault in (*off_axis(self), *(fault for kind in kinds for fault in kind.doubts(self))):
                 warnings.warn(f"mechanism {self.name!r}: {fault}", MechgraphWarning, stacklevel=3)
 
@@ -524,18 +524,8 @@ class Mechanism(DeclaredParts, Shown):
             and flat.normal != old.type.normal
         ):
             old = old.replace(axis=None, second=None)  # those of the plane
-        new = Pair(
-            old.name,
-            type,
-            old.a,
-            old.b,
-            point=old.point,
-            axis=old.axis,
-            second=old.second,
-            on_a=old.on_a,
-            on_b=old.on_b,
-            **(old.curves if travels(row_of(type, old.curve, old.surface)) else {}),
-        )
+        place = {name: getattr(old, name) for name in ("point", "axis", "second", "on_a", "on_b")}
+        new = Pair(old.name, type, old.a, old.b, **place, **(old.curves if travels(row) else {}))
         if not isinstance(new.type, PairType):
             raise DeclarationError(f"mechanism {self.name!r}", new.faults())
         if new.type.takes_pitch:

@@ -499,7 +499,7 @@ class Pair(Described):
     @property
     def says_more(self) -> bool:
         """Whether it says more than its type and where it sits."""
-        return bool(SAID_MORE(self) != SAID_MORE(Pair))
+        return any(one is not usual for one, usual in zip(SAID_MORE(self), SAID_MORE(Pair), strict=True))
 
     @property
     def curves(self) -> dict[str, Any]:

@@ -731,8 +731,7 @@ def _factors(part: LawPieces, rise: float, over: float, at_ends: Sequence[bool])
 class CamLaws(RowsByName[LawFactors]):
     """The factors of the standard laws by name; prints as a table."""
 
-    @cached_property
-    def _rows(self) -> dict[str, LawFactors]:  # type: ignore[override]  # made at the first reading
+    def __init__(self) -> None:
         shapes = {name: rise_of(name) for name in (*SCCA, *RISES)}
         shapes["scca (1/3, 1/3, 1/3)"] = of_scca(1 / 3, 1 / 3, 1 / 3)
         shapes["scca (1/5, 0, 3/5)"] = of_scca(0.2, 0.0, 0.6)
@@ -743,7 +742,7 @@ class CamLaws(RowsByName[LawFactors]):
             out[name] = _factors(
                 shape, 1.0, 1.0, [bool(e > SEAM_ROUNDING * max(s, 1.0)) for e, s in zip(ends, size, strict=True)]
             )
-        return dict(sorted(out.items(), key=lambda item: item[1].Ca))
+        self._rows = dict(sorted(out.items(), key=lambda item: item[1].Ca))
 
     def document(self) -> Document:
         """The table as a document."""

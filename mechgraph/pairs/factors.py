@@ -314,9 +314,9 @@ class Factor(ABC):
     def scaled(self, L: float) -> Factor:
         """The factor with its lengths divided by ``L``; itself where it has none."""
 
-    @abstractmethod
     def stack(self, factors: Sequence[Factor], counts: Sequence[int]) -> Stack:
         """``counts`` copies each of ``factors`` of this kind, evaluated together."""
+        return PoseStack(self)
 
 
 class Stack(ABC):
@@ -532,6 +532,38 @@ class RotationStack(Stack):
 def entries(X: Array) -> Array:
     """Entries of homogeneous poses and of their inverses, ``(32, n, T)``."""
     return np.concatenate([homogeneous(Y).reshape(16, *X.shape[2:]) for Y in (X, inverse(X))])
+
+
+class PoseStack(Stack):
+    """Copies of one factor of any kind, by its pose: the values are the entries of the pose and of its inverse.
+
+    Only constant screws take the pitch of a pair; the pose of any other factor is asked for with pitch zero.
+    """
+
+    def __init__(self, factor: Factor) -> None:
+        self.factor = factor
+
+    def values(self, x: Array) -> Array:
+        """Entries of the homogeneous pose and of its inverse, ``(32, n, T)``."""
+        return entries(self.factor.pose(x, np.zeros((x.shape[1], 1))))
+
+    def coefficients(self, pitch: Array, back: Flags) -> Array:
+        """Ones: the first sixteen values are the entries of the pose, the others those of its inverse."""
+        pick = np.eye(16).reshape(4, 4, 16)
+        out = np.zeros((4, 4, 32, len(back), 1))
+        out[:, :, :16, ~back, 0], out[:, :, 16:, back, 0] = pick[..., None], pick[..., None]
+        return out
+
+    def constant_twists(self, pitch: Array) -> None:
+        """None: they may move."""
+
+    def twists(self, x: Array, pitch: Array) -> Array:
+        """Those of the factor."""
+        return self.factor.twists(x, pitch)
+
+    def twist_rates(self, x: Array, dq: Array, pitch: Array) -> Array | None:
+        """Those of the factor."""
+        return self.factor.twist_rates(x, dq, pitch)
 
 
 class FixedStack(Stack):

@@ -17,7 +17,7 @@ from mechgraph.maths.se3 import Array, cross
 from mechgraph.maths.tolerances import COMPLEX_STEP, SHAPES
 from mechgraph.memo import dataclass
 from mechgraph.pairs.curves import ORDERS, Curve, CurvePlace, Travel, outside, point_text, shape_faults, turned
-from mechgraph.pairs.factors import UNIT_TWISTS, Factor, Flags, Freedom, Stack, entries
+from mechgraph.pairs.factors import UNIT_TWISTS, Factor, Freedom, PoseStack, Stack, entries
 from mechgraph.quantities import LENGTH, is_numeric, wrong
 
 
@@ -101,11 +101,12 @@ class Travelling(Factor):
         return np.matmul(self.start[:, :3].T, screw.reshape(2, 3, -1)).reshape(6, *p.shape[1:])
 
 
-class TravellingStack(Stack):
-    """Copies of one of them, by their poses; a place serves poses, twists and rates at the same coordinates."""
+class TravellingStack(PoseStack):
+    """Copies of one of them; a place serves poses, twists and rates at the same coordinates."""
 
-    def __init__(self, travelling: Travelling) -> None:
-        self.travelling = travelling
+    def __init__(self, factor: Travelling) -> None:
+        super().__init__(factor)
+        self.travelling = factor
         self._last: tuple[Array, Any] | None = None
 
     def _here(self, x: Array) -> Any:
@@ -117,16 +118,6 @@ class TravellingStack(Stack):
     def values(self, x: Array) -> Array:
         """Entries of the pose and of its inverse."""
         return entries(self.travelling.pose_at(self._here(x)))
-
-    def coefficients(self, pitch: Array, back: Flags) -> Array:
-        """Ones: the first sixteen values are the entries of the pose, the others those of its inverse."""
-        pick = np.eye(16).reshape(4, 4, 16)
-        out = np.zeros((4, 4, 32, len(back), 1))
-        out[:, :, :16, ~back, 0], out[:, :, 16:, back, 0] = pick[..., None], pick[..., None]
-        return out
-
-    def constant_twists(self, pitch: Array) -> None:
-        """None: they move."""
 
     def twists(self, x: Array, pitch: Array) -> Array:
         """Those of the factor."""
