@@ -218,15 +218,8 @@ class LoopSystem(ReducedRows):
         super().__init__(rows, fixed)
         self.borders = borders
         self._match()
-        self.pattern, self._constant = self._border(beside=False)
+        self.pattern, self._constant = self._border()
         self.first = self.factor(rows)
-        # smallest pivot below which another bordering is tried
-        if borders is None and self.shared and not self.first.smallest_pivot > 1e-3:
-            own = self.first, self.pattern, self._constant
-            self.pattern, self._constant = self._border(beside=True)
-            self.first = self.factor(rows)
-            if own[0].smallest_pivot > self.first.smallest_pivot:
-                self.first, self.pattern, self._constant = own
         self.smallest = self.first.smallest_pivot
         self.regular = self.smallest > PIVOT
         self.pivot_limit = max(PIVOT, WORSE * self.smallest)
@@ -365,26 +358,23 @@ class LoopSystem(ReducedRows):
         out.data *= self.scale[self.free][out.indices]
         return scipy.sparse.csr_array(out)
 
-    def _border(self, beside: bool) -> tuple[Pattern, Array]:
+    def _border(self) -> tuple[Pattern, Array]:
         """The pattern of the square system and its constant values.
 
-        A random column for every row left over, in the rows of its loop, or where it is ``beside`` them also in those of the
-        neighbors; a random row for every column left over. Or the borders that are given.
+        A random column for every row left over, in the rows of its loop; a random row for every column left over. Or the borders that
+        are given.
         """
         rows, cols, data = self._inner
         rng = np.random.default_rng(17)
         if self.borders is not None:
             (number, support), (held, columns) = (np.indices(part.T.shape).reshape(2, -1) for part in self.borders)
             constant = np.concatenate([part.T.ravel() for part in self.borders])
-        elif beside:
-            number, support = _shares(self._touch, self._touch.T.tocsr(), self._left_rows)
         else:
             height = np.concatenate([self.kept, np.ones(self.rows.further, dtype=np.intp)])
             count = height[self.shared_in]
             number = np.repeat(np.arange(len(count)), count)
             first = np.cumsum(height)[self.shared_in] - count
             support = first[number] + np.arange(len(number)) - (np.cumsum(count) - count)[number]
-        if self.borders is None:
             held, columns = _shares(self._touch.T.tocsr(), self._touch, self._left_cols.astype(np.intp))
             constant = np.concatenate([data, _random_units(rng, number), _random_units(rng, held)])
         self._size = self._n + self.shared
