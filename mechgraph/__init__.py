@@ -139,12 +139,10 @@ def __getattr__(name: str) -> Any:
             from mechgraph.compiled import compiled as home
         case "Decomposition" | "Group":
             from mechgraph.determinacy import decomposition as home
-        case "equivalent" | "multiple_joints" | "split_joint":
+        case "equivalent" | "multiple_joints" | "split_joint" | "to_planar" | "to_spatial":
             from mechgraph.determinacy import equivalent as home
         case "Families":
             from mechgraph.determinacy import families as home
-        case "to_planar" | "to_spatial":
-            from mechgraph.determinacy import flat as home
         case "DeterminacyReport" | "Structure" | "check" | "groups" | "structure":
             from mechgraph.determinacy import report as home
         case "snapped":
