@@ -40,17 +40,21 @@ from mechgraph.quantities import is_numeric, shown, wrong
 def refuse_mixed_lengths(here: Configuration) -> None:
     """Raise a DeclarationError where the first position of a configuration has such a loop; looked at once at a position."""
     m, key = here.system.m, here.x[:, 0].tobytes()
-    told = m.once(_told)
+    told = m.once(_kept)["sound"]
     if key not in told:
         if fault := _fault(here):
             raise DeclarationError(f"mechanism {m.name!r}", [fault])
         told.clear()
-        told.add(key)
+        told[key] = True
 
 
-def _told(m: Mechanism) -> set[bytes]:
-    """The last state that has no such loop."""
-    return set()
+def _kept(m: Mechanism) -> dict[str, dict[bytes, Any]]:
+    """What is kept with a mechanism, by coordinates or states.
+
+    ``sound``: the last state that has no such loop; ``starts``: what is known of a start beside the mechanism, system and configuration;
+    ``searched``: the best state that a search from a start found, and its closure error; ``opposite``: what ``_opposite_axis`` says then.
+    """
+    return {name: {} for name in ("sound", "starts", "searched", "opposite")}
 
 
 def _fault(here: Configuration) -> str:
@@ -93,7 +97,7 @@ def scaled_start(m: Mechanism) -> Configuration:
     """
     raw = indexed(m)
     q = raw.start_coordinates(m.start)
-    kept, key = m.once(_kept_starts), q.tobytes()
+    kept, key = m.once(_kept)["starts"], q.tobytes()
     again = key in kept
     if again:
         known, evaluated = kept[key]
@@ -108,11 +112,6 @@ def scaled_start(m: Mechanism) -> Configuration:
             getattr(here, name)
         kept[key] = here.system.known(), here.evaluated()
     return here
-
-
-def _kept_starts(m: Mechanism) -> dict[bytes, tuple[dict[str, Any], dict[str, Any]]]:
-    """What is known of a start beside the mechanism, system and configuration, by the coordinates."""
-    return {}
 
 
 def scaled(here: Configuration) -> Configuration:
@@ -243,12 +242,12 @@ def _closed_start(m: Mechanism, preferred: Mapping[str, float], tol: float) -> C
         return here
     if error <= CLOSED:
         return scaled(Configuration(system, close_all(system, here.x, np.arange(0))[0]))
-    known, asked = m.once(_searched), x.tobytes()
+    known, asked = m.once(_kept)["searched"], x.tobytes()
     if not tol or known.get(asked, (x, 0.0))[1] <= tol:  # a search with a tolerance begins at the same guesses
         known[asked] = _search(m, system, x, preferred, tol)
     x, error = known[asked]
     if error > max(CLOSED, tol):
-        words = m.once(_opposite)
+        words = m.once(_kept)["opposite"]
         if asked not in words:
             words[asked] = _opposite_axis(m, preferred, error)
         best = dict(zip(m.freedom_names(), system.coordinates_of(x[:, None])[:, 0].tolist(), strict=True))
@@ -260,16 +259,6 @@ def _closed_start(m: Mechanism, preferred: Mapping[str, float], tol: float) -> C
             best,
         )
     return scaled(Configuration(system, x[:, None]))
-
-
-def _searched(m: Mechanism) -> dict[bytes, tuple[Array, float]]:
-    """By the start from which the last search began: the best state that it found, and its closure error."""
-    return {}
-
-
-def _opposite(m: Mechanism) -> dict[bytes, str]:
-    """What ``_opposite_axis`` says, by the start from which a search failed."""
-    return {}
 
 
 def _belts_off(m: Mechanism) -> str:

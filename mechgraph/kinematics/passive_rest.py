@@ -354,9 +354,8 @@ class _Carried:
 
     def spin(self, nodes: Nodes) -> Array:
         """Increments ``(F, nodes)`` from nodes to one period later."""
-        return self._missing(nodes.x, nodes.which, nodes.track, nodes.place, np.ones(len(nodes), dtype=np.intp), None)[
-            1
-        ]
+        later = np.ones(len(nodes), dtype=np.intp)
+        return self._missing(nodes.x, nodes.which, nodes.track, nodes.place, later, None)[1]
 
     def _missing(
         self, x: Array, which: Index, track: Index, place: Array, turns: Index, expected: dict[int, Array] | None

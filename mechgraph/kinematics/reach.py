@@ -292,7 +292,7 @@ class _Way:
 
 def along_polygons_with_gaps(path: DriverPath, requests: list[Request], total: int) -> Positions:
     """Several drivers: all positions; see the head of this file."""
-    found = _within_ranges(path, requests, total)
+    found = _within_ranges(path, along_polygons(path, requests, total))
     polygons = []
     for i, request in enumerate(requests):
         if (ended := _ended(found, i)) is not None:
@@ -309,7 +309,7 @@ def along_polygons_with_gaps(path: DriverPath, requests: list[Request], total: i
             again.append(ahead)
             back += behind
         variants = path.variant_of
-        more = _within_ranges(path, again + back, total)
+        more = _within_ranges(path, along_polygons(path, again + back, total))
         path.variant_of = np.concatenate([variants, path.variant_of])
         places = [request.places for request in again]
         places += [r.places[more.moved[r.places]] for r in back]
@@ -326,9 +326,8 @@ def along_polygons_with_gaps(path: DriverPath, requests: list[Request], total: i
     return found
 
 
-def _within_ranges(path: DriverPath, requests: list[Request], total: int) -> Positions:
-    """All positions, each polygon up to where a coordinate leaves its range."""
-    found = along_polygons(path, requests, total)
+def _within_ranges(path: DriverPath, found: Positions) -> Positions:
+    """All positions, each track up to where a coordinate leaves its range."""
     end_at_ranges(path, found)
     end_beside_poles(path, found)
     return found
@@ -468,10 +467,7 @@ def follow(path: DriverPath, requests: list[Request], total: int) -> Positions:
     """States at all positions asked for; ``total`` positions in all."""
     if path.size[1] != 1:
         return along_polygons_with_gaps(path, requests, total)
-    found = _along_curves(path, requests, total)
-    end_at_ranges(path, found)
-    end_beside_poles(path, found)
-    return found
+    return _within_ranges(path, _along_curves(path, requests, total))
 
 
 def _along_curves(path: DriverPath, requests: list[Request], total: int) -> Positions:
