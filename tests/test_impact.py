@@ -326,6 +326,56 @@ def test_a_block_slides_on_a_floor_that_only_holds_it_up():
     assert r.energy.friction[-1] == pytest.approx(1.0, rel=1e-9)
 
 
+def woodpecker(start):
+    """The woodpecker toy where its sleeve and its bird have turned by ``start``, with the numbers of Glocker's thesis, 1995."""
+    r0, half, pivot, far, beak = 2.5e-3, 5.8e-3, 1e-2, 1.5e-2, (4.9e-3, 2e-2)
+    links = [
+        mg.Link("pole"),
+        mg.Link("slider"),
+        mg.Link("sleeve", 3e-4, (0, 0), 5e-9),
+        mg.Link("bird", 4.5e-3, (pivot + far, 0), 7e-7),
+    ]
+    pairs = [
+        mg.Pair("G", "P", "pole", "slider", point=(0, 0), axis=(0, 1)),
+        mg.Pair("M", "R", "slider", "sleeve", point=(0, 0)),
+        mg.Pair("S", "R", "sleeve", "bird", point=(pivot, 0)),
+    ]
+    m = mg.Mechanism("woodpecker", links, pairs, planar=True, units={"length": "m", "mass": "kg", "time": "s"})
+    begun = mg.kinematics(m.replace(drives=["G", "M", "S"]), {"G": 0.0, **start})
+    line = mg.Curve.line(point=(r0, 0, 0), direction=(0, -1, 0))
+    loads = [mg.Gravity((0, -G)), mg.Spring(freedom="S", stiffness=5.6e-3)]
+    for name, link, at, e in (
+        ("K1", "bird", beak, 0.5),
+        ("K2", "sleeve", (3.1e-3, -half), 0.0),
+        ("K3", "sleeve", (3.1e-3, half), 0.0),
+    ):
+        gap = (begun.link(link).pose @ [*at, 0.0, 1.0])[0] - r0
+        on = {"on_a": mg.Marker((r0, at[1], 0), Z, -Y), "on_b": mg.Marker((*at, 0), Z, -Y)}
+        pairs.append(mg.Pair(name, "Ps", "pole", link, **on, closed="force", curve=line, restitution=e, gap=gap))
+        loads.append(mg.Friction(name, mu=0.3))
+    return m.replace(pairs=pairs, loads=loads)
+
+
+@pytest.mark.slow
+def test_a_woodpecker_comes_back_to_itself_after_a_period():
+    """The limit cycle by Moreau's time stepping in C with steps of 1e-7 s: period .193764 s, a step down of 56.18 mm, and a state in
+    flight on it. By equations linear in the angles, from the start that R. I. Leine and others publish, the same stepping gives .1460 s,
+    which is what they print; with these the laws of Newton and of Poisson agree.
+    """
+    sleeve, bird, rates, period = 0.074085391, 0.073342754, (-0.02932194, -8.0959802, -3.5985852), 0.193764
+    start = {"M": sleeve, "S": bird - sleeve}
+    begin = {"G": rates[0], "M": rates[1], "S": rates[2] - rates[1]}
+    r = mg.respond(woodpecker(start), (0, period), start=start, rates=begin, rtol=1e-6, atol=1e-8)
+    assert [str(one).split(" at ")[0] for one in r.events].count("K1 lands") == 1
+    assert r["G"].position[-1, 0] - r["G"].position[0, 0] == pytest.approx(-0.05618, rel=1e-4)
+    (beak,) = (one.t for one in r.events if str(one).startswith("K1"))
+    assert beak == pytest.approx(0.182694, abs=2e-6)
+    turned = [r[name].position[-1, 0] for name in "MS"]
+    np.testing.assert_allclose(turned, list(start.values()), atol=1e-4)
+    np.testing.assert_allclose([r[name].velocity[-1, 0] for name in "MS"], [begin["M"], begin["S"]], atol=5e-3)
+    assert np.abs(r.energy.balance).max() < 1e-8
+
+
 @pytest.mark.slow
 def test_a_woodpecker_strikes_its_pole_as_a_program_of_its_own_says():
     """Against Moreau's time stepping of its three coordinates, turned in full, from rest of the sleeve to the first stroke of the beak.
@@ -386,44 +436,9 @@ def test_a_woodpecker_strikes_its_pole_as_a_program_of_its_own_says():
         return q
 
     start, rate, end = np.array([0.0, -0.05, -0.15]), -7.4583, 0.12
-    line, gaps = mg.Curve.line(point=(r0, 0, 0), direction=(0, -1, 0)), contacts(start)[0]
-    on = {"K1": (pivot + beak[0], beak[1], 0.0), "K2": (r, -h, 0.0), "K3": (r, h, 0.0)}
-    touch = [
-        mg.Pair(
-            name,
-            "Ps",
-            "pole",
-            "sleeve" if i else "bird",
-            on_a=mg.Marker((r0, at[1], 0), Z, -Y),
-            on_b=mg.Marker(at, Z, -Y),
-            closed="force",
-            curve=line,
-            restitution=e[i],
-            gap=gaps[i],
-        )
-        for i, (name, at) in enumerate(on.items())
-    ]
-    links = [
-        mg.Link("pole"),
-        mg.Link("slider"),
-        mg.Link("sleeve", m_sleeve, (0, 0, 0), j_sleeve * np.eye(3)),
-        mg.Link("bird", m_bird, (pivot + far, 0, 0), j_bird * np.eye(3)),
-    ]
-    pairs = [
-        mg.Pair("G", "P", "pole", "slider", point=(0, 0, 0), axis=Y),
-        mg.Pair("M", "R", "slider", "sleeve", point=(0, 0, 0), axis=Z),
-        mg.Pair("S", "R", "sleeve", "bird", point=(pivot, 0, 0), axis=Z),
-    ]
-    loads = [mg.Gravity((0, -G, 0)), mg.Spring(freedom="S", stiffness=k), *(mg.Friction(name, mu=mu) for name in on)]
-    m = mg.Mechanism("woodpecker", links, [*pairs, *touch], loads=loads, planar=True)
-    found = mg.respond(
-        m,
-        (0, end),
-        start={"M": start[1], "S": start[2] - start[1]},
-        rates={"G": 0.0, "M": 0.0, "S": rate},
-        rtol=1e-7,
-        atol=1e-9,
-    )
+    begin = {"M": start[1], "S": start[2] - start[1]}
+    m = woodpecker(begin)
+    found = mg.respond(m, (0, end), start=begin, rates={"G": 0.0, "M": 0.0, "S": rate}, rtol=1e-7, atol=1e-9)
     names = [str(one).split(" at ")[0] for one in found.events]
     assert names[:6] == ["K2 lands", "K2 sticks", "K2 slips", "K2 opens", "K3 lands", "K1 lands"]
     q = stepped(start, np.array([0.0, 0.0, rate]), end, 2e-5)
