@@ -656,6 +656,25 @@ def test_gears_on_other_axes(kind, torque):
         assert gears[1].point[1] == pytest.approx(0.0565685, abs=1e-6)
 
 
+@pytest.mark.parametrize("backlash", [2e-4, 0.0])
+def test_gears_that_move_apart_until_no_tooth_reaches_the_other(backlash):
+    """Tip circles of 22 and 42 mm, axes 60.5 mm apart: they are past each other from 3.5 mm more on, in time and at given positions."""
+    m = gear_on_a_slide("forward")
+    m = m.replace(couplings=[m.couplings[0].replace(backlash=backlash)])
+    if not backlash:
+        given = m.replace(drives=["P", "A"])
+        mg.solve(given, {"P": [0.0, 0.0034], "A": [0.0, 0.0]}, loads=[])
+        with pytest.raises(
+            mg.DeclarationError, match=r"'two' moves against .* by up to 0.0036; .* where teeth reach each other"
+        ):
+            mg.solve(given, {"P": [0.0, 0.0036], "A": [0.0, 0.0]}, loads=[])
+        return
+    apart = [mg.Effort("P", 50.0)]
+    assert mg.respond(m, [0.0, 0.01], loads=apart).t[-1] == 0.01
+    with pytest.raises(mg.DeclarationError, match="where teeth reach each other"):
+        mg.respond(m, [0.0, 0.016], loads=apart)
+
+
 def test_shafts_that_leave_their_places():
     gears = KINDS["bevel"][0]
     pairs = [

@@ -66,6 +66,8 @@ class Meshing(LineCoupling):
     flank: str = "auto"
     play: str = ""
     backlash: float = 0.0
+    reach: float = float("inf")
+    """The distance of parallel axes from which on teeth do not reach each other, over that at the start."""
 
     @abstractmethod
     def _met(self, m: Any) -> Meeting:
@@ -101,6 +103,7 @@ class Meshing(LineCoupling):
             "held": met.held,
             "other": flanks[1] if both else flanks[0],
             "turning": tuple(not isinstance(gear, GearRack) for gear in (met.one, met.two)),
+            "reach": met.reach if self.sized else float("inf"),
         }
         return self._put(m, steps, coefficients, **known)
 
@@ -134,7 +137,9 @@ class Meshing(LineCoupling):
         """See ``LineCoupling``."""
         if self.relation in CROSSING.values():
             return "axes that keep their places: hold the shaft in bearings, with its gear on their axis"
-        return "a rack that slides at right angles to the axis of its pinion" if self._racked else super().keeps
+        if self._racked:
+            return "a rack that slides at right angles to the axis of its pinion"
+        return super().keeps.replace(":", ", where teeth reach each other:")
 
     @property
     def _racked(self) -> bool:
@@ -147,7 +152,9 @@ class Meshing(LineCoupling):
             off = np.hypot(dot(pinion.axis, rack.axis), dot(pinion.axis, rack.mark))
             return off, 0.0 * off
         if self.relation not in CROSSING.values():
-            return super().strayed(a, b, a0, b0)
+            leans, _ = super().strayed(a, b, a0, b0)
+            now, then = (np.sqrt((cross(q.point - p.point, p.axis) ** 2).sum(axis=0)) for p, q in ((a, b), (a0, b0)))
+            return leans, np.where(now > self.reach * then, now - then, 0.0)
         places = []
         for p, q in ((a, b), (a0, b0)):
             foot_a, foot_b, w = feet(p, q)
@@ -319,6 +326,7 @@ class Meeting(ABC):
     numbers: tuple[float, ...] = ()
     period: float = np.inf
     held: tuple[bool, bool] = (False, False)
+    reach: float = np.inf
 
     def __init__(self, one: Any, two: Any, a: LinePlaces, b: LinePlaces) -> None:
         self.one, self.two, self.a, self.b = one, two, a, b
@@ -399,6 +407,8 @@ class Parallel(Meeting):
         self.distance = float(np.sqrt(dot(across, across))[0, 0])
         self.numbers = (one.base_radius, two.base_radius, one.base_radius * one.base_lean, *_halves(one, two))
         self.period = one.base_pitch
+        if not (one.internal or two.internal):
+            self.reach = (tip_radius(one) + tip_radius(two)) / self.distance
 
     def powers(self, forward: bool) -> tuple[float, float]:
         """See ``Meeting``: the base radii times the cosine of the lean of the line."""
