@@ -192,12 +192,14 @@ class Newton:
             step = np.where(finite, step, 0.0) * np.minimum(1.0, LONGEST / np.maximum(size, LONGEST))
             x[:, at] = problem.advance(point.x, step, tracks[at])
             total[:, at] += step
+            # that of a small loop far from the origin is large beside the loop
+            rounded = (left > 0.5 * before[at]) & (left <= point.rounding)
             before[at] = left
             small = size <= step_goal
             if step_goal <= PATH.node and small.any():
                 # the rates of a node err by the last step times the condition: poor ones are closed further, down to rounding
                 poor = np.maximum(f.condition, 1.0)
-                small &= size <= np.maximum(PATH.rates / poor, PATH.rounding * poor)
+                small &= rounded | (size <= np.maximum(PATH.rates / poor, PATH.rounding * poor))
             # rows that were left out as dependent are not where a last step leaves their residual as large as it is: another form is tried
             # once. A residual 30 times the step is no matter of sizes: rows are of size one, with a few freedoms each
             unmet = small & (left > np.maximum(30.0 * size, 10.0 * PATH.accepted))
