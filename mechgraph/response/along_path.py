@@ -112,8 +112,9 @@ class AlongTerms:
         return out
 
     def forces(self, values: Array, rate: Array | float, t: Array) -> tuple[Array, Array]:
-        """Generalized forces ``(T,)`` of the other loads, stored and not, at times ``(T,)`` with values ``(m,)`` or ``(m, T)`` and
-        a rate, or one at each; internal units.
+        """Generalized forces ``(T,)`` of the other loads, stored and not, at times ``(T,)``; internal units.
+
+        ``values``: of one place ``(m,)``, or ``(m, T)`` with a rate each.
         """
         stored, rest = (
             _AlongSite(self, values, rate, t).collected(some) if some else np.zeros(len(t))

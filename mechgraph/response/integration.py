@@ -51,8 +51,8 @@ _SERIES[:, 0] *= 0.5
 def overlooked(along: Callable[[Array], Array], begin: float, end: float, apart: float, allowed: Array) -> bool:
     """Whether a step from ``begin`` to ``end`` may have missed something.
 
-    ``along(t (T,))``: accelerations ``(k, T)`` of what need not be smooth, NaN where they are not known; ``apart``: greatest
-    distance of looks; ``allowed (k,)``: changes of the rates within the tolerance.
+    ``along(t (T,))``: accelerations ``(k, T)`` of what need not be smooth, NaN where they are not known; ``apart``: greatest distance
+    of looks; ``allowed (k,)``: changes of the rates within the tolerance.
     """
     h = end - begin
     # fewest places between them at which is looked
