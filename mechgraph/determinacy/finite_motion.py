@@ -255,7 +255,8 @@ def _near_by(start: _Closed, rng: np.random.Generator) -> FiniteMotion:
         length, there = float(np.abs(change).max()), start.reached(x)
         rank = max(rank, there.closure.rank)
         dimension = there.N.shape[1]
-        if dimension and not there.regular(there.random(rng)):
+        # one direction may lie by chance, to the accuracy of a step, in a branch of fewer dimensions; two do not
+        if dimension and not all(there.regular(there.random(rng)) for _ in range(2)):
             # this near to where branches meet a step may cross to another one: only where nothing else is known
             near = length < 2 * TRIAL_STEPS[1]
             dimension = 0 if near and best.mobility else there.dimension()

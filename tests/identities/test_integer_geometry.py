@@ -112,6 +112,12 @@ def test_pivots_alone_prove_no_rank() -> None:
     assert [mg.check(m, engine=engine).finite_mobility for engine in ("dense", "sparse")] == [1, 1]
 
 
+def test_one_trial_step_proves_no_motion() -> None:
+    """Mobility 3 wherever it gets, and 2 finite: a random direction had 0.003 of itself outside of these, too little to open loops."""
+    m = integer_mechanism(88000013)
+    assert [mg.check(m, engine=engine).finite_mobility for engine in ("dense", "sparse")] == [2, 2]
+
+
 def test_a_trial_step_does_not_cross_to_another_branch() -> None:
     """Two branches of mobility 1 meet; a position 0.004 beside it, where the rank is a matter of rounding, had both within a step."""
     m = integer_mechanism(5000087)
