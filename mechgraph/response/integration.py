@@ -6,7 +6,7 @@ Over a step of length ``h`` in which the motion is followed to a tolerance, a fo
 through its values at Chebyshev points. Where it differs somewhere by an acceleration ``e``, the step may miss a change ``h e`` of a
 rate; it is refused where that is far above the tolerance.
 
-The equations of motion integrated in time by the steppers of scipy, stage after stage.
+The equations of motion integrated in time by the steppers of scipy, stage after stage; the kernel takes the steps of DOP853 along a path.
 
 A stage is a choice of coordinates that serves for a while: a local chart of independent freedoms (``charts``), or the distance along the
 only path there is (``along_path``). A segment is one accepted step: its times, its stage and the dense output of the stepper in the

@@ -637,7 +637,8 @@ def respond(
         Longest step. Steps end at the ``breaks`` of loads. A look at 2,000 times between begin and end finds pulses, and humps of tables
         and functions of place or rate, that steps missed; shorter ones need ``breaks``, or ``max_step``.
     engine : {"auto", "dense", "sparse", "compiled"}
-        As in ``solve``; the kernel finds the accelerations of independent freedoms, and tabulates the path of a single one.
+        As in ``solve``; the kernel finds the accelerations of independent freedoms, or tabulates the path of a single one and takes the
+        steps of DOP853 along it.
     events : Event or iterable of Event, optional
         Watched quantities; a terminal event ends the motion.
     stops : Stop or iterable of Stop, optional
