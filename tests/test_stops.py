@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
+from mechgraph.response.resting import Rests
 
 X, Y, Z = np.eye(3)
 G = 9.81
@@ -97,6 +98,37 @@ def test_a_body_rests_on_its_stop_until_it_is_lifted():
     after = np.maximum(r.t - t0, 0.0)
     np.testing.assert_allclose(r["A"].position[:, 0], 4 * after**3 / 6, atol=1e-9)
     np.testing.assert_allclose(r["A"].applied_effort[:, 0], np.where(after > 0, 0.0, G - 4 * r.t), atol=1e-9)
+
+
+def test_beside_a_sled_that_comes_to_rest_a_body_is_lifted_from_its_stop_once(monkeypatch):
+    """The closed forms of both: what a stop bears decides when it lets go, which is asked at few instants and not again and again."""
+    asked = []
+    settled = Rests._settled
+    monkeypatch.setattr(
+        Rests,
+        "_settled",
+        lambda *of: (asked.append(of[1]), len(asked) < 50 or pytest.fail(f"{asked}"), settled(*of))[2],
+    )
+    lift = mg.Wrench("ball", force=lambda pose, twist, t: np.stack([0 * t, 4 * t, 0 * t], axis=-1), point=(0, 0, 0))
+    pairs = [
+        mg.Pair("A", "P", "frame", "ball", point=(0, 0, 0), axis=Y),
+        mg.Pair("B", "P", "frame", "sled", point=(1, 0, 0), axis=X),
+    ]
+    links = [mg.Link("frame"), body("ball"), body("sled", center=(1, 0, 0))]
+    m = mg.Mechanism("both", links, pairs, loads=[mg.Gravity((0, -G, 0)), lift, mg.Friction("B", mu=0.25)])
+    stop = mg.Stop("A", lower=0.0)
+    r = mg.respond(m, np.linspace(0, 4, 41), rates={"B": 2.0}, rtol=1e-10, atol=1e-12, stops=[stop])
+    assert [str(one).split(" at ")[0] for one in r.events] == [
+        "A meets its lower stop",
+        "B sticks",
+        "A leaves its lower stop",
+    ]
+    stands, t0 = 2.0 / (0.25 * G), G / 4
+    np.testing.assert_allclose([one.t for one in r.events[1:]], [stands, t0], atol=1e-8)
+    after, slid = np.maximum(r.t - t0, 0.0), np.minimum(r.t, stands)
+    np.testing.assert_allclose(r["A"].position[:, 0], 4 * after**3 / 6, atol=1e-8)
+    np.testing.assert_allclose(r["A"].applied_effort[:, 0], np.where(after > 0, 0.0, G - 4 * r.t), atol=1e-8)
+    np.testing.assert_allclose(r["B"].position[:, 0], 2.0 * slid - 0.125 * G * slid**2, atol=1e-8)
 
 
 def test_two_bodies_strike_one_stop_and_pass_the_blow_on():
