@@ -192,9 +192,10 @@ def _of_truss(family: Family) -> Bound | None:
         return None
     locked = [k for k in P if not np.isin(np.arange(s.first_column[k], s.first_column[k + 1]), family.free).any()]
     body = components_of_edges(len(s.m.links), [s.graph.ends[k] for k in locked])
-    code = _truss([(int(body[a]), int(body[b])) for k, (a, b) in enumerate(s.graph.ends) if k not in locked])
+    own = [(int(body[a]), int(body[b])) for k, (a, b) in enumerate(s.graph.ends) if k not in locked]
     for joints, count, source in TRUSSES:
-        if code == _truss([(int(ends[0]), int(ends[1])) for ends in joints.split()]):
+        known = [(int(ends[0]), int(ends[1])) for ends in joints.split()]
+        if len(own) == len(known) and _truss(own) == _truss(known):
             return Bound(count, source)
     return None
 
