@@ -168,11 +168,6 @@ LADDER: dict[str, Callable[[], Rung]] = {
     "four-bar of two dyads, 5 poses": lambda: (
         four_bar(), mg.poses("coupler", _rows(5, 3)), ["A.point", "B.point", "C.point", "D.point"], 12,
     ),
-}  # fmt: skip
-LARGE: dict[str, Callable[[], Rung]] = {
-    "four-bar function, 3 pairs and 2 slopes": lambda: (
-        four_bar(), mg.function("A", "D", _rows(3, 2), rates=[np.nan, 0.6, 0.7]), ["B.point", "C.point"], 3,
-    ),
     "S-S dyad, 7 poses": lambda: (
         spatial("S-S", ("S", (0, 0, 0), None), ("S", (1, 0.3, 0.1), None)),
         mg.poses("body", turned(7, 1.0)), ["O.point", "P.point"], 20,
@@ -185,4 +180,21 @@ LARGE: dict[str, Callable[[], Rung]] = {
         mg.function("O", "R", _rows(7, 2)), ["P.point", "Q.point"], 2,
     ),
 }  # fmt: skip
+LARGE: dict[str, Callable[[], Rung]] = {
+    "four-bar function, 3 pairs and 2 slopes": lambda: (
+        four_bar(), mg.function("A", "D", _rows(3, 2), rates=[np.nan, 0.6, 0.7]), ["B.point", "C.point"], 3,
+    ),
+}  # fmt: skip
 """Rungs of minutes, without kept start sets: for ``benchmarks/make_task_starts.py``."""
+
+PUBLISHED = {
+    "R-R dyad, 5 poses": "Burmester, Lehrbuch der Kinematik, 1888",
+    "four-bar of two dyads, 5 poses": "pairs of the four dyads of Burmester, Lehrbuch der Kinematik, 1888",
+    "spherical R-R, 5 orientations": "Roth, On the screw axes and other special lines, J. Eng. Ind. 89, 1967",
+    "S-S dyad, 7 poses": "Innocenti, Polynomial solution of the spatial Burmester problem, J. Mech. Des. 117, 1995",
+    "four-bar path, 5 points, both pivots given": (
+        "36 or fewer, Morgan and Wampler, Solving a planar four-bar design problem using continuation, J. Mech. Des. 112, 1990"
+    ),
+    "R-R dyad, 4 poses": "the center-point curve is a cubic, Burmester, Lehrbuch der Kinematik, 1888",
+}
+"""Who says in print how many solutions a rung has."""

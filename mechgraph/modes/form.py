@@ -145,6 +145,14 @@ class RodSystem(System):
             vars(out)[name] = getattr(self, name)
         return out
 
+    def cases(self, which: Index) -> System:
+        """See there; points and lengths too."""
+        k, out = self.points, super().cases(which)
+        if k.squares.shape[1] == 1:
+            return out
+        points = replace(k, at_a=k.at_a[..., which], at_b=k.at_b[..., which], squares=k.squares[..., which])
+        return cast("RodSystem", out).with_points(points)
+
     def with_parameters(self, par: Parameters) -> RodSystem:
         """The same with other markers."""
         out = RodSystem(self.m, self.graph, par, self.points)
@@ -326,7 +334,7 @@ def rods_of(system: System, columns: Index) -> list[RodChain]:
         at[b].append(RodStep(k, -1))
     ends = {k for k, row in enumerate(rows) if _points(row) and driven.isdisjoint(_columns(system, k))}
     out: list[RodChain] = []
-    for k in sorted(ends, key=lambda k: _is_ball(rows[k])):
+    for k in sorted(ends, key=lambda k: is_ball(rows[k])):
         for body, sign in zip(system.graph.ends[k], (1, -1), strict=True):
             if k not in ends:
                 continue
@@ -338,7 +346,7 @@ def rods_of(system: System, columns: Index) -> list[RodChain]:
                     break
             last = steps[-1].pair
             # the first end may have two turns, as ends are taken in that order; the second is a ball
-            if len(steps) > 1 and last in ends and _is_ball(rows[last]) and links[-1] not in links[:-1]:
+            if len(steps) > 1 and last in ends and is_ball(rows[last]) and links[-1] not in links[:-1]:
                 out.append(RodChain(tuple(steps), tuple(links[:-1]), (body, links[-1])))
                 ends -= {k, last}
     return out
@@ -357,13 +365,14 @@ def _columns(system: System, pair: int) -> range:
     return range(system.first_column[pair], system.first_column[pair + 1])
 
 
-def _is_ball(row: PairType) -> bool:
+def is_ball(row: PairType) -> bool:
+    """Whether a pair does nothing but turn about one point, without a chart."""
     return len(row.steps) == 1 and row.steps[0].holds_rotation
 
 
 def _points(row: PairType) -> bool:
     """Whether a pair can point anywhere about one point and does nothing else: a ball, or two turns about different axes."""
-    if _is_ball(row):
+    if is_ball(row):
         return True
     twists = np.array([f.twist for f in row.freedoms])
     return (
@@ -395,7 +404,7 @@ class WithoutRods:
         )
         own = np.isin(whole.columns, self.kept)
         self.drive = np.concatenate([drive[own], self._squares()])
-        both = sum(not _is_ball(s.m.pairs[rod.steps[0].pair].type) for rod in rods)
+        both = sum(not is_ball(s.m.pairs[rod.steps[0].pair].type) for rod in rods)
         self.told: tuple[str, ...] = (f"{WAYS} ({counted(both, 'leg')} here).",) if both else ()
         if self.spare:
             self.told += (
@@ -544,7 +553,7 @@ class WithoutRods:
             to, of = of, to
         rows = slice(s.first_row[near.pair], s.first_row[near.pair + 1])
         row = s.m.pairs[near.pair].type
-        out[rows] = _ball(of, to, begin[rows]) if _is_ball(row) else _two_turns(row, of, to, begin[rows])
+        out[rows] = least_turn(of, to, begin[rows]) if is_ball(row) else _two_turns(row, of, to, begin[rows])
         # the ball at the other end, from both its markers
         last = compose(compose(bodies[0], behind(self.full, near, out)), C)
         A, B = (last, bodies[1]) if far.sign > 0 else (bodies[1], last)
@@ -556,7 +565,7 @@ def _unit(v: Array) -> Array:
     return np.asarray(v / np.sqrt((v * v).sum(axis=0)))
 
 
-def _ball(of: Array, to: Array, begin: Array) -> Array:
+def least_turn(of: Array, to: Array, begin: Array) -> Array:
     """Quaternions ``(4, T)`` that take directions ``of`` to those ``to (3, T)`` by the least turn from where they ``begin``."""
     a, u = np.broadcast_arrays(_unit(rotate(quaternion_matrix(begin), of)), _unit(to))
     cosine = (a * u).sum(axis=0)
@@ -582,12 +591,12 @@ def _two_turns(row: PairType, of: Array, to: Array, begin: Array) -> Array:
     ways = []
     for sign in (1.0, -1.0):
         v = alpha * first + beta * second + sign * across * normal
-        ways.append(np.stack([_angle(v, g, first), _angle(e, v, second)]))
+        ways.append(np.stack([angle_about(v, g, first), angle_about(e, v, second)]))
     apart = [np.abs(np.exp(1j * way) - np.exp(1j * begin)).max(axis=0) for way in ways]
     return np.where(apart[0] <= apart[1], *ways)
 
 
-def _angle(a: Array, b: Array, axis: Array) -> Array:
+def angle_about(a: Array, b: Array, axis: Array) -> Array:
     """Angles ``(T,)`` by which ``a`` turns about a unit ``axis`` into ``b``."""
     a, b = (v - axis * (axis * v).sum(axis=0) for v in (a, b))
     cosine, sine = (v / (a * a).sum(axis=0) for v in ((a * b).sum(axis=0), (axis * np.cross(a, b, axis=0)).sum(axis=0)))

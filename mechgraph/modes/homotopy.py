@@ -11,7 +11,9 @@ the size wanted (Allgower and Georg, Introduction to Numerical Continuation Meth
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Executor
 from contextlib import suppress
+from contextvars import ContextVar
 from dataclasses import field, replace
 from typing import Any, TypeAlias
 
@@ -37,6 +39,10 @@ FIRST_STEP = 0.02
 
 TRACKS_TOGETHER = 600
 """Tracks followed together, at most, of several positions or loops."""
+
+
+ELSEWHERE: ContextVar[Executor | None] = ContextVar("ELSEWHERE", default=None)
+"""Who follows tracks, in parts; None: this process."""
 
 
 class Equations:
@@ -279,16 +285,26 @@ def follow(
     tracks: Index | None = None,
     polish: bool = True,
     laps: int = 1,
+    stride: int = 0,
 ) -> Tracked:
     """Tracks from states ``x (nx, V)`` at ``s = 0`` to ``s = 1``, at the end polished; ``tracks`` are their numbers on the leg.
 
-    Of several ``laps`` each one follows the ways ``V`` numbers further on from where the last one ended. There no track waits for others,
-    and the last ones, which may come near to where assemblies meet, are given up where they take twice the steps of all others.
+    Of several ``laps`` each one follows the ways ``stride`` (else V) numbers further on from where the last one ended. There no track waits
+    for others, and the last ones, which may come near to where assemblies meet, are given up where they take twice the steps of all others.
     """
     V = x.shape[1]
-    every = np.arange(V) if tracks is None else tracks
+    every, stride = np.arange(V) if tracks is None else tracks, stride or V
+    # ways round an end are short, and no data
+    if (executor := ELSEWHERE.get()) is not None and way is straight and V > 1:
+        blocks = np.array_split(np.arange(V), min(-(-V // 32), 64))
+        parts = [
+            executor.submit(_followed_here, leg, x[:, at], care, straight, every[at], polish, laps, stride)
+            for at in blocks
+        ]
+        each = [vars(part.result()).values() for part in parts]
+        return Tracked(*(np.concatenate(values, axis=-1) for values in zip(*each, strict=True)))
     out = Tracked(x.copy(), np.zeros(V), np.zeros(V, dtype=bool), np.zeros(V, dtype=bool))
-    march = _March(leg, x, every, way)
+    march = _March(leg, x, every, way, stride)
     # steps after which a track is given up
     most = 2000 * laps
     for step in range(most):
@@ -308,18 +324,24 @@ def follow(
     done = np.flatnonzero(out.arrived)
     if done.size and polish:
         out.x[:, done], good = polished(
-            leg, out.x[:, done], way(np.ones(1))[0][0], every[done] + (laps - 1) * V, care.noise
+            leg, out.x[:, done], way(np.ones(1))[0][0], every[done] + (laps - 1) * stride, care.noise
         )
         out.arrived[done] = good
     return out
 
 
+def _followed_here(*asked: Any) -> Tracked:
+    """Tracks followed by this process, which may be a copy of one that has others do so."""
+    ELSEWHERE.set(None)
+    return follow(*asked)
+
+
 class _March:
     """Tracks on their way: ``who`` they are, states, places and next steps, and the rates at the last nodes, the newest first."""
 
-    def __init__(self, leg: Followed, x: Array, every: Index, way: Way) -> None:
+    def __init__(self, leg: Followed, x: Array, every: Index, way: Way, stride: int) -> None:
         V = x.shape[1]
-        self.leg, self.way, self.every = leg, way, every
+        self.leg, self.way, self.every, self.stride = leg, way, every, stride
         self.who, self.x, self.h = np.arange(V), x.copy(), np.full(V, FIRST_STEP)
         self.s, self.known, self.lap = np.zeros((RATES_KEPT, V)), np.zeros(V, dtype=np.intp), np.zeros(V, dtype=np.intp)
         t, dt = way(self.s[0])
@@ -333,7 +355,7 @@ class _March:
         leg, eq = self.leg, self.leg.equations
         s = np.minimum(self.s[0] + self.h, 1.0)
         h = s - self.s[0]
-        tracks = self.every[self.who] + self.lap * len(self.every)
+        tracks = self.every[self.who] + self.lap * self.stride
         with np.errstate(all="ignore"):
             x = eq.normal(self.x + self._ahead(h))
             t, dt = self.way(s)

@@ -126,8 +126,8 @@ class Syntheses(Shown, Sequence[Mechanism]):
         Solutions that are no mechanisms of their own: ``kind``, ``count``, ``text``.
     infinite : int
         How many went to infinity here.
-    completeness : {"tested", "searched"}
-        A trace test passed, and no track was lost; or not.
+    completeness : {"proved", "tested", "searched"}
+        As many as are published for such tasks; a trace test passed, and no track was lost; or neither.
     evidence : tuple of str
         The reasons, with numbers.
     condition : (n,) array
@@ -326,25 +326,29 @@ class Syntheses(Shown, Sequence[Mechanism]):
 
     def document(self) -> Document:
         """A table of the mechanisms, and how sure it is that these are all."""
-        several = bool(self.sources)
-        rows = tuple(
-            (
-                str(i),
-                *([self.sources[i].name] if several else [f"{v:.6g}" for v in values]),
-                "yes" if fit.good else "no",
-                _degrees(fit.transmission),
-                f"{fit.size:.4g}",
-            )
-            for i, (values, fit) in enumerate(zip(self.values, self.fitness, strict=True))
-        )
-        header = ("mechanism", *(["of"] if several else self.unknown), "good", "transmission [deg]", "size")
+        fits = [("yes" if fit.good else "no", _degrees(fit.transmission), f"{fit.size:.4g}") for fit in self.fitness]
+        judged: tuple[str, ...] = ("good", "transmission [deg]", "size")
+        parts: list[tuple[tuple[str, ...], Sequence[tuple[str, ...]]]]
+        if self.sources:
+            own: list[tuple[str, ...]] = [(one.name,) for one in self.sources]
+            parts = [(("of", *judged), [(*a, *b) for a, b in zip(own, fits, strict=True)])]
+        else:
+            own = [tuple(f"{v:.6g}" for v in values) for values in self.values]
+            # columns for which a terminal is wide enough
+            parts = [(self.unknown[i : i + 5], [v[i : i + 5] for v in own]) for i in range(0, len(self.unknown), 5)]
+            parts += [(judged, fits)]
+            if len(parts) == 2:
+                parts = [((*self.unknown, *judged), [(*a, *b) for a, b in zip(own, fits, strict=True)])]
+        tables = [
+            Table(("mechanism", *header), tuple((str(i), *row) for i, row in enumerate(rows))) for header, rows in parts
+        ]
         told = " ".join([f"Completeness: {self.completeness}.", *self.evidence, *(one.text for one in self.degenerate)])
         if any(fit.branch is None for fit in self.fitness):
             told += " No single driver determines the positions: nothing is known of defects and transmission."
-        title = f"{'chains' if several else self.mechanism.name}: {counted(len(self), 'mechanism')}"
+        title = f"{'chains' if self.sources else self.mechanism.name}: {counted(len(self), 'mechanism')}"
         title += "" if self.total is None else f", of {counted(self.total, 'solution')} over the complex numbers"
         left_out = [f"{', '.join(f'{v:.6g}' for v in one.values)}: {'; '.join(one.reasons)}" for one in self.rejected]
-        blocks: list[Block] = [Table(header, rows), Paragraph(told)]
+        blocks: list[Block] = [*tables, Paragraph(told)]
         return Document(title, blocks + ([Heading("Left out", 2), Bullets(left_out)] if left_out else []))
 
     @property

@@ -16,6 +16,7 @@ from copy import copy
 from functools import cached_property
 
 import numpy as np
+import scipy.linalg
 
 from mechgraph.graph.linkgraph import link_graph
 from mechgraph.kinematics.state import CLOSED, Configuration, close
@@ -27,6 +28,7 @@ from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
 from mechgraph.modes.family import Array, Family, common, generated
 from mechgraph.modes.homotopy import ENDLESS_STATE, Equations, Mask, rounding, solved
+from mechgraph.synthesis.rods import RodProblem, rods_of
 from mechgraph.synthesis.system import ArrowRows, RowNumbers, RowProblem
 from mechgraph.variants.numbers import MARKER
 
@@ -81,6 +83,30 @@ class TaskClass:
     idle = 0
 
     def __init__(self, problem: RowProblem, rng: np.random.Generator) -> None:
+        self.whole = problem
+        self._lay_out(problem)
+        start = problem.inside(problem.unknowns.declared[:, None])
+        # declared values may be anything, all in one place too: the class is read at others, with which some may not close
+        for _ in range(8):
+            spread = problem.numbers.with_values(problem.places, start + rng.normal(size=start.shape))
+            here = Configuration(problem.system_with(spread), problem.at_rest[:, None])
+            if problem.closed_at_start or close(here.system, here.x[:, 0], _NONE)[1] < CLOSED:
+                break
+        if not problem.closed_at_start:
+            here = Configuration(here.system, close(here.system, here.x[:, 0], _NONE)[0][:, None])
+        algebras, rods = self._algebras(here), rods_of(problem)
+        free = [np.zeros((6, 0))] * (len(problem.order) - len(algebras))
+        if rods:
+            problem = RodProblem(problem, rods)
+            numbers = spread.of_pairs(problem.order)
+            here = Configuration(problem.system_with(numbers), here.x[problem.state_rows])
+            self._lay_out(problem)
+        self.algebras = [[*algebras, *free][k] for k in problem.order]
+        self._of_rows(here)
+        self._read(rng)
+
+    def _lay_out(self, problem: RowProblem) -> None:
+        """Where everything stands in the states of a problem."""
         self.problem, s = problem, problem.system
         self.u, self.R, self.states = problem.u, len(problem.rows), s.n_state
         # behind the state of a row stand the coefficients of its rates, as far as any are asked
@@ -98,21 +124,56 @@ class TaskClass:
         # the highest order of which anything is asked of a row
         self.orders = np.where(asked, np.arange(1 + orders), 0).max(axis=1, initial=0)
         self.free = self._free_columns()
-        start = problem.inside(problem.unknowns.declared[:, None])
-        # declared values may be anything, all in one place too: the class is read at others, with which some may not close
-        for _ in range(8):
-            spread = problem.numbers.with_values(problem.places, start + rng.normal(size=start.shape))
-            here = Configuration(problem.system_with(spread), problem.at_rest[:, None])
-            if problem.closed_at_start or close(here.system, here.x[:, 0], _NONE)[1] < CLOSED:
-                break
-        if not problem.closed_at_start:
-            here = Configuration(here.system, close(here.system, here.x[:, 0], _NONE)[0][:, None])
-        self.here = here
-        self.W = spread.norms.size if any(p.turns for own in problem.places for p in own) else 0
+        self.W = problem.numbers.norms.size if any(p.turns for own in problem.places for p in own) else 0
         self.family = self
-        self.of_row = Equations(Family(here, problem.columns, np.zeros((s.n_freedoms, 0))), None)
-        self.algebras = self._algebras(here)
-        self._read(rng)
+
+    def _of_rows(self, here: Configuration) -> None:
+        """What is known of a row."""
+        self.here, s = here, here.system
+        self.of_row = Equations(Family(here, self.problem.columns, np.zeros((s.n_freedoms, 0))), None)
+
+    @cached_property
+    def full(self) -> TaskClass:
+        """The same with all rods in their places and all that is asked: for what ``lifted`` makes of states."""
+        if self.problem is self.whole and not self.followed.any():
+            return self
+        out = copy(self)
+        out._lay_out(self.whole)
+        out._of_rows(Configuration(self.whole.system, self.whole.at_rest[:, None]))
+        # what is lifted needs places in states alone
+        vars(self)["full"] = out
+        out.start, x = self.lifted(self.start, self.x[:, None])
+        out.x = x[:, 0]
+        return out
+
+    def lifted(self, member: ClassMember, x: Array) -> tuple[ClassMember, Array]:
+        """A member and states ``x (nx, T)`` of it with all rods in their places."""
+        p = self.problem
+        if not isinstance(p, RodProblem):
+            return member, x
+        near = x[self.u : self.head].reshape(2, 2, -1, x.shape[1]) if self.W else None
+        numbers = member.numbers.with_values(p.places, x[: self.u], near)
+        rows = x[self.head :].reshape(self.R, self.nx, -1)
+        back = np.argsort(p.order)
+        states = p.lifted(numbers, rows[:, : self.states])
+        norms = x[self.u : self.head].reshape(4, -1, x.shape[1])[:, back].reshape(self.W, -1) if self.W else x[:0]
+        every = [x[: self.u], norms]
+        member, whole, T = ClassMember(member.numbers.of_pairs(back), member.drive), self.full, x.shape[1]
+        F = whole.problem.system.n_freedoms
+        states = np.concatenate([states, np.zeros((self.R, whole.nx - whole.states, T), dtype=x.dtype)], axis=1)
+        # rates are linear in those of lower orders
+        for k in range(1, 1 + len(p.rates)):
+            here = whole.at(member, np.concatenate([*every, states.reshape(-1, T)]).astype(complex))
+            n = here.residual.shape[1] // (1 + len(p.rates))
+            J, left = here.by_coordinates[:, :n, :F].copy(), here.residual[:, k * n : (k + 1) * n]
+            asked = whole.given.reshape(self.R, 1 + len(p.rates), -1)[:, k]
+            for i, given in enumerate(asked):
+                J[i][:, whole.problem.columns[given]] = 0.0
+            own = slice(whole.states + (k - 1) * F, whole.states + k * F)
+            step = [least_norm_steps(A, b, MODES.generic) for A, b in zip(J, left, strict=True)]
+            rates = here.x[:, own] + np.where((self.orders >= k)[:, None, None], step, 0.0)
+            states[:, own] = rates if np.iscomplexobj(x) else rates.real
+        return member, np.concatenate([*every, states.reshape(-1, T)])
 
     # --- the class ---------------------------------------------------------------------------------------------------
 
@@ -122,9 +183,12 @@ class TaskClass:
         for i, given in enumerate(self.given):
             free = complement(self.columns[given], p.system.n_freedoms * (1 + int(self.orders[i])))
             # a declared row that is closed by itself stays where it is, but for what names its points
-            at_rest = p.closed_at_start and p.rows[i] == 0
-            out.append(free[free >= p.system.first_column[len(p.m.pairs)]] if at_rest else free)
+            out.append(free[free >= p.system.first_column[p.own]] if self._rests(i) else free)
         return out
+
+    def _rests(self, i: int) -> bool:
+        """Whether a row is the declared one, closed by itself."""
+        return bool(self.problem.closed_at_start and self.problem.rows[i] == 0)
 
     def _algebras(self, here: Configuration) -> list[Array]:
         """For every pair a basis ``(6, k)`` of the motions by which its place may be moved, in the global frame ``here``.
@@ -182,6 +246,7 @@ class TaskClass:
         rows = self.at(self.start, self.x[:, None])
         J, B = rows.by_coordinates[..., 0], rows.by_unknowns[..., 0]
         n, ranks, settled = J.shape[1], [], []
+        self._leave_followers(J, B)
         for i, free in enumerate(self.free):
             own = slice(self._counted(n, i))
             settled.append(_rank(J[i][own, free]))
@@ -197,6 +262,47 @@ class TaskClass:
         ]
         best = int(self._by_condition(found, x)[0])
         self.start, self.x = found[best], x[:, best]
+
+    def _leave_followers(self, J: Array, B: Array) -> None:
+        """Ask nothing of numbers that follow from others of their row, whatever the mechanism: what they are is looked at in the end.
+
+        Ways between tasks lead straight on, and would ask of such numbers what no mechanism does. Angles are kept before lengths.
+        """
+        angles_first, every = np.argsort(self.is_length, kind="stable"), self.given.copy()
+        for i, own in enumerate(every):
+            k, F = self._counted(J.shape[1], i), self.problem.system.n_freedoms
+            # a declared row that is closed by itself stays where it is: of it rates alone may follow
+            columns = [c for c in angles_first if own[c] and (not self._rests(i) or self.columns[c] >= F)]
+            A = np.concatenate([J[i][:k, self.columns[columns]], J[i][:k, self.free[i]], B[i][:k]], axis=1)
+            ways = scipy.linalg.null_space(A, MODES.generic)[: len(columns)]
+            for j, c in enumerate(columns):
+                self.given[i, c] = (
+                    np.subtract(*(np.linalg.matrix_rank(ways[:n], MODES.generic) for n in (j + 1, j))) > 0
+                )
+        self.free, self.followed = self._free_columns(), (every & ~self.given).any(axis=1)
+
+    def missed(self, rng: np.random.Generator) -> Array:
+        """By how much every row ``(R,)`` that asks for numbers which follow from others is missed, each with dimensions of its own."""
+        of, out, T = self.full, np.zeros(self.R), 24
+        p, goal = of.problem, of.goal(of.problem.numbers)
+        goal = ClassMember(goal.numbers, goal.drive.real)
+        for i in np.flatnonzero(self.followed).tolist():
+            z = p.inside(p.unknowns.declared[:, None]) + rng.normal(size=(of.u, T))
+            moved = (not self._rests(i)) * rng.normal(size=(p.system.n_freedoms, T))
+            rest = p.system.advance(p.at_rest[:, None], moved)
+            states = np.concatenate([rest, np.zeros((of.nx - of.states, T))])
+            norms = p.numbers.with_values(p.places, z).norms.reshape(-1, T)[: of.W]
+            x, free = np.concatenate([z, norms, *[states] * of.R]), of.free[i]
+            at = np.array([*range(of.u), *(of.head + i * of.F + free)])
+            for _ in range(40):
+                rows = of.at(goal, x)
+                k = of._counted(rows.residual.shape[1], i)
+                J = np.concatenate([rows.by_unknowns[i][:k], rows.by_coordinates[i][:k, free]], axis=1)
+                step = np.zeros((of.head + of.R * of.F, T))
+                step[at] = least_norm_steps(J, rows.residual[i][:k], MODES.generic).real
+                x = of.advance(of.state(rows).real, step / np.maximum(1.0, np.abs(step).max(axis=0)))
+            out[i] = np.abs(of.at(goal, x).residual[i][:k]).max(axis=0).min()
+        return out
 
     def _by_condition(self, members: Sequence[ClassMember], x: Array) -> Index:
         """Numbers of members in the order of the condition of their unknowns at their solutions ``x (nx, n)``."""
@@ -261,11 +367,11 @@ class TaskClass:
 
     def _random_places(self, rng: np.random.Generator) -> Array:
         """Known places moved at random, such that loops keep the groups in which they move ``(3, 4, 2, P, 1)``."""
-        P, s = len(self.problem.whole.pairs), self.problem.system
+        P, s = len(self.problem.order), self.problem.system
         moves = np.zeros((6, 2, P, 1), dtype=complex)
         for k, basis in enumerate(self.algebras):
             moves[:, :, k] = (basis @ (0.5 * _random(rng, basis.shape[1])))[:, None, None]
-            if self.problem.m.pairs[k].on_a is not None:
+            if k < self.problem.own and self.problem.whole.pairs[k].on_a is not None:
                 # a place that is declared on each link by itself moves on each by itself
                 for side, link in enumerate((s.a[k], s.b[k])):
                     own = basis @ (0.5 * _random(rng, basis.shape[1]))
@@ -378,7 +484,7 @@ class TaskClass:
     @cached_property
     def turning(self) -> Mask:
         """Which markers ``(2 P,)`` have unknown directions: the others go on rigidly from member to member."""
-        out = np.zeros((2, len(self.problem.whole.pairs)), dtype=bool)
+        out = np.zeros((2, len(self.problem.order)), dtype=bool)
         for p in (p for own in self.problem.places for p in own if p.turns):
             out[p.side, p.pair] = True
         return out.ravel()
@@ -564,7 +670,7 @@ class Arrow:
         J = self.rows.by_coordinates
         opened = np.einsum("rndt,rdt->rnt", J[:, :, columns], np.broadcast_to(change, (*change.shape[:2], self.rows.T)))
         if (moving := self.leg.moving).size:
-            P = len(of.problem.whole.pairs)
+            P = len(of.problem.order)
             side, pair = moving // P, moving % P
             opened = opened + self.rows.moved(side, pair, self._known_rates()[:, :, side, pair]).sum(axis=2)
         out = self.solve(-opened)

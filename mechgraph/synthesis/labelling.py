@@ -21,17 +21,18 @@ class TaskLabelling:
     """Links and pairs of a class of tasks in canonical order; ``turned (P,)`` are pairs whose links change places there."""
 
     def __init__(self, of: TaskClass) -> None:
-        self.of, self._whole, s = of, of.problem.whole, of.problem.system
+        self.of, self._whole, s = of, of.whole.whole, of.whole.system
         links = self._whole.link_names()
         matrix, self._labels = ranked(self._graph(links))
         order = least_order(matrix)
         self._code = [matrix[u][v] for u in order for v in order]
         place = np.argsort(order)
         P = len(self._whole.pairs)
-        self.pairs: Index = np.argsort(place[len(links) :])
-        self.turned = np.array(
-            [self._may_turn(k) and bool(place[s.a[k]] > place[s.b[k]]) for k in range(P)], dtype=bool
-        )
+        # the pairs of the problem, in which those of rods stand last
+        own = of.problem.order
+        self.pairs: Index = np.argsort(place[len(links) :][own])
+        turned = [self._may_turn(k) and bool(place[s.a[k]] > place[s.b[k]]) for k in range(P)]
+        self.turned = np.array(turned, dtype=bool)[own]
 
     @property
     def key(self) -> str:
@@ -43,7 +44,7 @@ class TaskLabelling:
             self.of.problem.rows.tolist(),
         ]
         # the first figure is the version of the files
-        return "2-" + hashlib.sha256(json.dumps(told).encode()).hexdigest()[:32]
+        return "3-" + hashlib.sha256(json.dumps(told).encode()).hexdigest()[:32]
 
     # --- the graph ---------------------------------------------------------------------------------------------------
 
@@ -56,7 +57,7 @@ class TaskLabelling:
 
     def _graph(self, links: tuple[str, ...]) -> list[list[Hashable]]:
         """What stands at nodes and between them."""
-        n, s = len(links), self.of.problem.system
+        n, s = len(links), self.of.whole.system
         out: list[list[Hashable]] = [[()] * (n + len(self._whole.pairs)) for _ in range(n + len(self._whole.pairs))]
         for i, link in enumerate(links):
             out[i][i] = ("link", link == self._whole.frame)
@@ -69,18 +70,19 @@ class TaskLabelling:
 
     def _pair(self, k: int) -> tuple[Hashable, ...]:
         """What is known of a pair: its motions, what is asked of them and unknown of its place, and how that may be moved."""
-        of, p, pair = self.of, self.of.problem, self._whole.pairs[k]
+        of, p, pair = self.of, self.of.whole, self._whole.pairs[k]
+        place = int(np.argsort(of.problem.order)[k])
         freedoms = [(step.holds_rotation, *((f.label, *f.twist) for f in step.freedoms)) for step in pair.type.steps]
         first = p.system.first_column
         asked = [
-            tuple(of.given[:, np.flatnonzero(of.columns == c + order * p.system.n_freedoms)].any(axis=1).tolist())
+            tuple(of.given[:, np.flatnonzero(p.asked_columns == c + order * p.system.n_freedoms)].any(axis=1).tolist())
             for c in range(first[k], first[k + 1])
             for order in range(1 + len(p.rates))
         ]
-        factors = of.problem.factor_of[p.system.pair_of_freedom[of.columns % p.system.n_freedoms] == k]
+        factors = p.factor_of[p.system.pair_of_freedom[p.asked_columns % p.system.n_freedoms] == k]
         asked += [("scaled", *factors.tolist())] if (factors >= 0).any() else []
         unknown = sorted((q.array, q.side, q.component) for own in p.places for q in own if q.pair == k)
-        B = of.algebras[k] if k < len(of.algebras) else np.zeros((6, 0))
+        B = of.algebras[place]
         # decimals that a class keeps of the motions by which markers may be moved
         moves: object = (np.round(B @ B.T, 5) + 0.0).tolist() if 0 < B.shape[1] < 6 else B.shape[1]
         lines = p.system.coupling_matrix[:, first[k] : first[k + 1], 0].tolist()
@@ -92,6 +94,8 @@ class TaskLabelling:
             pair.on_a is None,
             repr(pair.contact),
             repr(lines),
+            # rods have no states
+            place < len(of.problem.whole.pairs),
         )
 
     # --- start sets --------------------------------------------------------------------------------------------------
@@ -121,18 +125,17 @@ class TaskLabelling:
     @cached_property
     def _states(self) -> tuple[Index, Array]:
         """For every number of a state in canonical order its place and its sign."""
-        of, s, P = self.of, self.of.problem.system, len(self._whole.pairs)
+        of, s, P = self.of, self.of.problem.system, len(self.of.problem.whole.pairs)
         sign = np.ones(of.nx)
         rows = [np.arange(s.first_row[k], s.first_row[k + 1]) for k in range(P)]
         columns = [np.arange(s.first_column[k], s.first_column[k + 1]) for k in range(P)]
         orders = range(len(of.problem.rates))
-        for k in np.flatnonzero(self.turned):
+        for k in np.flatnonzero(self.turned[:P]):
             sign[[*rows[k], *(of.states + i * s.n_freedoms + c for i in orders for c in columns[k])]] = -1.0
         if s.rotations is not None:
             sign[s.rotations[1][0]] = 1.0
-        own = [rows[k] for k in self.pairs] + [
-            of.states + i * s.n_freedoms + columns[k] for i in orders for k in self.pairs
-        ]
+        pairs = self.pairs[self.pairs < P]
+        own = [rows[k] for k in pairs] + [of.states + i * s.n_freedoms + columns[k] for i in orders for k in pairs]
         row = np.concatenate([*own, np.zeros(0, dtype=np.intp)]).astype(np.intp)
         norms = np.arange(of.W).reshape(2, 2, -1) if of.W else np.zeros((2, 2, 0), dtype=np.intp)
         if of.W:

@@ -4,8 +4,8 @@ A random complex mechanism at random positions gives a task that it solves; as t
 is led to others of the first task: finite ones only, and no others than mechanisms of its kind, as the pairs of a random mechanism do not
 coincide. (Plecnik and Fearing, Finding only finite roots to large kinematic synthesis systems, J. Mech. Robotics 9, 2017.)
 
-In the trace test what is asked of one row goes along a line: ``exp(i q)`` of angles and lengths are linear in one number, on which the
-sum of a combination of the unknowns over all solutions depends rationally.
+In the trace test what is asked of one row goes along a line: lengths, or else ``exp(i q)`` of an angle, are linear in one number, on which
+the sum of a combination of the unknowns over all solutions depends rationally.
 """
 
 from __future__ import annotations
@@ -48,7 +48,10 @@ Progress = Callable[[str], None] | None
 
 @dataclass(frozen=True)
 class TaskStart:
-    """All solutions ``x (nx, N)`` known of a task of a class, and what that they are all rests on (see ``modes.start_sets.StartSet``)."""
+    """All solutions ``x (nx, N)`` known of a task of a class, and what that they are all rests on (see ``modes.start_sets.StartSet``).
+
+    ``source``: who published that there are so many, for sets that came with the package.
+    """
 
     member: ClassMember
     x: Array
@@ -57,10 +60,13 @@ class TaskStart:
     lost: int
     followed: int
     trace: Trace
+    source: str = ""
 
     @property
     def word(self) -> str:
         """How sure it is that none is missing."""
+        if self.source:
+            return "proved"
         return "tested" if self.trace.passed and self.chance <= MISSED else "searched"
 
     @property
@@ -71,6 +77,8 @@ class TaskStart:
             f"brought no further one (chance of one missed {self.chance:.1g} where all permutations are as likely), {self.lost} of "
             f"{self.followed} tracks lost."
         )
+        if self.source:
+            return (f"As many as such tasks have in general: {self.source}.",)
         if not self.trace.passed:
             return (loops, "No trace test passed; solutions may be missing.")
         return (
@@ -81,7 +89,7 @@ class TaskStart:
 
 
 class TaskPencil:
-    """Tasks on a line through that of a member: of one row ``exp(i q / n)`` of angles and lengths grow linearly with ``z``.
+    """Tasks on a line through that of a member: of one row lengths, or else ``exp(i q / n)`` of an angle, grow linearly with ``z``.
 
     The line leads towards a task that some mechanism does; the other rows leave a curve of mechanisms, which it cuts. Where couplings turn
     freedoms by parts of each other's angles, ``n`` is such that all are whole multiples of ``q / n``.
@@ -97,6 +105,10 @@ class TaskPencil:
         part = rng.normal(size=2) @ [0.7, 0.7j]
         self.rate, self.parts = np.zeros(base.drive.shape[:2], dtype=complex), _parts_of_turns(equations)
         self.rate[row] = part * np.where(length, other, np.exp(1j / self.parts * np.where(length, 0.0, other)) - 1.0)
+        # one angle, or lengths alone: rational functions of several angles are of much higher degrees
+        given = equations.given[row]
+        moves = given & length if (given & length).any() else np.arange(len(given)) == np.argmax(given)
+        self.rate[row] *= moves
         self.weights = rng.normal(size=(equations.u, 2)) @ [1.0, 1.0j]
 
     def members(self, phi: Array) -> ClassMember:
@@ -128,13 +140,18 @@ def _parts_of_turns(of: TaskClass) -> int:
     return prod(lcm(*row) for row in parts)
 
 
-def start_set(of: TaskClass, rng: np.random.Generator, progress: Progress) -> TaskStart:
-    """All solutions of a random task of a class."""
+def start_set(
+    of: TaskClass, rng: np.random.Generator, progress: Progress, published: tuple[int, str] | None = None
+) -> TaskStart:
+    """All solutions of a random task of a class; where there are as many as were ``published``, no test is needed."""
     # solutions from which on they are not looked for any further
-    group = TrackGroup(of, of.start, of.x[:, None], 20_000)
+    most, source = published or (20_000, "")
+    group = TrackGroup(of, of.start, of.x[:, None], most)
     group.grow(MISSED, rng, progress)
     known = group.quiet, group.chance
     group.move(*tame(of, group.base, group.x, rng))
+    if source and group.x.shape[1] == most:
+        return TaskStart(group.base, group.x, *known, group.lost, group.followed, NOT_PASSED, source)
     trace = trace_test(of, group.base, group.x, rng, progress, TaskPencil) if known[1] <= MISSED else NOT_PASSED
     if not trace.passed:
         group.grow(MISSED_AGAIN, rng, progress)
@@ -162,9 +179,10 @@ def _read(labelling: TaskLabelling, file: Path, prefix: str) -> TaskStart | None
         with file.open("rb") as handle, np.load(handle, allow_pickle=False) as f:
             loops, lost, followed, degree, samples = f[prefix + "counts"].tolist()
             chance, last, beyond = f[prefix + "sizes"].tolist()
+            source = str(f[prefix + "source"])
             vectors = {name: f[prefix + name] for name in MARKER}
             member, x = labelling.taken(vectors, f[prefix + "drive"], f[prefix + "x"])
-        found = TaskStart(member, x, loops, chance, lost, followed, Trace(degree, samples, last, beyond))
+        found = TaskStart(member, x, loops, chance, lost, followed, Trace(degree, samples, last, beyond), source)
         here = labelling.of.at(found.member, found.x)
         size = np.maximum(1.0, np.abs(here.here.poses).max())
         return found if labelling.of.error(here).max() < MODES.member_closed * size else None
@@ -176,7 +194,8 @@ def arrays(labelling: TaskLabelling, start: TaskStart) -> dict[str, Any]:
     """A start set as arrays by name."""
     sizes = np.array([start.chance, start.trace.last, start.trace.beyond])
     counts = np.array([start.loops, start.lost, start.followed, start.trace.degree, start.trace.samples])
-    return {**labelling.ordered(start.member, start.x), "sizes": sizes, "counts": counts}
+    told = {"sizes": sizes, "counts": counts, "source": np.array(start.source)}
+    return labelling.ordered(start.member, start.x) | told
 
 
 def _keep(of: TaskClass, start: TaskStart) -> None:

@@ -13,10 +13,13 @@ from typing import Any
 
 import numpy as np
 
+from mechgraph.graph.linkgraph import components_of_edges, members
 from mechgraph.maths.se3 import Index
+from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
 from mechgraph.modes.family import Array
 from mechgraph.modes.start_sets import distinct
+from mechgraph.synthesis.classes import ClassMember, TaskClass
 from mechgraph.synthesis.system import RowProblem
 
 
@@ -90,19 +93,46 @@ def _label(problem: RowProblem, k: int) -> str:
     return str((pair.type.symbol, known, k if alone else -1))
 
 
-def orbits(z: Array, of: tuple[Symmetry, ...]) -> list[list[int]]:
-    """Solutions ``z (u, n)`` that exchanges make of each other."""
-    out: list[list[int]] = []
-    left = list(range(z.shape[1]))
-    while left:
-        mine = [left.pop(0)]
-        for i in mine:
-            for one in of:
-                there = np.empty_like(z[:, i])
-                there[one.places] = z[:, i]
-                for j in list(left):
-                    if not len(distinct(there[:, None], z[:, [j]])):
-                        mine.append(j)
-                        left.remove(j)
-        out.append(sorted(mine))
-    return out
+def orbits(z: Array, of: tuple[Symmetry, ...], motions: Array) -> list[list[int]]:
+    """Solutions ``z (u, n)`` that exchanges make of each other, or that do the same: whose ``motions (k, n)`` are the same."""
+    n, ends = z.shape[1], list[tuple[int, int]]()
+    for i in range(n):
+        for one in of:
+            there = np.empty_like(z[:, i])
+            there[one.places] = z[:, i]
+            ends += [(i, j) for j in range(i + 1, n) if not len(distinct(there[:, None], z[:, [j]]))]
+        ends += [(i, j) for j in range(i + 1, n) if does_the_same(motions, i, j)]
+    return members(components_of_edges(n, ends)) if n else []
+
+
+def motions_of(of: TaskClass, member: ClassMember, x: Array) -> Array:
+    """Where numbers asked can go from every row, dimensions at rest ``(n, T)``: projectors on these directions; none where all can.
+
+    They are the same for mechanisms that do the same, as Roberts' cognates.
+    """
+    rows, out = of.at(member, x), list[Array]()
+    F = of.problem.system.n_freedoms
+    for i, given in enumerate(of.given):
+        columns = of.columns[given & (of.columns < F)]
+        J = rows.by_coordinates[i][: rows.residual.shape[1] // (1 + len(of.problem.rates)), :F].transpose(2, 0, 1)
+        sigma, V = np.linalg.svd(J)[1:]
+        rank = int((sigma > MODES.generic * sigma[:, :1]).sum(axis=1).max(initial=0))
+        ways = V[:, rank:, columns].conj().swapaxes(1, 2)
+        onto = ways @ np.linalg.pinv(ways, rcond=MODES.generic)
+        if np.abs(onto - np.eye(len(columns))).max(initial=0.0) > MODES.span:
+            out.append(onto.reshape(x.shape[1], -1).T)
+    return np.concatenate(out) if out else np.zeros((0, x.shape[1]))
+
+
+def does_the_same(motions: Array, i: int, j: int) -> bool:
+    """Whether two solutions of ``motions (k, n)`` do the same."""
+    return bool(len(motions) and np.abs(motions[:, i] - motions[:, j]).max() < MODES.real_singular)
+
+
+def cognates(copies: list[list[int]], of: tuple[Symmetry, ...], motions: Array) -> tuple[Symmetry, ...]:
+    """What is said where solutions do the same and are more than exchanges make."""
+    same = max((sum(does_the_same(motions, mine[0], i) for i in mine) for mine in copies), default=1) // (1 + len(of))
+    text = (
+        f"Of {same} mechanisms each the numbers asked move in the same directions at all positions: they do the same."
+    )
+    return (Symmetry("cognate", same, text, np.zeros(0, dtype=np.intp)),) if same > 1 else ()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Executor
+from contextvars import copy_context
 from dataclasses import fields
 from functools import cache, partial
 from typing import Any, get_args
@@ -16,7 +18,7 @@ from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import MODES
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.synthesis_setup import DefectName, FitName, SynthesisSetup
-from mechgraph.modes.homotopy import Mask
+from mechgraph.modes.homotopy import ELSEWHERE, Mask
 from mechgraph.quantities import Count, door, items_of, real_array, wrong
 from mechgraph.quantities import Index as Seed
 from mechgraph.synthesis.answers import (
@@ -32,10 +34,13 @@ from mechgraph.synthesis.fitness import Fitness, Measure, fitness, limits_of
 from mechgraph.synthesis.fits import Fit, FitPoint, Fitted, fitted
 from mechgraph.synthesis.solve import Progress, TaskEnds, TaskStart, ends, kept, real_states, start_of
 from mechgraph.synthesis.structures import WHERE, structures
-from mechgraph.synthesis.symmetries import orbits, symmetries
+from mechgraph.synthesis.symmetries import cognates, motions_of, orbits, symmetries
 from mechgraph.synthesis.system import RowNumbers, RowProblem
 from mechgraph.synthesis.tasks import FunctionTask, function, path, poses, positions
 from mechgraph.synthesis.unknowns import Unknowns
+
+NO_SCREWS = "a screw ties an angle to a length: the equations are not algebraic, their number of solutions has no end"
+NO_CONTACTS = "curves and surfaces are made of pieces: solutions on one cannot be led to those on all others"
 
 
 class Synthesis:
@@ -62,17 +67,9 @@ class Synthesis:
             for name in (p.tasks.scaled if p.tasks else ())
             if p.system.m.turns(name)
         ]
-        for what, why in (
-            (
-                "pitch",
-                "a screw ties an angle to a length: the equations are not algebraic, their number of solutions has no end",
-            ),
-            (
-                "contact",
-                "curves and surfaces are made of pieces: solutions on one cannot be led to those on all others",
-            ),
-        ):
-            named = [p.name for p in m.pairs if (p.type.takes_pitch if what == "pitch" else p.contact is not None)]
+        screws = [pair.name for pair in m.pairs if pair.type.takes_pitch]
+        contacts = [pair.name for pair in m.pairs if pair.contact is not None]
+        for named, why in ((screws, NO_SCREWS), (contacts, NO_CONTACTS)):
             faults += [f"pairs {', '.join(named)}: {why}; exact synthesis does not serve them"] if named else []
         self.sweep = Unknowns(m, p.whole, list(sweep), faults)
         faults += [
@@ -107,6 +104,13 @@ class Synthesis:
         DeclarationError
         """
         p, wanted = self.problem, int(self.of.conditions.sum())
+        missed = self.of.missed(self.rng)
+        if over := [
+            f"row {p.rows[i]} is missed by {missed[i]:.2g}" for i in np.flatnonzero(missed > MODES.real_closed)
+        ]:
+            raise DeclarationError(
+                p.name, [f"more is asked than such mechanisms can do, whatever their numbers: {', '.join(over)}"]
+            )
         names = [p.unknowns.names[k] for k in p.sought]
         if wanted == p.u:
             at = np.zeros(1, dtype=np.intp)
@@ -137,10 +141,10 @@ class Synthesis:
         """For every value swept."""
         p = self.problem
         start = start_of(self.of, self.rng, self.cache, self.progress)
-        n = self.swept.shape[1]
-        numbers = p.numbers.taken(np.zeros(n, dtype=np.intp))
+        n, own = self.swept.shape[1], self.of.problem
+        numbers = own.numbers.taken(np.zeros(n, dtype=np.intp))
         if self.sweep.names:
-            numbers = numbers.with_values(self.sweep.places, p.scaled(self.sweep.places, self.swept))
+            numbers = numbers.with_values(own.placed(self.sweep.places), p.scaled(self.sweep.places, self.swept))
         goals = self.of.goal(numbers)
         found = ends(self.of, start, goals, self.rng, self.progress)
         return [
@@ -148,26 +152,24 @@ class Synthesis:
         ]
 
     def _answer(self, start: TaskStart, goal: ClassMember, found: TaskEnds, i: int) -> Syntheses:
-        p, of = self.problem, self.of
-        x, error, which = real_states(of, goal, found.x)
+        p, of = self.problem, self.of.full
+        x, error, which = real_states(self.of, goal, found.x)
         fits = error <= CLOSED_TO
         told = [*start.evidence, self._tracks(start, found)]
-        if which.size and not fits.any():
-            raise DeclarationError(
-                p.name,
-                [
-                    f"more is asked than such mechanisms can do: what meets independent conditions misses others by {error.min():.2g}"
-                ],
-            )
         real = which[fits]
-        x, error = self._upright(goal, x[:, fits])
+        condition, motions = self._conditions(goal, x[:, fits]), motions_of(self.of, goal, x[:, fits].astype(complex))
+        goal, x = self.of.lifted(goal, x[:, fits])
+        x, error = self._upright(goal, x)
         against, merged = error > CLOSED_TO, self._merged(goal, x)
-        x, error = x[:, ~merged & ~against], error[~merged & ~against]
+        left = ~merged & ~against
+        x, error, condition, motions = x[:, left], error[left], condition[left], motions[:, left]
         others = np.delete(found.x[: of.u], real, axis=1)
         values = p.outside(x[: of.u]).T
         order = np.lexsort(np.round(values, 9).T[::-1]) if len(values) else np.zeros(0, dtype=np.intp)
-        x, error, values = x[:, order], error[order], values[order]
-        copies = {k: mine for mine in orbits(x[: of.u], self.symmetries) for k in mine}
+        x, error, values, condition = x[:, order], error[order], values[order], condition[order]
+        motions = motions[:, order]
+        alike = orbits(x[: of.u], self.symmetries, motions)
+        copies = {k: mine for mine in alike for k in mine}
         made = [self._mechanism(goal, x[:, k], values[k], i) for k in range(len(values))]
         shape = (p.tasks.rows if p.tasks else 0, len(p.m.links), 4, 4)
         degenerate = [
@@ -200,10 +202,10 @@ class Synthesis:
             found.infinite,
             start.word if not found.lost else "searched",
             tuple(told),
-            self._conditions(goal, x),
+            condition,
             Fitnesses([cache(partial(self._fitness, m, q)) for m, q, _ in made]),
-            len(orbits(start.x[: of.u], self.symmetries)),
-            self.symmetries,
+            len(orbits(start.x[: of.u], self.symmetries, motions_of(self.of, start.member, start.x))),
+            (*self.symmetries, *cognates(alike, self.symmetries, motions)),
             tuple(tuple(copies[k]) for k in range(len(values))),
             driver=driver_of(p.m, self.tasks)[0],
         )
@@ -223,7 +225,7 @@ class Synthesis:
         Tracks may turn the sign of a norm. Its direction is the opposite one then: motions along it change their signs too, and where
         such a motion is asked, its states do not close.
         """
-        of, s, n = self.of, self.problem.system, x.shape[1]
+        of, s, n = self.of.full, self.problem.system, x.shape[1]
         turned = x.copy()
         if of.W:
             second, axis = np.sign(x[of.u : of.head]).reshape(2, 2, -1, n)[::-1, 0]
@@ -241,7 +243,7 @@ class Synthesis:
 
     def _merged(self, goal: ClassMember, x: Array) -> Mask:
         """Which solutions ``(n,)`` have elements of a link that fall together, where those of a random mechanism do not."""
-        of, pairs = self.of, _neighbors(self.problem.m)
+        of, pairs = self.of.full, _neighbors(self.problem.m)
         here, there = of.at(of.start, of.x[:, None]).here, of.at(goal, x.astype(complex)).here
         s, out = here.system, np.zeros(x.shape[1], dtype=bool)
         for i, j in pairs:
@@ -260,7 +262,7 @@ class Synthesis:
 
     def _mechanism(self, goal: ClassMember, x: Array, values: Array, i: int) -> tuple[Mechanism, Array, Array]:
         """The mechanism of a solution, its coordinates ``(rows, F)`` and poses ``(rows, N, 4, 4)``."""
-        p, of, F = self.problem, self.of, len(self.problem.m.freedom_names())
+        p, of, F = self.problem, self.of.full, len(self.problem.m.freedom_names())
         m = p.unknowns.mechanism(values)
         if self.sweep.names:
             m = replace_fields(self.sweep, m, self.swept[:, i])
@@ -332,7 +334,7 @@ def subset_values(problem: RowProblem, tasks: Any, subsets: int, seed: int, cach
         return np.zeros((0, len(problem.unknowns.names)))
     picks = np.unique([np.sort(rng.choice(alike, R, replace=False)) for _ in range(subsets)], axis=0)
     drive = np.moveaxis(problem.asked[picks], 0, -1).astype(complex)
-    goals = ClassMember(problem.numbers.taken(np.zeros(len(picks), dtype=np.intp)), np.nan_to_num(drive))
+    goals = ClassMember(of.problem.numbers.taken(np.zeros(len(picks), dtype=np.intp)), np.nan_to_num(drive))
     found = ends(of, start, goals, rng, None)
     real = [real_states(of, goals.taken(np.array([i])), one.x)[0] for i, one in enumerate(found)]
     return problem.outside(np.concatenate(real, axis=1)[: of.u]).T
@@ -411,6 +413,7 @@ def synthesize(
     seed: Seed = 0,
     cache: bool = True,
     progress: Callable[[str], None] | None = None,
+    executor: Executor | None = None,
 ) -> Any:
     """Find all mechanisms of a declared topology that do what is asked, or those that come nearest to it.
 
@@ -454,6 +457,9 @@ def synthesize(
     progress : callable, optional
         Called with a line of text now and then. Default: a terminal or notebook shows those of the first task of a kind.
 
+    executor : concurrent.futures.Executor, optional
+        Who follows the tracks of exact syntheses, in parts: one of processes, or of a cluster as Dask's. Results are the same on any.
+
     Returns
     -------
     Syntheses or SynthesesOver
@@ -474,6 +480,16 @@ def synthesize(
     >>> len(s), s.total
     (1, 1)
     """
+    if executor is not None:
+        if not callable(getattr(executor, "submit", None)):
+            raise DeclarationError("synthesis", [wrong(executor, "executor", "an executor, with submit()")])
+        asked = {
+            "fit": fit, "bounds": bounds, "conditions": conditions, "require": require, "minimize": minimize,
+            "maximize": maximize, "sweep": sweep, "over": over, "starts": starts, "seed": seed, "cache": cache, "progress": progress,
+        }  # fmt: skip
+        context = copy_context()
+        context.run(ELSEWHERE.set, executor)
+        return context.run(partial(synthesize, m, tasks, unknown, **asked))
     if not isinstance(m, Mechanism):
         given = {
             "fit": fit, "bounds": bounds, "conditions": conditions, "require": require, "minimize": minimize,

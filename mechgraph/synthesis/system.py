@@ -64,6 +64,11 @@ class RowNumbers:
         """Some of them."""
         return RowNumbers(*(v[..., which] for v in vars(self).values()))
 
+    def of_pairs(self, order: Index) -> RowNumbers:
+        """Those of some pairs, in that order."""
+        point, axis, second, norms = (v[:, :, order] for v in (*self.vectors, self.norms))
+        return RowNumbers(point, axis, second, norms, self.factors)
+
     @property
     def vectors(self) -> tuple[Array, Array, Array]:
         """Points, axes and second directions."""
@@ -183,6 +188,7 @@ class RowProblem:
     Attributes
     ----------
     whole, system : the mechanism with free pairs for points and links of which something is asked; its places and rows.
+    own : number of pairs of the mechanism itself, which stand before free ones.
     columns (d,), asked (rows, d) : freedoms of which something is asked, and their values in internal units; NaN where nothing is.
     rows (R,) : numbers of the rows with coordinates of their own; the declared one is among them where it is not closed by itself.
     origin (3,), L : of the internal lengths.
@@ -197,6 +203,7 @@ class RowProblem:
         faults: list[str] = []
         self.first = FirstPoses(m, tasks, unknown, faults)
         self.m = m = self.first.m
+        self.own = len(m.pairs)
         self.name = f"synthesis of {m.name!r}"
         self.tasks = asked_of(m, self.first.tasks, faults)
         if moving := m.once(moving_lines):
@@ -241,6 +248,7 @@ class RowProblem:
         self.numbers = RowNumbers.of(
             (numbers.point - self.origin[:, None, None]) / self.L, numbers.axis, numbers.second
         )
+        self.order: Index = np.arange(len(self.whole.pairs))
         self.closed_at_start = all(pair.on_a is None and pair.contact is None for pair in m.pairs)
         self.rows: Index = np.arange(self.tasks.rows)[self._row_counts :]
         self._read_declared_row()
@@ -396,11 +404,16 @@ class RowProblem:
 
     # --- the equations -----------------------------------------------------------------------------------------------
 
+    def placed(self, places: Sequence[Sequence[UnknownPlace]]) -> list[list[UnknownPlace]]:
+        """Places of numbers of pairs where pairs stand in ``order``."""
+        at = {int(k): i for i, k in enumerate(self.order)} | {-1: -1}
+        return [[replace(p, pair=at[p.pair]) for p in own] for own in places]
+
     def system_with(self, numbers: RowNumbers) -> System:
         """The system with other markers."""
         point, axis, second = numbers.unit()
         n = replace(self.whole.once(declared), point=point, axis=axis, second=second)
-        zero = np.zeros((3, len(self.m.links)))
+        zero = np.zeros((3, len(self.whole.links)))
         par = n.parameters(self.whole, zero, zero[:, 0], 1.0)
         old = self.system.par
         par = replace(par, offset=old.offset, frame=old.frame, origin=old.origin, L=old.L, pitch=old.pitch)
@@ -510,14 +523,22 @@ class ArrowRows:
 
     def moved(self, side: Index, pair: Index, rates: Array) -> Array:
         """Derivatives ``(R, n, k, T)`` for markers, one on a side of a pair each, of which the numbers grow at ``rates (3, 3, k, B)``."""
+        return self._by_row(self.opened(side, pair, self.twists(side, pair, rates)))
+
+    def twists(self, side: Index, pair: Index, rates: Array) -> Array:
+        """Twists ``(6, k, R N T)`` of these markers in the global frame."""
         here, s, n = self.here, self.here.system, self.numbers
         vectors = [v[side, :, pair].swapaxes(0, 1) for v in n.vectors]
         eta = marker_twists(vectors, n.norms[:, side, pair], rates)
         eta = np.tile(np.broadcast_to(eta, (*eta.shape[:2], self.T)), self.R * self.N)
-        V = move_twist(here.poses[:, :, np.where(side == 0, s.a[pair], s.b[pair])], eta)
+        return move_twist(here.poses[:, :, np.where(side == 0, s.a[pair], s.b[pair])], eta)
+
+    def opened(self, side: Index, pair: Index, V: Array) -> Array:
+        """How fast ``(n, k, R N T)`` loops open by such twists."""
+        here, s = self.here, self.here.system
         out = np.zeros((len(here.residual), len(pair), here.T), dtype=V.dtype)
         C = np.where(side == 0, 1.0, -1.0) * self.problem.loop_signs[:, pair]
         loops = V[:, None] * C[:, :, None]
         loops[3:] += cross(loops[:3], here.middles[:, :, None])
         out[: s.graph.loop_rows] = loops[s.graph.span].swapaxes(0, 1).reshape(s.graph.loop_rows, *V.shape[1:])
-        return self._by_row(out)
+        return out
