@@ -319,6 +319,7 @@ def test_what_no_mechanism_can_do_is_refused_before_anything_is_solved() -> None
             mg.synthesize(m, task, unknown, progress=pytest.fail)
 
 
+@pytest.mark.slow
 def test_the_center_of_a_spherical_mechanism_may_be_anywhere() -> None:
     """The same orientations about another point have the same axes."""
     m, task, unknown, total = LADDER["spherical R-R, 5 orientations"]()

@@ -151,19 +151,23 @@ class TaskClass:
         p = self.problem
         if not isinstance(p, RodProblem):
             return member, x
-        near = x[self.u : self.head].reshape(2, 2, -1, x.shape[1]) if self.W else None
+        near = x[self.u : self.head].reshape(2, 2, len(p.order), x.shape[1]) if self.W else None
         numbers = member.numbers.with_values(p.places, x[: self.u], near)
         rows = x[self.head :].reshape(self.R, self.nx, -1)
         back = np.argsort(p.order)
         states = p.lifted(numbers, rows[:, : self.states])
-        norms = x[self.u : self.head].reshape(4, -1, x.shape[1])[:, back].reshape(self.W, -1) if self.W else x[:0]
+        norms = (
+            x[self.u : self.head].reshape(4, len(back), x.shape[1])[:, back].reshape(self.W, x.shape[1])
+            if self.W
+            else x[:0]
+        )
         every = [x[: self.u], norms]
         member, whole, T = ClassMember(member.numbers.of_pairs(back), member.drive), self.full, x.shape[1]
         F = whole.problem.system.n_freedoms
         states = np.concatenate([states, np.zeros((self.R, whole.nx - whole.states, T), dtype=x.dtype)], axis=1)
         # rates are linear in those of lower orders
         for k in range(1, 1 + len(p.rates)):
-            here = whole.at(member, np.concatenate([*every, states.reshape(-1, T)]).astype(complex))
+            here = whole.at(member, np.concatenate([*every, states.reshape(self.R * whole.nx, T)]).astype(complex))
             n = here.residual.shape[1] // (1 + len(p.rates))
             J, left = here.by_coordinates[:, :n, :F].copy(), here.residual[:, k * n : (k + 1) * n]
             asked = whole.given.reshape(self.R, 1 + len(p.rates), -1)[:, k]
@@ -173,7 +177,7 @@ class TaskClass:
             step = [least_norm_steps(A, b, MODES.generic) for A, b in zip(J, left, strict=True)]
             rates = here.x[:, own] + np.where((self.orders >= k)[:, None, None], step, 0.0)
             states[:, own] = rates if np.iscomplexobj(x) else rates.real
-        return member, np.concatenate([*every, states.reshape(-1, T)])
+        return member, np.concatenate([*every, states.reshape(self.R * whole.nx, T)])
 
     # --- the class ---------------------------------------------------------------------------------------------------
 
@@ -496,7 +500,7 @@ class TaskClass:
 
     def at(self, member: ClassMember, x: Array) -> ArrowRows:
         """The equations of members at states of which what is asked is set to what they ask."""
-        near = x[self.u : self.head].reshape(2, 2, -1, x.shape[1]) if self.W else None
+        near = x[self.u : self.head].reshape(2, 2, len(p.order), x.shape[1]) if self.W else None
         numbers = member.numbers.with_values(self.problem.places, x[: self.u], near)
         X, drive = x[self.head :].reshape(self.R, self.nx, -1).copy(), member.drive * self.problem.factors(numbers)
         for i, given in enumerate(self.given):

@@ -152,7 +152,7 @@ class RodProblem(RowProblem):
                 row = s.m.pairs[k].type
                 state = matrix_quaternion(D) if is_ball(row) else _turned(row, D)
                 out[s.first_row[k] : s.first_row[k + 1]] = state if np.iscomplexobj(x) else state.real
-        return np.moveaxis(out.reshape(-1, R, T), 0, 1)
+        return np.moveaxis(out.reshape(len(out), R, T), 0, 1)
 
 
 _STILL = np.eye(4)[:, :1]

@@ -228,7 +228,7 @@ class Synthesis:
         of, s, n = self.of.full, self.problem.system, x.shape[1]
         turned = x.copy()
         if of.W:
-            second, axis = np.sign(x[of.u : of.head]).reshape(2, 2, -1, n)[::-1, 0]
+            second, axis = np.sign(x[of.u : of.head]).reshape(2, 2, of.W // 4, n)[::-1, 0]
             twists = np.array([f.twist for pair in s.m.pairs for f in pair.type.freedoms])
             along = (twists**2).reshape(-1, 2, 3).sum(axis=1) / (twists**2).sum(axis=1, keepdims=True)
             sign = np.einsum("fi,ifn->fn", along, np.stack([second, axis * second, axis])[:, s.pair_of_freedom])
