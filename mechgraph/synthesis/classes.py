@@ -500,7 +500,7 @@ class TaskClass:
 
     def at(self, member: ClassMember, x: Array) -> ArrowRows:
         """The equations of members at states of which what is asked is set to what they ask."""
-        near = x[self.u : self.head].reshape(2, 2, len(p.order), x.shape[1]) if self.W else None
+        near = x[self.u : self.head].reshape(2, 2, len(self.problem.order), x.shape[1]) if self.W else None
         numbers = member.numbers.with_values(self.problem.places, x[: self.u], near)
         X, drive = x[self.head :].reshape(self.R, self.nx, -1).copy(), member.drive * self.problem.factors(numbers)
         for i, given in enumerate(self.given):
