@@ -172,7 +172,8 @@ class Friction(Load):
             yield "mu: is missing; give the coefficient of friction"
         # what is no number, or below zero, is a fault of its own
         mu, static, part = (
-            float(of) if is_numeric(of, ()) and of >= 0 else np.nan for of in (self._mu, self.static, self.efficiency)
+            float(of) if of is not None and is_numeric(of, ()) and of >= 0 else np.nan
+            for of in (self._mu, self.static, self.efficiency)
         )
         if static < mu:
             yield wrong(self.static, "static", f"mu = {mu:g} or more")
