@@ -88,10 +88,10 @@ def stage(folder: Path | None = None) -> Iterator[None]:
     """A folder to run in (a temporary one), no windows, and numpy for what does not ask for the kernel."""
     import matplotlib
 
-    from mechgraph import by_kernel
+    from mechgraph import outcome
 
     matplotlib.use("agg")
-    numpy = unittest.mock.patch.object(by_kernel, "at_hand", return_value=None)
+    numpy = unittest.mock.patch.object(outcome, "at_hand", return_value=None)
     with tempfile.TemporaryDirectory() as temporary, contextlib.chdir(folder or temporary), numpy:
         yield
 

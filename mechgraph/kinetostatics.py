@@ -26,7 +26,6 @@ from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
 
-from mechgraph.by_kernel import compiled, served_before
 from mechgraph.determinacy.finite_motion import branches, branches_text
 from mechgraph.determinacy.mobility import Freedoms, actuation_fault, free_motion
 from mechgraph.determinacy.report import (
@@ -70,7 +69,7 @@ from mechgraph.memo import dataclass
 from mechgraph.model.loads import Effort, Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import declared
-from mechgraph.outcome import FollowedPositions, Options, Outcome, Starts
+from mechgraph.outcome import FollowedPositions, Options, Outcome, Starts, compiled, served_before
 from mechgraph.quantities import door, wrong
 from mechgraph.result.contacts import with_other_flanks
 from mechgraph.result.solution import Solution

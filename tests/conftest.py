@@ -12,7 +12,7 @@ import pytest
 from hypothesis import settings
 
 import mechgraph as mg
-from mechgraph import by_kernel
+from mechgraph import outcome
 from mechgraph.kernel import build, compiler
 
 settings.register_profile("dev", max_examples=10, deadline=None)
@@ -160,7 +160,7 @@ def engine_of_auto(request: pytest.FixtureRequest, kernel_cache: Path, monkeypat
     if "compiled" in request.fixturenames:
         monkeypatch.setenv("MECHGRAPH_CACHE", str(kernel_cache))
     elif not request.config.getoption("--kernel"):
-        monkeypatch.setattr(by_kernel, "at_hand", lambda: None)
+        monkeypatch.setattr(outcome, "at_hand", lambda: None)
 
 
 @pytest.fixture

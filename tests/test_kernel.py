@@ -21,7 +21,7 @@ from mechanisms import Z, hexapod
 from strategies import closed_mechanism, motions, with_drives, with_loads, with_loads_on_links
 
 import mechgraph as mg
-from mechgraph import by_kernel
+from mechgraph import outcome
 from mechgraph.kernel import build, tables
 from mechgraph.kernel.tables import pointer
 from mechgraph.kinematics.prescribed import DriverMotion
@@ -384,7 +384,7 @@ def test_what_it_cannot_carry_is_named(make, why):
 
 def test_auto_is_numpy_where_no_library_is(monkeypatch):
     m = mg.load("four-bar")
-    monkeypatch.setattr(by_kernel, "at_hand", lambda: None)
+    monkeypatch.setattr(outcome, "at_hand", lambda: None)
     assert mg.solve(m, swing(m)).engine == "dense"
 
 

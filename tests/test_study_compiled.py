@@ -12,7 +12,7 @@ import pytest
 import scipy.stats
 
 import mechgraph as mg
-from mechgraph import by_kernel
+from mechgraph import outcome
 
 MOTION = {"O1": mg.Motion(np.deg2rad([150.0, 175.0, 200.0]), 0.1, 0.2)}
 NOMINAL = {"length[0]": 0.5, "length[1]": 0.8, "length[2]": 0.4, "twist[0]": np.deg2rad(12), "twist[3]": np.deg2rad(15)}
@@ -80,8 +80,8 @@ def test_tables_are_filled_twice_for_a_narrow_study(monkeypatch: pytest.MonkeyPa
         sizes.append(x.shape[1])
         return filled(layout, system, x, loads)
 
-    filled = by_kernel.tables
-    monkeypatch.setattr(by_kernel, "tables", counted)
+    filled = outcome.tables
+    monkeypatch.setattr(outcome, "tables", counted)
     mg.study(mg.load("rcsr"), share(0.01), OUTPUTS, n=30, motions=MOTION, engine="compiled")
     assert sizes == [1, 41, 41]
 

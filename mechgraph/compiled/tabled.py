@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.by_kernel import cannot
 from mechgraph.determinacy.snapping import meant
 from mechgraph.errors import DeclarationError, FileError, listed, visible
 from mechgraph.files import writable, write_whole
@@ -38,7 +37,7 @@ from mechgraph.memo import dataclass
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Declared, declared
-from mechgraph.outcome import Options
+from mechgraph.outcome import Options, cannot
 from mechgraph.quantities import shown, unit_of, wrong
 from mechgraph.variants.numbers import AnyField, Variants, clashes, field_values, find_field, varied
 

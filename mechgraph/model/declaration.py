@@ -42,8 +42,7 @@ from mechgraph.model.loads import Load
 from mechgraph.model.motion import Drive
 from mechgraph.model.pair import NO_POINTS, Link, Pair, are_names, pairs_are_sound, types_of
 from mechgraph.model.plane import plane_faults
-from mechgraph.model.response_setup import ResponseSetup
-from mechgraph.model.synthesis_setup import SynthesisSetup
+from mechgraph.model.setups import ResponseSetup, SynthesisSetup
 from mechgraph.pairs.contact_types import travels
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.quantities import (

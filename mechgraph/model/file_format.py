@@ -23,9 +23,8 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.meshes import Mesh
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Misfit, Pair, Stiffness
-from mechgraph.model.response_setup import Event, ResponseSetup, Stop
+from mechgraph.model.setups import Event, ResponseSetup, Stop, SynthesisSetup, SynthesisTask
 from mechgraph.model.short_forms import Belt, BevelGears, Rack, SpurGears, WormGear
-from mechgraph.model.synthesis_setup import SynthesisSetup, SynthesisTask
 from mechgraph.pairs.cam_laws import CamLaw, Segment
 from mechgraph.pairs.contact_types import Hertz
 from mechgraph.pairs.factors import Bookkeeping, Component, Freedom

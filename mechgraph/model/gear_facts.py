@@ -18,7 +18,7 @@ from mechgraph.model.couplings import BaseCoupling
 from mechgraph.model.gears import Gear, GearRack, involute, tip_radius
 from mechgraph.model.meshes import Bevels, Mesh, Meshing, Parallel, WithRack
 from mechgraph.model.pair import Link, Pair
-from mechgraph.model.response_setup import Stop
+from mechgraph.model.setups import Stop
 from mechgraph.quantities import ByName, door
 
 if TYPE_CHECKING:

@@ -39,8 +39,7 @@ from mechgraph.model.loads import Gravity, Load
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Pair
 from mechgraph.model.plane import in_plane, in_space, is_flat, pair_in_plane, pair_in_space, spatial_row
-from mechgraph.model.response_setup import ResponseSetup
-from mechgraph.model.synthesis_setup import SynthesisSetup
+from mechgraph.model.setups import ResponseSetup, SynthesisSetup
 from mechgraph.pairs.contact_types import row_of, travels
 from mechgraph.pairs.pair_type import TABLE, PairType
 from mechgraph.quantities import (

@@ -42,7 +42,6 @@ from typing import Any
 
 import numpy as np
 
-from mechgraph.by_kernel import COMPILED
 from mechgraph.errors import DeclarationError
 from mechgraph.force.loads import NOT_FINITE, Site, user_twists
 from mechgraph.kinematics.motion_path import DriverPath
@@ -56,6 +55,7 @@ from mechgraph.maths.tolerances import PATH, RESPONSE
 from mechgraph.maths.tracker import End, Follower
 from mechgraph.memo import dataclass
 from mechgraph.model.loads import Load
+from mechgraph.outcome import COMPILED
 from mechgraph.response.charts import Task
 from mechgraph.response.motion_equations import ClosedChart, KernelPath, Loads, Stopped, along_one
 

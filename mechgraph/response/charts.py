@@ -22,7 +22,6 @@ from typing import Any, Literal
 import numpy as np
 import scipy
 
-from mechgraph.by_kernel import COMPILED
 from mechgraph.determinacy.mobility import free_motion
 from mechgraph.errors import DeclarationError
 from mechgraph.force.block import BlockForces, forces_of_block
@@ -39,6 +38,7 @@ from mechgraph.maths.tolerances import RESPONSE
 from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
+from mechgraph.outcome import COMPILED
 from mechgraph.response.motion_equations import (
     Chart,
     ClosedChart,

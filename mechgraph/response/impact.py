@@ -30,7 +30,7 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Array, Index, cross
 from mechgraph.maths.tolerances import RESPONSE
 from mechgraph.memo import dataclass
-from mechgraph.model.response_setup import Event, Occurrence, Stop
+from mechgraph.model.setups import Event, Occurrence, Stop
 from mechgraph.response.charts import Task
 from mechgraph.response.motion_equations import NO_INERTIA, ClosedChart, Moved, Stopped, accelerations, moved
 from mechgraph.response.rough import Rough

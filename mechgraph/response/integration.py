@@ -32,7 +32,7 @@ from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import RESPONSE
 from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.response_setup import WHATS, Event, Occurrence
+from mechgraph.model.setups import WHATS, Event, Occurrence
 from mechgraph.quantities import items_of, real_array, shown, wrong
 from mechgraph.response.charts import Task
 from mechgraph.response.motion_equations import ClosedChart, Stopped, stopping

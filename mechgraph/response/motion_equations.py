@@ -45,7 +45,7 @@ from typing import Any, Literal
 import numpy as np
 import scipy
 
-from mechgraph import by_kernel
+from mechgraph import outcome
 from mechgraph.force.friction import Rubbed
 from mechgraph.force.friction_problem import rubbed_in_motion
 from mechgraph.force.loads import Site, inertia_wrenches
@@ -65,8 +65,7 @@ from mechgraph.memo import dataclass
 from mechgraph.model.friction import Friction, rubbing_loads
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.response.rolling import Rolling
-from mechgraph.response.rough import Rough, rough_freedoms
+from mechgraph.response.rough import Rolling, Rough, rough_freedoms
 
 
 class Stopped(Exception):
@@ -657,9 +656,9 @@ def library_for(system: System, loads: Loads, held: bool, engine: str) -> Any:
     DeclarationError
         where the kernel was asked for by name and cannot carry it; MissingExtraError without a compiler.
     """
-    library = build.built() if engine == by_kernel.COMPILED else by_kernel.at_hand() if engine == "auto" else None
+    library = build.built() if engine == outcome.COMPILED else outcome.at_hand() if engine == "auto" else None
     why = None if library is None else cannot(system, loads, held)
-    if why is not None and engine == by_kernel.COMPILED:
+    if why is not None and engine == outcome.COMPILED:
         raise build.not_served(f"respond {system.m.name!r}", why)
     return library if why is None else None
 

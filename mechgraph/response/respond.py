@@ -16,7 +16,6 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from mechgraph.by_kernel import COMPILED
 from mechgraph.determinacy.finite_motion import branches, branches_text, finite_motion
 from mechgraph.determinacy.mobility import free_motion
 from mechgraph.determinacy.report import hinted
@@ -41,7 +40,7 @@ from mechgraph.model.gear_facts import with_play
 from mechgraph.model.loads import Law, Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import declared
-from mechgraph.model.response_setup import (
+from mechgraph.model.setups import (
     METHODS,
     Event,
     MethodName,
@@ -52,6 +51,7 @@ from mechgraph.model.response_setup import (
     read_times,
     tolerance_faults,
 )
+from mechgraph.outcome import COMPILED
 from mechgraph.quantities import Limit, door, is_numeric, items_of, option_faults, real_array, without_units, wrong
 from mechgraph.response.along_path import Arc, PathStage
 from mechgraph.response.charts import OVER_POSITIONS, ChartStage, Prescribed, Task, read_motions, trajectory_of

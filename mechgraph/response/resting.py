@@ -33,7 +33,7 @@ from mechgraph.maths.tolerances import MOTIONS, RESPONSE
 from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair
-from mechgraph.model.response_setup import Event, Occurrence, Stop
+from mechgraph.model.setups import Event, Occurrence, Stop
 from mechgraph.pairs.contact_types import pressing
 from mechgraph.pairs.pair_type import PairType
 from mechgraph.quantities import items_of, wrong

@@ -1,17 +1,26 @@
-"""What rubs in a motion in time: freedoms that slip and stick together.
+"""What rubs in a motion in time: freedoms that slip and stick together, bodies that roll on each other without sliding.
 
 A pair rubs along sliding velocities that are linear in the rates of its freedoms: a journal in its turn, a shaft that turns and slides in
 both at once, a ball in its three turns, a contact in the slides of its point. Friction acts against their direction. Where all of them are
 zero it holds, up to its greatest size. Bodies that touch at a place that moves on both of them slide as their points there do: where that
 is zero they roll.
+
+Sliding rates are ``A q' = 0 (m,)`` while friction holds. With ``q' = Z v + Z_p p'`` and ``C = A Z`` these are equations of rates that no
+coordinates meet, ``C v + A Z_p p' = 0`` and ``C v' + A q''_0 + A' q' = 0``, with forces ``f`` along the tangents for multipliers:
+
+    v' = M^-1 (Q + C^T f),   f = -G^+ (C M^-1 Q + ...),   G = C M^-1 C^T.
+
+Forces that move nothing, as across a guide, are those of least norm. Source: Neimark and Fufaev, Dynamics of Nonholonomic Systems, 1972.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 
-from mechgraph.force.friction import Grip
-from mechgraph.kinematics.rates import Rates
+from mechgraph.force.friction import Grip, Rubbed
+from mechgraph.kinematics.rates import Rates, Velocities
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Array, Mask
@@ -124,3 +133,39 @@ def rough_freedoms(s: System, dry: tuple[Friction, ...]) -> tuple[Rough, ...]:
             weights = tuple(1.0 if s.is_length[c] else arm**2 for c in columns)
             out.append(Rough(load.of, columns, (1.0, 1.0) if rolls else weights, load if rolls else None))
     return tuple(out)
+
+
+class Rolling:
+    """Friction that holds at closed states with motions ``Z (F, n, T)``; ``moves``: accelerations ``(n, T)`` under efforts ``(F, T)``."""
+
+    def __init__(
+        self, here: Configuration, loads: Sequence[Friction], Z: Array, moves: Callable[[Array], Array]
+    ) -> None:
+        self.here, self.grips = here, [Grip.of(here, load) for load in loads]
+        self.rows = np.concatenate([grip.rows(here) for grip in self.grips])
+        self.C = np.einsum("mft,fnt->mnt", self.rows, Z)
+        self.yields = np.stack([moves(row) for row in self.rows], axis=1)
+        G = np.moveaxis(np.einsum("mnt,nkt->mkt", self.C, self.yields), -1, 0)
+        self.inverse = np.moveaxis(np.linalg.pinv(G, rcond=MOTIONS.rounding, hermitian=True), 0, -1)
+        self.ends = np.cumsum([grip.W.shape[1] for grip in self.grips])[:-1]
+
+    def held(self, off: Array) -> tuple[Array, Array]:
+        """Forces ``(m, ..., T)`` that take back what slides ``(m, ..., T)``, and what the independent rates ``(n, ..., T)`` change by."""
+        forces = -np.einsum("mkt,k...t->m...t", self.inverse, off)
+        return forces, np.einsum("nmt,m...t->n...t", self.yields, forces)
+
+    def accelerations(self, at: Velocities, ddq: Array) -> Array:
+        """``A q'' + A' q' (m, T)``."""
+        bias = np.concatenate([grip.bias(at) for grip in self.grips])
+        return np.asarray((self.rows * ddq).sum(axis=1) + bias)
+
+    def rubbing(self, rubs: Rubbed, forces: Array) -> Rubbed:
+        """Friction with that of what rolls ``(m, T)``."""
+        for grip, part in zip(self.grips, np.split(forces, self.ends), strict=True):
+            rubs = rubs.with_grip(self.here, grip, part)
+        return rubs
+
+    def on_links(self, forces: Array) -> Array:
+        """Wrenches ``(6, N, ..., T)`` of forces ``(m, ..., T)``."""
+        parts = zip(self.grips, np.split(forces, self.ends), strict=True)
+        return np.asarray(sum(grip.on_links(self.here, part) for grip, part in parts))

@@ -19,7 +19,7 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.assemblies import weakest
 from mechgraph.quantities import items_of, place_among, real_array, wrong
 from mechgraph.synthesis.fitness import Fitness, keeps
-from mechgraph.synthesis.symmetries import Symmetry
+from mechgraph.synthesis.labelling import Symmetry
 
 if TYPE_CHECKING:
     import pandas

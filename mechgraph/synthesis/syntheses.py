@@ -17,7 +17,7 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import MODES
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.synthesis_setup import DefectName, FitName, SynthesisSetup
+from mechgraph.model.setups import DefectName, FitName, SynthesisSetup
 from mechgraph.modes.homotopy import ELSEWHERE, Mask
 from mechgraph.quantities import Count, door, items_of, real_array, wrong
 from mechgraph.quantities import Index as Seed
@@ -32,9 +32,9 @@ from mechgraph.synthesis.answers import (
 from mechgraph.synthesis.classes import ClassMember, NoClass, TaskClass
 from mechgraph.synthesis.fitness import Fitness, Measure, fitness, limits_of
 from mechgraph.synthesis.fits import Fit, FitPoint, Fitted, fitted
+from mechgraph.synthesis.labelling import cognates, motions_of, orbits, symmetries
 from mechgraph.synthesis.solve import Progress, TaskEnds, TaskStart, ends, kept, real_states, start_of
 from mechgraph.synthesis.structures import WHERE, structures
-from mechgraph.synthesis.symmetries import cognates, motions_of, orbits, symmetries
 from mechgraph.synthesis.system import RowNumbers, RowProblem
 from mechgraph.synthesis.tasks import FunctionTask, function, path, poses, positions
 from mechgraph.synthesis.unknowns import Unknowns

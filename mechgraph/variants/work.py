@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechgraph import by_kernel
-from mechgraph.by_kernel import COMPILED, InKernel, in_kernel
+from mechgraph import outcome
 from mechgraph.determinacy.snapping import SnappedMechanism, declared_closure, meant, started
 from mechgraph.errors import DeclarationError, MechgraphError, did_you_mean, listed, near_names
 from mechgraph.fields import XYZ
@@ -38,7 +37,7 @@ from mechgraph.model.friction import Friction
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Motion
 from mechgraph.model.parameters import Parameters
-from mechgraph.outcome import Options, Starts
+from mechgraph.outcome import COMPILED, InKernel, Options, Starts, in_kernel
 from mechgraph.quantities import items_of, shown, unit_of, wrong
 from mechgraph.result.contacts import LiftOff, Overlap
 from mechgraph.result.film import FILM_DIMENSIONS, FilmResult
@@ -538,7 +537,7 @@ class StudyTask:
     @property
     def may_be_compiled(self) -> bool:
         """Whether the kernel may serve, and no variant is built by a function."""
-        asked = self.engine == COMPILED or (self.engine == "auto" and by_kernel.at_hand() is not None)
+        asked = self.engine == COMPILED or (self.engine == "auto" and outcome.at_hand() is not None)
         return asked and self.source.build is None and self.source.tol is None and not self.source.one_by_one
 
 
