@@ -17,8 +17,8 @@ import numpy as np
 from mechgraph.determinacy.finite_motion import branches
 from mechgraph.determinacy.mobility import stand_still
 from mechgraph.errors import DeclarationError
-from mechgraph.force.block import FORCE_OUTCOMES, BlockForces, forces_of_block
-from mechgraph.force.redundant import ForceTask
+from mechgraph.force.block import forces_of_block
+from mechgraph.force.redundant import FORCE_OUTCOMES, BlockForces, ForceTask
 from mechgraph.kernel import build
 from mechgraph.kernel.tables import HEAD_RUBS, MIDDLE, START, Kernel, Layout, Mask, Records, layout, tables, why_not
 from mechgraph.kinematics.motion_path import BLOCK, DriverPath, Positions, Status, continued, in_blocks

@@ -6,68 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from mechgraph.force.friction import OUTCOMES, Rubbed, moving_rates
+from mechgraph.force.friction import Rubbed, moving_rates
 from mechgraph.force.friction_problem import FrictionProblem
 from mechgraph.force.loads import Site, inertia_wrenches, kinetic_power
 from mechgraph.force.reactions import METHODS, ForceProblem, on_their_flanks, pair_power, pretensioned, row_efforts
-from mechgraph.force.redundant import LIFTS_OFF, ForceTask, held_still, least_on_flanks
+from mechgraph.force.redundant import BlockForces, ForceTask, held_still, least_on_flanks
 from mechgraph.kinematics.rates import Rates
 from mechgraph.kinematics.state import Configuration, FactoredClosure
 from mechgraph.kinematics.touching import ContactLines
 from mechgraph.maths.linear import add_at
-from mechgraph.maths.se3 import Array, Index, Mask
-from mechgraph.memo import dataclass
+from mechgraph.maths.se3 import Array, Index
 from mechgraph.model.friction import rubbing_loads
-
-FORCE_OUTCOMES = (*OUTCOMES, LIFTS_OFF)
-"""What becomes of the forces at a position, by number."""
-
-
-@dataclass(frozen=True)
-class BlockForces:
-    """Forces at the positions of a block, internal units about the internal origin.
-
-    ``reactions (6, P, T)`` and all ``efforts (F, T)`` (of least norm where redundant), ``given (F, T)`` efforts of loads, ``loads
-    (6, N, T)`` inertia, applied wrenches and what holds passive bodies (``hold (6, N, T)`` that alone, or None), self-stresses
-    ``stress (6, P, s, T)`` with ``stress_efforts (F, s, T)``, ``coupled (F, T)`` efforts of couplings, ``shaking (6, T)``;
-    ``balance (T,)`` and ``power (T,)`` the residuals of equilibrium and power, ``largest`` the largest term of each; ``holds`` and
-    ``hold_terms (p, T)`` of the passive motions. ``multipliers (n, T)`` of the closure rows behind those of
-    the loops with ``multiplier_stress (n, s, T)``, of which ``coupled_stress (F, s, T)`` are the efforts in freedoms.
-    Where stiffness splits reactions: those that misfits lock in ``locked (6, P, T)``, and those of a misfit of one in every component
-    that is not rigid ``of_misfit (6, P, k, T)``. With friction: what came about, ``rubs``, and at rest the least and greatest efforts
-    between which drives may be ``range (F, 2, T)``, and whether it ``holds_alone (T,)`` with several of them off;
-    ``unborne (T,)`` where feet that only push cannot bear the loads.
-    """
-
-    reactions: Array
-    efforts: Array
-    given: Array
-    loads: Array
-    hold: Array | None
-    stress: Array
-    stress_efforts: Array
-    coupled: Array
-    multipliers: Array
-    multiplier_stress: Array
-    coupled_stress: Array
-    shaking: Array
-    balance: Array
-    power: Array
-    largest: tuple[float, float]
-    holds: Array
-    hold_terms: Array
-    locked: Array | None = None
-    of_misfit: Array | None = None
-    rubs: Rubbed | None = None
-    range: Array | None = None
-    holds_alone: Array | None = None
-    unborne: Mask | None = None
-
-    @property
-    def outcome(self) -> Array:
-        """What became of every position ``(T,)``, by its number in ``FORCE_OUTCOMES``."""
-        came = np.zeros(self.power.shape, int) if self.rubs is None else self.rubs.outcome
-        return came if self.unborne is None else np.where(self.unborne, FORCE_OUTCOMES.index(LIFTS_OFF), came)
 
 
 def forces_of_block(

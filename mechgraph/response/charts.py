@@ -24,10 +24,10 @@ import scipy
 
 from mechgraph.determinacy.mobility import free_motion
 from mechgraph.errors import DeclarationError
-from mechgraph.force.block import BlockForces, forces_of_block
+from mechgraph.force.block import forces_of_block
 from mechgraph.force.friction import OUTCOMES
 from mechgraph.force.loads import Site, kinetic_energy
-from mechgraph.force.redundant import ForceTask
+from mechgraph.force.redundant import BlockForces, ForceTask
 from mechgraph.kinematics.motion_path import in_blocks
 from mechgraph.kinematics.rates import PassiveMotion, Rates, Velocities
 from mechgraph.kinematics.state import Configuration

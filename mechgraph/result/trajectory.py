@@ -19,10 +19,9 @@ from mechgraph.determinacy.uniqueness import labels_of
 from mechgraph.equations.terms import State
 from mechgraph.errors import DeclarationError, MechgraphError
 from mechgraph.fields import PerCase
-from mechgraph.force.block import BlockForces
 from mechgraph.force.loads import Site, hold_names, inertia_wrenches, is_idle, kinetic_energy, user_twists
 from mechgraph.force.reactions import PairFrames, given_effort_loads, user_state, user_wrench
-from mechgraph.force.redundant import displacement, seats_of, strains
+from mechgraph.force.redundant import BlockForces, displacement, seats_of, strains
 from mechgraph.kernel.tables import OF_FRICTION, Records
 from mechgraph.kinematics.motion_path import Status, in_blocks
 from mechgraph.kinematics.rates import PassiveMotion, Rates, Velocities
