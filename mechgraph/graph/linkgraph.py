@@ -23,7 +23,7 @@ from mechgraph.errors import counted
 from mechgraph.maths.linear import Place, add_at, compact, scattered_sum
 from mechgraph.maths.se3 import IN_PLANE, IN_SPACE, Array, Index, compose, multiplied
 from mechgraph.memo import dataclass, of_graph
-from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.declaration import DeclaredParts
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -176,7 +176,7 @@ class LinkGraph:
         return C
 
 
-def network(m: Mechanism) -> nx.MultiGraph[str]:
+def network(m: DeclaredParts) -> nx.MultiGraph[str]:
     """The mechanism as a networkx multigraph; edge keys are pair names, nodes and edges carry ``link`` and ``pair``."""
     import networkx as nx
 
@@ -189,7 +189,7 @@ def network(m: Mechanism) -> nx.MultiGraph[str]:
 
 
 @of_graph
-def link_graph(m: Mechanism) -> LinkGraph:
+def link_graph(m: DeclaredParts) -> LinkGraph:
     """Tree, chords and loops of a mechanism."""
     return _graph(len(m.links), *m.pair_ends, m.link_index[m.frame], m.planar)
 
@@ -570,7 +570,7 @@ class GraphParts:
     spare_equations: int
 
 
-def parts_of(m: Mechanism, graph: LinkGraph) -> GraphParts:
+def parts_of(m: DeclaredParts, graph: LinkGraph) -> GraphParts:
     """Matching and parts from the graph and the freedoms of the pairs, by maximum flow from unknowns to equations."""
     P, N = len(m.pairs), graph.n_links
     width = graph.width

@@ -41,7 +41,6 @@ from mechgraph.model.gears import GEARS, gear_faults
 from mechgraph.model.loads import Load
 from mechgraph.model.motion import Drive
 from mechgraph.model.pair import NO_POINTS, Link, Pair, are_names, pairs_are_sound, types_of
-from mechgraph.model.plane import plane_faults
 from mechgraph.model.setups import ResponseSetup, SynthesisSetup
 from mechgraph.pairs.contact_types import travels
 from mechgraph.pairs.pair_type import PairType
@@ -175,6 +174,10 @@ class DeclaredParts(Formatted, Once):
         TABLE("what `synthesize` takes where it is given nothing else", table="synthesis", default="none"),
     ]
     expected: Annotated[Mapping[str, Any], FACTS("facts that a test checks; any names", default="empty")]
+
+    def leaving_the_plane(self, loads_alone: bool = False) -> list[str]:
+        """What of a planar mechanism leaves its plane, one line each; of these parts nothing is known of one."""
+        return []
 
     @property
     def span(self) -> slice:
@@ -400,7 +403,7 @@ def declaration_faults(m: DeclaredParts) -> list[str]:
     plain = (m.formats[what].fault(getattr(m, what), what) for what in ("planar", "source", "description"))
     faults += filter(None, plain)
     if m.planar is True:
-        faults += plane_faults(m.links, m.pairs, m.loads, m.gears)
+        faults += m.leaving_the_plane()
     names, pair_names = _texts(m.link_names()), _texts([pair.name for pair in m.pairs])
     faults += repeated(names, "link") + repeated(pair_names, "pair")
     tol = sound_tol(m.tol)
@@ -494,7 +497,7 @@ def _links_are_sound(links: Sequence[Link]) -> bool:
 
 def item_faults(m: DeclaredParts) -> list[str]:
     """Faults of drives and loads alone, for links, pairs and couplings that were checked before."""
-    return _kind_faults(m) or (plane_faults((), (), m.loads) if m.planar else []) + _reference_faults(m)
+    return _kind_faults(m) or (m.leaving_the_plane(loads_alone=True) if m.planar else []) + _reference_faults(m)
 
 
 @of_graph

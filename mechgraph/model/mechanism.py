@@ -38,7 +38,7 @@ from mechgraph.model.gears import off_axis
 from mechgraph.model.loads import Gravity, Load
 from mechgraph.model.motion import Drive, Motion
 from mechgraph.model.pair import Link, Marker, Pair
-from mechgraph.model.plane import in_plane, in_space, is_flat, pair_in_plane, pair_in_space, spatial_row
+from mechgraph.model.plane import in_plane, in_space, is_flat, pair_in_plane, pair_in_space, plane_faults, spatial_row
 from mechgraph.model.setups import ResponseSetup, SynthesisSetup
 from mechgraph.pairs.contact_types import row_of, travels
 from mechgraph.pairs.pair_type import TABLE, PairType
@@ -292,6 +292,13 @@ class Mechanism(DeclaredParts, Shown):
             kinds = {type(c): None for c in self.couplings}
             for fault in (*off_axis(self), *(fault for kind in kinds for fault in kind.doubts(self))):
                 warnings.warn(f"mechanism {self.name!r}: {fault}", MechgraphWarning, stacklevel=3)
+
+    def leaving_the_plane(self, loads_alone: bool = False) -> list[str]:
+        """What leaves the x-y plane, one line each."""
+        parts: tuple[Any, ...] = (
+            ((), (), self.loads) if loads_alone else (self.links, self.pairs, self.loads, self.gears)
+        )
+        return plane_faults(*parts)
 
     def _set(self, **fields: Any) -> None:
         for key, value in fields.items():

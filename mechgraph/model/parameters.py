@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from mechgraph.maths.se3 import Array, cross
 from mechgraph.memo import dataclass
-from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.declaration import DeclaredParts
 
 Index = NDArray[np.intp]
 Items = NDArray[np.object_]
@@ -99,14 +99,14 @@ class Declared:
     couplings: Array
     items: Items
 
-    def offset(self, m: Mechanism) -> Array:
+    def offset(self, m: DeclaredParts) -> Array:
         """Middle of the markers of every link in its frame, ``(3, N)``: of the first variant."""
         ends = np.concatenate(m.pair_ends)
         points = np.concatenate([self.point[0, :, :, 0], self.point[1, :, :, 0]], axis=1)
         count = np.bincount(ends, minlength=len(m.links))
         return np.stack([np.bincount(ends, row, minlength=len(m.links)) for row in points]) / count
 
-    def with_rest(self, m: Mechanism) -> Declared:
+    def with_rest(self, m: DeclaredParts) -> Declared:
         """The numbers with those of the pairs of ``m`` behind theirs (free pairs, which do not vary)."""
         P = self.pitch.shape[0]
         if len(m.pairs) == P:
@@ -117,7 +117,7 @@ class Declared:
             joined[name] = np.concatenate([mine, np.repeat(theirs, mine.shape[-1], axis=-1)], axis=-2)
         return replace(self, **joined)
 
-    def parameters(self, m: Mechanism, offset: Array, origin: Array, L: float) -> Parameters:
+    def parameters(self, m: DeclaredParts, offset: Array, origin: Array, L: float) -> Parameters:
         """The arrays that kernels read, about ``origin (3,)`` with lengths over ``L`` and link frames moved by ``offset (3, N)``."""
         frame_link = m.link_index[m.frame]
         frame = np.zeros((3, 4, 1))
@@ -152,7 +152,7 @@ class Declared:
         return out
 
 
-def coupling_places(m: Mechanism) -> list[slice]:
+def coupling_places(m: DeclaredParts) -> list[slice]:
     """For every coupling the places of its coefficients among the numbers of all; behind the last one stands its constant."""
     ends = accumulate((len(c.terms) + 1 for c in m.couplings), initial=0)
     return [slice(begin, end - 1) for begin, end in pairwise(ends)]
@@ -163,7 +163,7 @@ def _rows(vectors: Iterable[Any], count: int) -> Array:
     return np.fromiter(chain.from_iterable(vectors), float, 3 * count).reshape(-1, 3)
 
 
-def _of_sides(m: Mechanism, fields: tuple[str, ...]) -> list[Array]:
+def _of_sides(m: DeclaredParts, fields: tuple[str, ...]) -> list[Array]:
     """Fields of the markers on both sides of all pairs, ``(2, 3, P)`` each."""
     marked = [k for k, pair in enumerate(m.pairs) if pair.on_a is not None]
     sides = [pair.on_a or pair for pair in m.pairs], [m.pairs[k].on_b for k in marked]
@@ -176,7 +176,7 @@ def _of_sides(m: Mechanism, fields: tuple[str, ...]) -> list[Array]:
     return out
 
 
-def declared(m: Mechanism) -> Declared:
+def declared(m: DeclaredParts) -> Declared:
     """The declared numbers of one mechanism with geometry, a batch of one."""
     point, axis, second = _of_sides(m, ("point", "axis", "second"))
     n = len(m.links)
@@ -197,7 +197,7 @@ def declared(m: Mechanism) -> Declared:
     )
 
 
-def parameters(m: Mechanism) -> Parameters:
+def parameters(m: DeclaredParts) -> Parameters:
     """The arrays of a mechanism with geometry as it is declared, about the origin of its frame."""
     numbers = declared(m)
     offset = numbers.offset(m)
