@@ -88,7 +88,7 @@ def test_noise_beside_a_crossing_that_is_open_makes_no_more_pieces(engine):
     """Rounding grows with the square of the condition: where the branches pass each other no shorter series is free of it."""
     w = way(0.0, engine, narrower=3e-8)
     assert w.length > 2.0
-    assert len(w._pieces) < 90
+    assert len(w.pieces) < 90
 
 
 def test_motions_of_functions_break_where_their_acceleration_jumps():
