@@ -21,9 +21,10 @@ BUILT = frozenset({"Chain", "Compiled", "Families", "Formulation", "Group", "Ide
 """Classes whose objects functions make; a reader of a program finds them in ``__all__`` for their names alone."""
 INSIDE = {
     "Mechanism": "freedom freedom_fault full_name has_graph_of in_own_units once period place_of_link place_of_pair "
-    "take_graph_of turns ends_of",
+    "take_graph_of turns ends_of leaving_the_plane",
     "Ledger": "table",
-    "CamLaw": "faults in_units moved once replace take_graph_of value_faults without_quantities",
+    "CamLaw": "changed converted faults in_own_units in_units moved numbers_turn once replace take_graph_of value_faults "
+    "with_full_names without_quantities",
 }
 """Methods with public names that modules of the package call, not programs."""
 

@@ -16,7 +16,7 @@ from mechgraph.kinematics.system import indexed
 from mechgraph.maths.se3 import quaternion_matrix, rotation_exp
 from mechgraph.modes.assemblies import Finder, Question
 from mechgraph.modes.family import Member, searched
-from mechgraph.modes.form import _ball, _two_turns, rods_of
+from mechgraph.modes.form import _two_turns, least_turn, rods_of
 from mechgraph.modes.homotopy import Equations, Leg
 from mechgraph.modes.start_sets import bound, distinct
 from mechgraph.modes.targets import Ends, TrackRun, _account, ends
@@ -234,7 +234,7 @@ def test_balls_and_two_turns_point_where_they_shall() -> None:
     begin = rng.normal(size=(4, 50))
     begin /= np.linalg.norm(begin, axis=0)
     to[:, 0] = -np.einsum("ij,j->i", quaternion_matrix(begin)[:, :, 0], of[:, 0])  # half a turn from where it is
-    reached = np.einsum("ijt,j->it", quaternion_matrix(_ball(of, to, begin.astype(complex))), of[:, 0])
+    reached = np.einsum("ijt,j->it", quaternion_matrix(least_turn(of, to, begin.astype(complex))), of[:, 0])
     assert np.abs(reached - to).max() < 1e-12
 
 
