@@ -84,6 +84,28 @@ def test_as_numpy_solves_it(name: str, many: bool) -> None:
 
 
 @pytest.mark.usefixtures("compiled")
+@pytest.mark.parametrize("aside", [False, True])
+@pytest.mark.parametrize("on", "ab")
+def test_what_no_load_adds_to_stays_zero_in_the_kernel_too(on: str, aside: bool) -> None:
+    """A slider-crank on a tilted plane whose rough bearings have a length: sure as long as nothing acts across the plane."""
+    n, across = (0.0, 0.6, 0.8), (1.0, 0.0, 0.0)
+    at = [np.array(p) @ (across, np.cross(n, across), n) for p in ((0, 0, 0), (0.1, 0, 0), (0.4, 0, 0))]
+    links = ("frame", "crank", "rod", "slider")
+    pins = [mg.Pair(k, "R", *links[i : i + 2], point=at[i], axis=n) for i, k in enumerate("ABC")]
+    loads = [mg.Wrench("slider", force=(-100.0, 0, 0), point=at[2])]
+    loads += [mg.Friction(k, mu=0.1, radius=0.01, length=0.08, on=on) for k in "ABC"]
+    loads += [mg.Friction("D", mu=0.1, length=0.1, width=0.03, on=on)]
+    if aside:
+        loads.append(mg.Wrench("rod", force=tuple(5.0 * np.array(n)), point=at[1]))
+    guide = mg.Pair("D", "P", "frame", "slider", point=at[2], axis=across)
+    m = mg.Mechanism("slider-crank", pairs=[*pins, guide], drives=["A"], loads=loads)
+    s = mg.solve(m, {"A": mg.Motion([0.5], 1.0, 0.0)}, engine="dense")
+    hot = mg.compile(m)
+    found = hot([0.5], [1.0], [0.0])
+    assert (s.status[0], hot.status) == (("friction not determined", "friction not solved") if aside else ("ok", "ok"))
+    np.testing.assert_allclose(found, s["A"].effort[0], rtol=1e-12)
+
+
 @pytest.mark.usefixtures("compiled")
 def test_what_the_kernel_leaves_open_numpy_says() -> None:
     """Positions at rest, in motion and in the other sense in one call; a collar that jams has its factor."""
