@@ -333,3 +333,30 @@ def test_breaks_rise(breaks):
     ):
         with pytest.raises(mg.DeclarationError, match=r"1 fault\n.*breaks = .*: expected finite numbers that rise"):
             block(load)
+
+
+@pytest.mark.parametrize("place", [0.233, 0.356, 0.4682, 0.72])
+@pytest.mark.parametrize("kind", ["function", "table"])
+def test_a_hump_on_which_only_the_polynomial_of_a_step_stands_is_not_missed(kind: str, place: float) -> None:
+    """1 kg at 1 m/s gains the work of a hump of 7.5 mm that the stages of a step pass by; a table may end where only a trial state goes."""
+    x, force = place + 0.0075 * np.array([0.0, 0.25, 0.5, 1.0]), np.array([0.0, 1.0, 1.0, 0.0]) * 800.0 / 3.0
+    laws = {
+        "function": lambda q, v, t: np.interp(q, x, force),
+        "table": mg.ForceTable(x=[-9.0, *x, 9.0], force=[0.0, *force, 0.0]),
+    }
+    slide = mg.Pair("A", "P", "frame", "a", point=(0, 0, 0), axis=(1, 0, 0))
+    links = [mg.Link("frame"), mg.Link("a", 1.0, (0, 0, 0))]
+    m = mg.Mechanism("slide", links, [slide], loads=[mg.ForceLaw("A", law=laws[kind])])
+    r = mg.respond(m, (0.0, 1.0), rates={"A": 1.0})
+    assert r["A"].velocity[-1, 0] == pytest.approx(np.sqrt(1.0 + 2.0 * np.trapezoid(force, x)), abs=1e-5)
+
+
+@pytest.mark.parametrize("second", [1.0, 1e-6])
+def test_a_weak_spring_winds_up_whatever_the_unit_of_time(second: float) -> None:
+    """Many turns against a spring that is nothing beside the inertia in one of the units: sin(w t) / w."""
+    k = 4e-4 * second**2
+    links = [mg.Link("frame"), mg.Link("wheel", 1.0, (0, 0, 0), np.eye(3))]
+    axle = mg.Pair("A", "R", "frame", "wheel", point=(0, 0, 0), axis=(0, 0, 1))
+    m = mg.Mechanism("wheel", links, [axle], loads=[mg.TorsionSpring("A", k)])
+    r = mg.respond(m, np.linspace(0.0, 150.0 / second, 6), rates={"A": second})
+    np.testing.assert_allclose(r["A"].position[:, 0], 50.0 * np.sin(0.02 * np.linspace(0.0, 150.0, 6)), atol=1e-4)

@@ -572,8 +572,17 @@ class Arc:
         around = self.close(self.begin + sense * self.turn * (np.arange(POINTS) + 0.37) / POINTS)
         further = Configuration(s, around.here.x + sense * out[:, None])
         loads, factored = self.terms.smooth, self.path.solver.factored(further, around.f.which)
-        now, then = along_one(around.here, around.f, loads), along_one(further, factored, loads)
-        return out if np.abs(now - then).max() <= RESPONSE.periodic * np.abs(now).max() else None
+        both = (around.here, around.f), (further, factored)
+        now, then = (along_one(*one, loads) for one in both)
+        if np.abs(now - then).max() > RESPONSE.periodic * np.abs(now).max():
+            return None
+        # what acts in a freedom is small beside inertia where it is slow, or the unit of time is short, and counts turns all the same
+        for load in (load for load in (*loads.stored, *loads.rest) if load.freedoms):
+            alone = Loads(*(tuple(one for one in some if one is load) for some in (loads.stored, loads.rest)))
+            now, then = (along_one(*one, alone)[1:] for one in both)
+            if (np.abs(now - then) > RESPONSE.periodic * np.abs(now).max(axis=1, keepdims=True)).any():
+                return None
+        return out
 
 
 class PathStage:

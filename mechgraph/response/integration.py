@@ -26,7 +26,7 @@ from typing import Any, Protocol
 import numpy as np
 import scipy
 
-from mechgraph.errors import MechgraphWarning, counted
+from mechgraph.errors import DeclarationError, MechgraphWarning, counted
 from mechgraph.kernel.tables import pointer
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import RESPONSE
@@ -359,9 +359,9 @@ class Integration:
         self.work.stages += 1
         while t < end:
             goal = min((one for one in self.breaks if one > t), default=end)
-            stepper = self._stepper(stage, t, y, min(goal, end), h)
-            serves = True
+            stepper, serves = None, True
             try:
+                stepper = self._stepper(stage, t, y, min(goal, end), h)
                 while stepper.status == "running" and serves:
                     # trial steps may be far too long; what overflows there is taken back
                     with np.errstate(over="ignore", invalid="ignore"):
@@ -378,7 +378,7 @@ class Integration:
                             f"{message or ''} Steps collapse where loads are stiff or jump, and at positions where the mechanism locks or "
                             "only links without inertia move; for stiff loads use method='Radau'".strip()
                         )
-                    if not known or (not rounding and self._missed(stage, t, stepper, dense)):
+                    if not known or (not rounding and self._missed(stage, (t, y), stepper, dense)):
                         # part of a step that was refused with which the next is tried
                         h = 0.25 * (stepper.t - t)
                         break
@@ -390,8 +390,14 @@ class Integration:
                     self._look(end)
                     serves = stage.accepted(t, y)
                     yield self.segments[-1]
+            except DeclarationError:
+                # a trial state may lie outside of a table in which the motion stays
+                tried = (h or goal - t) if stepper is None else stepper.t - t or getattr(stepper, "h_abs", goal - t)
+                h = 0.25 * tried
+                if h <= 1e-13 * max(abs(t), abs(goal)):
+                    raise
             finally:
-                self.work.evaluations += stepper.nfev
+                self.work.evaluations += 0 if stepper is None else stepper.nfev
             if t < end and not serves:
                 stage = stage.following(t, y)
                 y, before = stage.begin(), self.done
@@ -414,15 +420,26 @@ class Integration:
             make = partial(StepsInKernel, stage)
         return make(between(stage.rates), t, y, end, rtol=self.rtol, atol=atol, max_step=self.max_step, **more)
 
-    def _missed(self, stage: Stage, begin: float, stepper: Any, dense: Callable[[Any], Array]) -> bool:
-        """Whether a step that the stepper has just taken may have missed what tables and functions do within it."""
-        end = stepper.t
-        unsmooth = stage.unsmooth(end, stepper.y, dense)
-        if unsmooth is None:
+    def _missed(self, stage: Stage, before: tuple[float, Array], stepper: Any, dense: Callable[[Any], Array]) -> bool:
+        """Whether a step that the stepper has just taken may have missed what tables and functions do within it.
+
+        It is looked at along its polynomial, and along the cubic between its ends: stages that serve the polynomial alone may lie on a hump
+        that the step has missed, and bend it away.
+        """
+        (begin, y), end = before, stepper.t
+        if stage.unsmooth(end, stepper.y, dense) is None:
             return False
-        accelerations, rates = unsmooth
+        slopes = np.stack([stage.rates(*one) for one in (before, (end, stepper.y))])
+        if not np.isfinite(slopes).all():
+            return True
+        cubic = scipy.interpolate.CubicHermiteSpline((begin, end), (y, stepper.y), slopes, axis=0)
         inside = np.nextafter(begin, end), np.nextafter(end, begin)
-        return overlooked(accelerations, *inside, self.apart, self.rtol * np.abs(rates) + self.atol)
+        for along in (dense, lambda t: cubic(t).T):
+            found = stage.unsmooth(end, stepper.y, along)
+            assert found is not None
+            if overlooked(found[0], *inside, self.apart, self.rtol * np.abs(found[1]) + self.atol):
+                return True
+        return False
 
     def _look(self, end: float) -> None:
         """Say where steps have become so short that a long wait is certain; give up where there is no end."""
