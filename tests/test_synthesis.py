@@ -369,3 +369,26 @@ def test_a_link_that_begins_elsewhere_than_at_the_identity_comes_back_by_markers
     assert np.abs(moved.poses[0, 2, 2] - _planar(poses[2]) @ own).max() < 1e-9
     with pytest.raises(mg.DeclarationError, match="a fit begins there"):
         mg.synthesize(m, mg.poses("body", np.array([_planar(row) @ own for row in poses])), ["B.point"], fit="minimax")
+
+
+def test_a_real_solution_of_large_dimensions_is_none_of_the_complex_ones() -> None:
+    """Five points with both pivots given: one of the 20 real four-bars is 3,000 cranks large, and complex ones come in pairs."""
+    points = [
+        [1.2000000000000002, 2.2],
+        [1.112112336786848, 2.209806789949453],
+        [0.9391142433734428, 2.196125776555743],
+        [0.5197399603005753, 2.0188589321640817],
+        [0.2814256501065775, 1.8185930318084498],
+    ]
+    links = ("frame", "crank", "coupler", "rocker", "frame")
+    at = {"A": (0, 0), "B": (0, 1), "C": (3, 2), "D": (3, 0)}
+    pins = [mg.Pair(k, "R", *links[i : i + 2], point=p) for i, (k, p) in enumerate(at.items())]
+    parts = [mg.Link(name, points={"tip": points[0]} if name == "coupler" else {}) for name in links[:4]]
+    m = mg.Mechanism("four-bar", parts, pins, drives=["A"], planar=True)
+    s = mg.synthesize(m, mg.path("coupler.tip", points), ["B.point", "C.point"])
+    assert (len(s), len(s.complex), s.completeness) == (20, 16, "proved")
+    # by Newton in 50 digits
+    large = s.values[np.abs(s.values).max(axis=1).argmax()]
+    np.testing.assert_allclose(
+        large, [-3023.87347842258, 1669.70465986535, 4.39956101537635, 0.237225493006354], rtol=2e-6
+    )

@@ -39,7 +39,7 @@ class ComplexSyntheses:
 class Degenerate:
     """Solutions of the equations that are no mechanisms of their own, and that ``total`` does not count."""
 
-    kind: Annotated[str, "double, coincident or reversed"]
+    kind: Annotated[str, "double, open, coincident or reversed"]
     count: int
     text: str
 

@@ -154,16 +154,16 @@ class Synthesis:
     def _answer(self, start: TaskStart, goal: ClassMember, found: TaskEnds, i: int) -> Syntheses:
         p, of = self.problem, self.of.full
         x, error, which = real_states(self.of, goal, found.x)
-        fits = error <= CLOSED_TO
+        # rounding of rows in squares of lengths grows with these
+        fits = error <= CLOSED_TO * np.maximum(1.0, np.abs(x[: self.of.u]).max(axis=0, initial=0.0)) ** 2
         told = [*start.evidence, self._tracks(start, found)]
-        real = which[fits]
         condition, motions = self._conditions(goal, x[:, fits]), motions_of(self.of, goal, x[:, fits].astype(complex))
         goal, x = self.of.lifted(goal, x[:, fits])
         x, error = self._upright(goal, x)
         against, merged = error > CLOSED_TO, self._merged(goal, x)
         left = ~merged & ~against
         x, error, condition, motions = x[:, left], error[left], condition[left], motions[:, left]
-        others = np.delete(found.x[: of.u], real, axis=1)
+        others = np.delete(found.x[: of.u], which, axis=1)
         values = p.outside(x[: of.u]).T
         order = np.lexsort(np.round(values, 9).T[::-1]) if len(values) else np.zeros(0, dtype=np.intp)
         x, error, values, condition = x[:, order], error[order], values[order], condition[order]
@@ -182,6 +182,7 @@ class Synthesis:
         degenerate += [
             Degenerate(kind, int(these.sum()), f"In {counted(int(these.sum()), 'solution')} {what}.")
             for kind, these, what in (
+                ("open", ~fits, "what follows from the other conditions is not met"),
                 ("coincident", merged & ~against, "elements of a link coincide"),
                 ("reversed", against, "an axis that is sought points against the motion that is asked about it"),
             )
