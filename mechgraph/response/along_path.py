@@ -578,7 +578,7 @@ class Arc:
             return None
         # what acts in a freedom is small beside inertia where it is slow, or the unit of time is short, and counts turns all the same
         for load in (load for load in (*loads.stored, *loads.rest) if load.freedoms):
-            alone = Loads(*(tuple(one for one in some if one is load) for some in (loads.stored, loads.rest)))
+            alone = Loads((load,), ()) if load in loads.stored else Loads((), (load,))
             now, then = (along_one(*one, alone)[1:] for one in both)
             if (np.abs(now - then) > RESPONSE.periodic * np.abs(now).max(axis=1, keepdims=True)).any():
                 return None
