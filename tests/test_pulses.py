@@ -1,5 +1,7 @@
 """What depends on time by itself is not stepped over: pulses, breaks, the longest step; laws along a path and in charts."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import scipy
@@ -360,3 +362,28 @@ def test_a_weak_spring_winds_up_whatever_the_unit_of_time(second: float) -> None
     m = mg.Mechanism("wheel", links, [axle], loads=[mg.TorsionSpring("A", k)])
     r = mg.respond(m, np.linspace(0.0, 150.0 / second, 6), rates={"A": second})
     np.testing.assert_allclose(r["A"].position[:, 0], 50.0 * np.sin(0.02 * np.linspace(0.0, 150.0, 6)), atol=1e-4)
+
+
+@pytest.mark.usefixtures("compiled")
+def test_a_peak_of_the_mass_beside_a_change_point_is_not_stepped_over() -> None:
+    """A crank whose pin passes the pivot of its guide at .003: w = sqrt(E / M), so that t is the integral of sqrt(M / E) over its angle."""
+    far, begin, turn = 1.003, 4.5, 4.6 * np.pi
+    pin, pivot = np.array([np.cos(begin), np.sin(begin), 0.0]), np.array([far, 0.0, 0.0])
+    links = [mg.Link("frame"), mg.Link("block")]
+    links += [mg.Link(name, 1.0, at, np.eye(3)) for name, at in (("crank", (0, 0, 0)), ("guide", pivot))]
+    pairs = [
+        mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=Z),
+        mg.Pair("B", "R", "crank", "block", point=pin, axis=Z),
+        mg.Pair("C", "P", "guide", "block", point=pin, axis=pin - pivot),
+        mg.Pair("D", "R", "frame", "guide", point=pivot, axis=Z),
+    ]
+
+    def root_of_mass(angle: float) -> float:
+        ratio = (1.0 - far * np.cos(angle)) / (1.0 + far**2 - 2.0 * far * np.cos(angle))
+        return float(np.sqrt(1.0 + ratio**2))
+
+    peaks = 2.0 * np.pi * np.arange(1, 4)[:, None] + [-0.1, -0.01, 0.0, 0.01, 0.1]
+    ends = [begin, *np.sort(peaks.ravel()).tolist(), begin + turn]
+    parts = [scipy.integrate.quad(root_of_mass, *part, epsabs=1e-11)[0] for part in pairwise(ends)]
+    r = mg.respond(mg.Mechanism("guide", links, pairs), (0.0, sum(parts) / root_of_mass(begin)), rates={"A": 1.0})
+    assert r["A"].position[-1, 0] == pytest.approx(turn, abs=3e-6)

@@ -509,6 +509,13 @@ class Arc:
                 return self.piece(u)
         return None if at > way.length or not way.length else (way.piece(at), turns)
 
+    def number(self, u: float) -> float:
+        """How many pieces lie between the beginning and a place, below zero on the way back."""
+        turns = 0.0 if self.advance is None else self._sense * math.floor(self._sense * (u - self.begin) / self.turn)
+        at = u - self.turn * turns - self.begin
+        way = self._way((at > 0) - (at < 0) or self._first_way)
+        return turns * len(way.pieces) + way.sense * bisect_right(way._starts, way.sense * at)
+
     def tabulated(self) -> tuple[Array, Array]:
         """All pieces in order, their ends and series ``(n, 2 + 4 POINTS)``; places between which they lie, and between which more may be
         asked for; begin, turn and its sense.
@@ -596,6 +603,7 @@ class PathStage:
         self.engine = self.task.engine if self.task.library is None else COMPILED
         self._piece: SeriesPiece | None = None
         self._turns = 0.0
+        self._number = arc.number(u)
         self._mass, smooth, *_ = (terms := self._terms(u)).tolist()
         if self._piece is not None and self._mass <= RESPONSE.massless * np.abs(self._piece.series[:, 0]).sum():
             raise Stopped(AT_DEAD_POINT)
@@ -678,22 +686,27 @@ class PathStage:
     ) -> tuple[Callable[[Array], Array], Array] | None:
         """See ``Stage``."""
         of = self.arc.terms
-        if not (of.stored or of.rest):
+        # pieces of the table in one step from which on a peak of the mass may lie between its evaluations
+        loads, peaks = bool(of.stored or of.rest), abs(self.arc.number(float(y[0])) - self._number) > 4
+        if not (loads or peaks):
             return None
 
-        def accelerations(times: Array) -> Array:
+        def along(times: Array) -> Array:
+            """Accelerations by loads, and the rate of the place, which the mass decides."""
             u, w = dense(times)[:2]
             terms = self._terms_at(u)
             if not (terms[0] > 0.0).all():
-                return np.full((1, len(times)), np.nan)
-            size = np.sqrt(terms[0] / self._mass)
-            return np.add(*of.forces(terms[OF_LOADS:], w / size, times))[None] / (size * self._mass)
+                return np.full((loads + peaks, len(times)), np.nan)
+            v = w / (size := np.sqrt(terms[0] / self._mass))
+            rows = [np.add(*of.forces(terms[OF_LOADS:], v, times)) / (size * self._mass)] if loads else []
+            return np.stack([*rows, v] if peaks else rows)
 
-        return accelerations, y[1:2]
+        return along, y[[1] * loads + [0] * peaks]
 
     def accepted(self, t: float, y: Array) -> bool:
         """See ``Stage``."""
         self._terms(float(y[0]))
+        self._number = self.arc.number(float(y[0]))
         # rate of another freedom against that of the coordinate above which it becomes the coordinate
         return self._piece is not None and self._piece.steepness <= 2.0
 
