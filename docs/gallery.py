@@ -336,7 +336,7 @@ def table() -> mg.Solution:
 def woodpecker() -> mg.Solution:
     """The woodpecker toy, with the numbers of Glocker's thesis (1995): its sleeve grips the pole and slips, its beak strikes.
 
-    Its cycle takes .1938 s, turned in full; equations linear in the angles give the .1460 s in print.
+    With its geometry in full a cycle takes .1938 s; equations linear in the angles give the .1460 s in print.
     """
     pole, half, pivot, far, beak = 2.5e-3, 5.8e-3, 0.01, 0.015, (4.9e-3, 0.02)
     start, line = {"M": -0.05, "S": -0.1}, mg.Curve.line(point=(pole, 0, 0), direction=(0, -1, 0))

@@ -1605,40 +1605,43 @@ static int normal_forces(const Model *m, Work *w) {
   return 0;
 }
 
+/* By how much a self-stress, about the point of the pair, is along the reaction `force` about the origin in what place t reads of it: the sum
+ * over the components, which stand in the marker on a. */
+static double along_components(const Model *m, const Work *w, int t, int pair, double *stress, const double *force) {
+  const double *X = w->end + 12 * pair, *A = w->frame + 12 * m->first[pair], point[3] = {X[3], X[7], X[11]}, a[3] = {A[3], A[7], A[11]};
+  double own[6], acting[6], sum = 0.0;
+  wrench_moved(stress, point, 1.0);
+  memcpy(own, stress, sizeof own), memcpy(acting, force, sizeof acting);
+  wrench_moved(own, a, -1.0), wrench_moved(acting, a, -1.0);
+  FOR(j, 6) {
+    const double e[3] = {A[j % 3], A[4 + j % 3], A[8 + j % 3]};
+    double weight = 0.0, arm[3];
+    for (int r = 0; r < w->row_of[t + 1] - w->row_of[t]; r++) {
+      const double *row = w->reads + 18 * t + 6 * r;
+      cross(row, a, arm);
+      const double part = j < 3 ? dot(row, e, 3) : dot(row + 3, e, 3) + dot(arm, e, 3);
+      weight += part * part;
+    }
+    sum += weight * dot(own + 3 * (j / 3), e, 3) * dot(acting + 3 * (j / 3), e, 3);
+  }
+  return sum;
+}
+
 /* Whether something rubs under components that a self-stress may change and to which loads add: those that are zero along it stay so. */
 static int loosened(const Model *m, const Work *w, const int *rubs) {
   const magnitude largest = size_of(w->smooth, 6 * m->pairs);
   FOR(t, m->rubs) FOR(s, m->stresses) {
     int width;
     const int at = read_at(m, m->load + 4 * rubs[t], &width);
-    double stress[6], force[6], along = 0.0, square = 0.0, weight[6] = {0}, a[3];
+    const double *force = w->pressing + at;
+    double stress[6], along = 0.0, square = 0.0;
     if (!(size_of(w->exerts + 24 * t, 24) > 0.0)) continue;
     memcpy(stress, w->stress + s * (6 * m->pairs + m->columns + m->couplings) + at, width * sizeof(double));
-    memcpy(force, w->pressing + at, width * sizeof(double));
-    const double *X = w->end + 2 * at, *A = w->frame + 12 * m->first[width == 6 ? at / 6 : 0]; /* components stand in the marker on a */
-    if (width == 6) {
-      FOR(i, 3) a[i] = X[3 + 4 * i];
-      wrench_moved(stress, a, 1.0);
-      FOR(i, 3) a[i] = A[3 + 4 * i];
-    }
-    for (int r = w->row_of[t]; r < w->row_of[t + 1]; r++) {
-      const double *row = w->reads + 18 * t + 6 * (r - w->row_of[t]), part = dot(row, stress, width);
+    if (width == 6) along = along_components(m, w, t, at / 6, stress, force);
+    for (int r = 0; r < w->row_of[t + 1] - w->row_of[t]; r++) {
+      const double *row = w->reads + 18 * t + 6 * r, part = dot(row, stress, width);
       square += part * part;
       if (width != 6) along += part * dot(row, force, width);
-      else FOR(j, 3) {
-        const double e[3] = {A[j], A[4 + j], A[8 + j]};
-        double arm[3];
-        cross(row, a, arm);
-        const double turning = dot(row, e, 3), pushing = dot(row + 3, e, 3) + dot(arm, e, 3);
-        weight[j] += turning * turning, weight[3 + j] += pushing * pushing;
-      }
-    }
-    if (width == 6) {
-      wrench_moved(stress, a, -1.0), wrench_moved(force, a, -1.0);
-      FOR(j, 6) {
-        const double e[3] = {A[j % 3], A[4 + j % 3], A[8 + j % 3]};
-        along += weight[j] * dot(stress + 3 * (j / 3), e, 3) * dot(force + 3 * (j / 3), e, 3);
-      }
     }
     const magnitude size = fabs(sqrt(square));
     if (size > UNIQUE && !(fabs(along) <= UNIQUE * size * largest)) return 1;

@@ -249,7 +249,14 @@ class StepsInKernel:
     """The stepper DOP853 of scipy, its first step and coefficients, with steps taken by the kernel along the tables of a stage."""
 
     def __init__(
-        self, stage: Stage, rates: Callable[[float, Array], Array], t: float, y: Array, end: float, **how: Any
+        self,
+        stage: Stage,
+        table: tuple[Any, Array, Array],
+        rates: Callable[[float, Array], Array],
+        t: float,
+        y: Array,
+        end: float,
+        **how: Any,
     ) -> None:
         first = scipy.integrate.DOP853(rates, t, y, end, **how)
         parts = [getattr(first, name).ravel() for name in ("A", "B", "E3", "E5", "A_EXTRA", "D")]
@@ -257,7 +264,7 @@ class StepsInKernel:
         self._bounds = [ctypes.c_double(value) for value in (end, how["max_step"], how["rtol"])]
         self._at, self._slope = np.array([t, first.h_abs, 0.0]), first.f.copy()
         self._evaluations, self._end = np.array([first.nfev], dtype=np.intc), end
-        self._stage, self._table = stage, stage.table()
+        self._stage, self._table = stage, table
         self.t, self.y, self.status = t, y, "running"
 
     @property
@@ -270,7 +277,6 @@ class StepsInKernel:
         y, dense, (rule, atol) = self.y.copy(), np.empty((7, len(self.y))), self._given
         found = 2
         while found == 2:
-            assert self._table is not None
             library, pieces, about = self._table
             sizes = map(ctypes.c_int, (len(pieces), (pieces.shape[-1] - 2) // 4))
             begun = (
@@ -280,7 +286,9 @@ class StepsInKernel:
             )
             found = library.mgk_step_along(*sizes, *begun, pointer(self._evaluations))
             if found == 2:
-                self._table = self._stage.table(float(self._at[2]))
+                further = self._stage.table(float(self._at[2]))
+                assert further is not None
+                self._table = further
         if found:
             self.status = "failed"
             return "Required step size is less than spacing between numbers."
@@ -416,8 +424,8 @@ class Integration:
         if self.method not in EXPLICIT:
             more["jac"] = stage.jacobian and between(stage.jacobian)
         make: Any = getattr(scipy.integrate, self.method)
-        if self.method == "DOP853" and stage.table() is not None:
-            make = partial(StepsInKernel, stage)
+        if self.method == "DOP853" and (table := stage.table()) is not None:
+            make = partial(StepsInKernel, stage, table)
         return make(between(stage.rates), t, y, end, rtol=self.rtol, atol=atol, max_step=self.max_step, **more)
 
     def _missed(self, stage: Stage, before: tuple[float, Array], stepper: Any, dense: Callable[[Any], Array]) -> bool:
@@ -427,19 +435,19 @@ class Integration:
         that the step has missed, and bend it away.
         """
         (begin, y), end = before, stepper.t
-        if stage.unsmooth(end, stepper.y, dense) is None:
-            return False
+        inside = np.nextafter(begin, end), np.nextafter(end, begin)
+
+        def missed(along: Callable[[Any], Array]) -> bool | None:
+            found = stage.unsmooth(end, stepper.y, along)
+            return found and overlooked(found[0], *inside, self.apart, self.rtol * np.abs(found[1]) + self.atol)
+
+        if (seen := missed(dense)) is not False:
+            return bool(seen)
         slopes = np.stack([stage.rates(*one) for one in (before, (end, stepper.y))])
         if not np.isfinite(slopes).all():
             return True
         cubic = scipy.interpolate.CubicHermiteSpline((begin, end), (y, stepper.y), slopes, axis=0)
-        inside = np.nextafter(begin, end), np.nextafter(end, begin)
-        for along in (dense, lambda t: cubic(t).T):
-            found = stage.unsmooth(end, stepper.y, along)
-            assert found is not None
-            if overlooked(found[0], *inside, self.apart, self.rtol * np.abs(found[1]) + self.atol):
-                return True
-        return False
+        return bool(missed(lambda t: cubic(t).T))
 
     def _look(self, end: float) -> None:
         """Say where steps have become so short that a long wait is certain; give up where there is no end."""

@@ -151,8 +151,7 @@ class TaskClass:
         p = self.problem
         if not isinstance(p, RodProblem):
             return member, x
-        near = x[self.u : self.head].reshape(2, 2, len(p.order), x.shape[1]) if self.W else None
-        numbers = member.numbers.with_values(p.places, x[: self.u], near)
+        numbers = self._numbers(member, x)
         rows = x[self.head :].reshape(self.R, self.nx, -1)
         back = np.argsort(p.order)
         states = p.lifted(numbers, rows[:, : self.states])
@@ -498,10 +497,14 @@ class TaskClass:
         drive = np.nan_to_num(self.asked)[:, :, None].astype(complex)
         return ClassMember(numbers, np.repeat(drive, numbers.point.shape[-1], axis=-1))
 
+    def _numbers(self, member: ClassMember, x: Array) -> RowNumbers:
+        """The numbers of members at states, with the unknown ones of these."""
+        near = x[self.u : self.head].reshape(2, 2, len(self.problem.order), x.shape[1]) if self.W else None
+        return member.numbers.with_values(self.problem.places, x[: self.u], near)
+
     def at(self, member: ClassMember, x: Array) -> ArrowRows:
         """The equations of members at states of which what is asked is set to what they ask."""
-        near = x[self.u : self.head].reshape(2, 2, len(self.problem.order), x.shape[1]) if self.W else None
-        numbers = member.numbers.with_values(self.problem.places, x[: self.u], near)
+        numbers = self._numbers(member, x)
         X, drive = x[self.head :].reshape(self.R, self.nx, -1).copy(), member.drive * self.problem.factors(numbers)
         for i, given in enumerate(self.given):
             X[i, self.asked_rows[given]] = drive[i, given]

@@ -147,11 +147,14 @@ class Synthesis:
             numbers = numbers.with_values(own.placed(self.sweep.places), p.scaled(self.sweep.places, self.swept))
         goals = self.of.goal(numbers)
         found = ends(self.of, start, goals, self.rng, self.progress)
+        apart = len(orbits(start.x[: self.of.u], self.symmetries, motions_of(self.of, start.member, start.x)))
         return [
-            self._answer(start, goals.taken(np.array([i])) if n > 1 else goals, one, i) for i, one in enumerate(found)
+            self._answer(start, apart, goals.taken(np.array([i])) if n > 1 else goals, one, i)
+            for i, one in enumerate(found)
         ]
 
-    def _answer(self, start: TaskStart, goal: ClassMember, found: TaskEnds, i: int) -> Syntheses:
+    def _answer(self, start: TaskStart, apart: int, goal: ClassMember, found: TaskEnds, i: int) -> Syntheses:
+        """The answer to the task numbered ``i``; ``apart``: how many solutions of the start set no symmetry makes of others."""
         p, of = self.problem, self.of.full
         x, error, which = real_states(self.of, goal, found.x)
         # rounding of rows in squares of lengths grows with these
@@ -205,7 +208,7 @@ class Synthesis:
             tuple(told),
             condition,
             Fitnesses([cache(partial(self._fitness, m, q)) for m, q, _ in made]),
-            len(orbits(start.x[: of.u], self.symmetries, motions_of(self.of, start.member, start.x))),
+            apart,
             (*self.symmetries, *cognates(alike, self.symmetries, motions)),
             tuple(tuple(copies[k]) for k in range(len(values))),
             driver=driver_of(p.m, self.tasks)[0],
