@@ -17,7 +17,6 @@ Knuth's, and a sign that these do not have is shown by its number, ``[U+4E2D]``.
 
 from __future__ import annotations
 
-import html
 import re
 import textwrap
 import unicodedata
@@ -386,15 +385,21 @@ def to_html(document: Document) -> str:
     return joined(parts, "\n")
 
 
+def _escaped(text: str) -> str:
+    import html
+
+    return html.escape(text)
+
+
 def _tagged(tag: str, text: str, attributes: str = "", *, always: bool = False) -> str:
     """Return running text, escaped, in a tag; nothing for an empty text unless `always`."""
-    inner = html.escape(plain(text))
+    inner = _escaped(plain(text))
     return f"<{tag}{attributes}>{inner}</{tag}>" if inner or always else ""
 
 
 def _preformatted(lines: list[str], attributes: str = "") -> str:
     """Return preformatted lines, escaped, in a pre tag."""
-    return f"<pre{attributes}>{html.escape(chr(10).join(lines))}</pre>" if lines else ""
+    return f"<pre{attributes}>{_escaped(chr(10).join(lines))}</pre>" if lines else ""
 
 
 def _block_html(block: Block) -> str:
@@ -409,11 +414,11 @@ def _block_html(block: Block) -> str:
         case Table():
             return _table_html(block)
         case Legend(entries):
-            signs = [f"<math>{e.mathml}</math>" if e.mathml else html.escape(plain(e.text)) for e, _ in entries]
-            lines = [f"<li>{s}: {html.escape(plain(means))}</li>" for s, (_, means) in zip(signs, entries, strict=True)]
+            signs = [f"<math>{e.mathml}</math>" if e.mathml else _escaped(plain(e.text)) for e, _ in entries]
+            lines = [f"<li>{s}: {_escaped(plain(means))}</li>" for s, (_, means) in zip(signs, entries, strict=True)]
             return "\n".join(["<ul>", *lines, "</ul>"]) if lines else ""
         case Equation(text, latex, mathml):
-            source = html.escape(plain(latex))
+            source = _escaped(plain(latex))
             attributes = f' data-latex="{source}"' if source else ""
             if mathml:
                 return f'<div class="equation"{attributes}><math display="block">{mathml}</math></div>'
@@ -427,7 +432,7 @@ def _bullets_html(block: Bullets) -> str:
     lines: list[str] = []
     for text, nested in block.grouped():
         inner = "".join(_tagged("li", item, always=True) for item in nested)
-        lines.append(f"<li>{html.escape(plain(text))}{f'<ul>{inner}</ul>' if inner else ''}</li>")
+        lines.append(f"<li>{_escaped(plain(text))}{f'<ul>{inner}</ul>' if inner else ''}</li>")
     return "\n".join(["<ul>", *lines, "</ul>"]) if lines else ""
 
 

@@ -13,12 +13,8 @@ import re
 import shutil
 import signal
 import stat
-import tempfile
 import threading
-import tomllib
-import traceback
 import types
-import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import astuple, fields, is_dataclass
@@ -187,6 +183,8 @@ def text_of(path: Path, kind: str) -> str:
 
 def toml_of(path: Path, text: str) -> dict[str, Any]:
     """The content of TOML; refused with its place where it is none, or where Python or a mechanism cannot hold it."""
+    import tomllib
+
     try:
         long = LONG_KEY.search(text)
         if long:
@@ -208,6 +206,8 @@ def toml_of(path: Path, text: str) -> dict[str, Any]:
 
 def _place_reached(error: BaseException) -> str:
     """The line at which the parser stood, from the variables of its own frames; empty where they cannot be told."""
+    import traceback
+
     line = ""
     for frame, _ in traceback.walk_tb(error.__traceback__):
         source, at = frame.f_locals.get("src"), frame.f_locals.get("pos")
@@ -278,10 +278,12 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     FileError
         where the file cannot be written.
     """
+    import tempfile
+
     target = writable(path)
     regular = not target.exists() or target.is_file()
     folder = target.parent if regular else Path(tempfile.gettempdir())
-    temporary = folder / f".mechgraph-{uuid.uuid4().hex}"
+    temporary = folder / f".mechgraph-{os.urandom(16).hex()}"
     try:
         with _ended_in_order(), _refused(path):
             yield temporary

@@ -15,7 +15,6 @@ from typing import Annotated, Any, ClassVar, Protocol
 
 import numpy as np
 import scipy
-from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
 
 from mechgraph.errors import DeclarationError
@@ -62,10 +61,8 @@ class _Panel:
 
     def at(self, t: Array) -> tuple[Array, Array, Array]:
         """Return the interpolant and its two derivatives at t."""
-        x = (2.0 * t - self.left - self.right) / (self.right - self.left)
-        position, velocity, acceleration = (
-            chebyshev.chebval(x, chebyshev.chebder(self.coefficients, k) * self.slope**k) for k in range(3)
-        )
+        series = np.polynomial.Chebyshev(self.coefficients, (self.left, self.right))
+        position, velocity, acceleration = (series.deriv(k)(t) for k in range(3))
         return position, velocity, acceleration
 
 
@@ -117,8 +114,8 @@ def _panels(function: Callable[[Array], Array], low: float, high: float) -> list
 
     The rounding in the values is 8 eps (|f| + |t f'| / 4), the second term from that in t.
     """
-    nodes = np.asarray(chebyshev.chebpts1(CHEBYSHEV_POINTS))
-    transform = chebyshev.chebvander(nodes, CHEBYSHEV_POINTS - 1).T * (2.0 / CHEBYSHEV_POINTS)
+    nodes = np.asarray(np.polynomial.chebyshev.chebpts1(CHEBYSHEV_POINTS))
+    transform = np.polynomial.chebyshev.chebvander(nodes, CHEBYSHEV_POINTS - 1).T * (2.0 / CHEBYSHEV_POINTS)
     transform[0] /= 2.0
     done: list[_Panel] = []
     ends = [(low, high)]

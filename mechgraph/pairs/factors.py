@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeVar, cast
 
@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechgraph.maths.se3 import Array, homogeneous, inverse, quaternion_matrix, skew
-from mechgraph.memo import dataclass
 from mechgraph.quantities import is_numeric, items_of, shown, wrong
 
 Six = tuple[float, float, float, float, float, float]

@@ -855,7 +855,7 @@ class Solution(Shown):
 
         Raises
         ------
-        MissingFactError
+        MissingExtraError
             Without anywidget.
         """
         return methods.call("view", self)
@@ -963,7 +963,7 @@ class Solution(Shown):
 
         Raises
         ------
-        MissingFactError
+        MissingExtraError
             Without pandas.
 
         Examples
@@ -991,7 +991,7 @@ class Solution(Shown):
 
         Raises
         ------
-        MissingFactError
+        MissingExtraError
             Without xarray.
 
         Examples
@@ -1020,7 +1020,7 @@ class Solution(Shown):
         ------
         FileError
             Another extension, or the file cannot be written.
-        MissingFactError
+        MissingExtraError
             Without the extra of the format.
 
         Examples
