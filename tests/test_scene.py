@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.path import Path
+from numpy.testing import assert_allclose
 
 import mechgraph as mg
 from mechgraph import show
@@ -591,3 +592,32 @@ def test_a_shaft_goes_through_its_wheel_in_space() -> None:
     disc, below, above = color((-0.02, 0.01, 0.002)), color((0, 0, -0.01)), color((0, 0, 0.01))
     assert np.abs(below - disc).max() < 20
     assert np.abs(above - disc).max() > 60
+
+
+def test_curves_and_surfaces_are_drawn_where_they_are():
+    """The symbol of a pair shows its curve as a line through the marker, on link b that of its own; no straight guide beside it."""
+    round_, open_ = mg.Curve.ellipse(a=2.0, b=1.0), mg.Curve.line(point=(2, 0, 0), direction=(0, 1, 0), ends_at=(-1, 1))
+    pair = mg.Pair("K", "Kc", "a", "b", point=(2, 0, 0), curve=round_, curve_b=open_)
+    lines = [e for e in symbol(pair.type, 0.0, 0.1, [(-1, 1), (-1, 1)]) if e.role == "axis"]
+    assert [e.frame for e in lines] == [0, 2]
+    marker = pair.markers[0].pose()
+    first, second = (e.shape.vertices @ marker[:, :3].T + marker[:, 3] for e in lines)
+    assert_allclose((first[:, 0] / 2) ** 2 + first[:, 1] ** 2, 1, atol=1e-12)
+    assert_allclose(np.abs(second[:, 1]).max(), 1, atol=1e-12)
+    assert_allclose(second[:, 0], 2, atol=1e-12)
+    ball = mg.Pair("X", "Sp", "a", "b", point=(1, 0, 0), surface=mg.Surface.sphere(radius=1.0))
+    drawn = symbol(ball.type, 0.0, 0.1, [(0, 0)] * 5)
+    grid = np.concatenate([e.shape.vertices for e in drawn if e.role == "axis"])
+    marker = ball.markers[0].pose()
+    assert_allclose(np.linalg.norm(grid @ marker[:, :3].T + marker[:, 3], axis=1), 1, atol=1e-12)
+    assert not any(e.role == "guide" for e in drawn)
+
+
+def test_an_endless_helix_is_drawn_a_turn_to_either_side():
+    helix, at = mg.Curve.helix(radius=0.5, pitch=0.1), np.array([0.5, 0, 0.2 * np.pi * 3])
+    pair = mg.Pair("X", "Sg", "a", "b", point=at, curve=helix)
+    (line,) = (e for e in symbol(pair.type, 0.0, 0.1, [(-1, 1)] * 4) if e.role == "axis")
+    marker = pair.markers[0].pose()
+    x = line.shape.vertices @ marker[:, :3].T + marker[:, 3] - at
+    assert_allclose(x[[0, len(x) // 2, -1]], [[0, 0, -0.2 * np.pi], [0, 0, 0], [0, 0, 0.2 * np.pi]], atol=0.02)
+    assert_allclose(np.hypot(x[:, 0] + 0.5, x[:, 1]), 0.5, atol=1e-12)
