@@ -14,21 +14,20 @@ Mathematical Programming 58, 1993; F. Pfeiffer and Ch. Glocker, Multibody Dynami
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from enum import IntEnum
 from itertools import product
 from typing import Any
 
 import numpy as np
-import scipy
 
 from mechgraph.errors import DeclarationError
 from mechgraph.kinematics.rates import Velocities
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.touching import ContactLines
 from mechgraph.maths.se3 import Array, Index, cross, skew
-from mechgraph.maths.tolerances import MOTIONS, STRESSES
+from mechgraph.maths.tolerances import MOTIONS
 from mechgraph.memo import dataclass
 from mechgraph.model.friction import Friction, Rubs, place_of_coupling, places_in, way_of
 from mechgraph.model.gear_facts import mean_sliding
@@ -466,17 +465,17 @@ _SUMS = ("efforts", "taken", "teeth", "beside", "rubbing")
 """What is summed over all that rubs."""
 
 
-def rubbed(here: Configuration, places: Sequence[Place], base: Array, unit: dict[int, Array]) -> Rubbed:
+def rubbed(here: Configuration, places: Sequence[Place], base: Array, unit: Mapping[int, Array]) -> Rubbed:
     """Solve for the normal forces; ``base (6, P, T)`` reactions without friction, ``unit`` those of a unit effort in freedoms, by column.
 
     Behind the reactions stand the forces on gears b, one a coupling, where teeth rub.
     """
     T = here.T
     starts = np.concatenate([[0], np.cumsum([len(place.A) for place in places])]).astype(np.intp)
-    split = [[_passed_on(here, place.way, W) for W in (place.D[:, None], place.K)] for place in places]
+    split = passed_on(here, places)
     preload = np.array([np.broadcast_to(place.preload, T) for place in places])
-    a, B, C = _linear(places, split, starts, base, unit)
-    a = a + np.einsum("dnt,nt->dt", B, preload)
+    a, B, C = (reading(places, each) for each in (base[:, :, None], *answers(split, base, unit)))
+    a = a[:, 0] + np.einsum("dnt,nt->dt", B, preload)
     signed = [t for t, place in enumerate(places) if place.signed]
     C[:, starts[signed]] += B[:, signed]
     B[:, signed] = 0.0
@@ -501,72 +500,6 @@ def rubbed(here: Configuration, places: Sequence[Place], base: Array, unit: dict
     return out
 
 
-def rests(
-    here: Configuration,
-    ways: Sequence[tuple[int, Place]],
-    base: Array,
-    unit: dict[int, Array],
-    efforts: dict[int, Array],
-    own: Array,
-) -> Array:
-    """Where some friction holds a mechanism at rest whose drives, of efforts ``own (d, T)`` without friction, supply nothing: 1 where one
-    is found, 0 where none can be, NaN where neither is proved, ``(T,)``.
-
-    ``ways``: for every place, by number, the places that it is in motions of its pair each way, whose frictions it mixes: parts ``g >= 0``
-    of them with ``sum g <= |V|``. With the direction u of V from the last trial ``u . V`` is below ``|V|``, linear, and so is what is above
-    it, ``|a| + sum |B| g``: a state is found, or none there, by least squares under signs (Farkas). ``base``, ``unit``: see ``rubbed``;
-    ``efforts (d, T)`` of drives for a unit effort in a freedom, by column.
-    """
-    of, places = np.array([number for number, _ in ways]), [place for _, place in ways]
-    starts = np.concatenate([[0], np.cumsum([len(place.A) for place in places])]).astype(np.intp)
-    split = [[_passed_on(here, place.way, W) for W in (place.D[:, None], place.K)] for place in places]
-    a, B, C = _linear(places, split, starts, base, unit)
-    E = [
-        sum(np.einsum("dt,nt->dnt", efforts[c], row) for _, cols, rows, _ in part for c, row in _by_column(cols, rows))
-        for both in split
-        for part in both
-    ]
-    first = np.array([int(np.argmax(of == number)) for number in range(of.max(initial=-1) + 1)])
-    sums = (of == np.arange(len(first))[:, None]).astype(float)
-    # of what may slide in k independent ways frictions in these alone span a part 1 / sqrt(k) of all
-    span = np.sqrt(np.maximum(sums.sum(axis=1) / 2, 1.0))
-    out = np.full(here.T, np.nan)
-    for t in range(here.T):
-        part = [slice(starts[o], starts[o + 1]) for o in range(len(places))]
-        preload = np.array([np.broadcast_to(places[o].preload, here.T)[t] for o in first])
-        towards = [a[part[o], t] for o in first]
-        for trial in range(8):
-            u = [v / max(float(np.linalg.norm(v)), np.finfo(float).tiny) for v in towards]
-            per = np.array([B[:, o, t] + C[:, part[o], t] @ u[of[o]] for o in range(len(places))]).T
-            rates = np.array([E[2 * o][:, 0, t] + E[2 * o + 1][:, :, t] @ u[of[o]] for o in range(len(places))]).T
-            along = np.array([u[p] @ per[part[o]] for p, o in enumerate(first)])
-            limit = np.array([u[p] @ a[part[o], t] for p, o in enumerate(first)])
-            g, met = _mixed(rates, own[:, t], sums - along, limit + preload)
-            if met:
-                out[t] = 1.0
-                break
-            towards = [a[part[o], t] + per[part[o]] @ g for o in first]
-            if trial == 0:
-                above = np.array([np.linalg.norm(per[part[o]], axis=0) for o in first])
-                size = np.array([np.linalg.norm(v) for v in (a[part[o], t] for o in first)])
-                if not _mixed(rates, own[:, t], sums / span[:, None] - above, size + preload)[1]:
-                    out[t] = 0.0
-                    break
-    return out
-
-
-def _by_column(columns: slice, rows: Array) -> Iterable[tuple[int, Array]]:
-    return zip(range(columns.start, columns.stop), rows, strict=True)
-
-
-def _mixed(rates: Array, own: Array, sums: Array, limit: Array) -> tuple[Array, bool]:
-    """Parts ``g >= 0`` with ``rates g + own = 0`` and ``sums g <= limit`` as nearly as there are, and whether these are."""
-    size = max(float(np.abs(own).max(initial=0.0)), np.finfo(float).tiny), max(float(limit.max(initial=0.0)), 1e-300)
-    A = np.block([[rates / size[0], np.zeros((len(own), len(limit)))], [sums / size[1], np.eye(len(limit)) / size[1]]])
-    found, missed = scipy.optimize.nnls(A, np.concatenate([-own / size[0], limit / size[1]]))
-    return found[: rates.shape[1]], bool(missed <= STRESSES.unique)
-
-
 Passed = list[tuple[int, slice, Array, Array]]
 """For every pair that n wrenches pass: its place, its freedoms, efforts there ``(f, n, T)`` and what it takes up ``(6, n, T)``."""
 
@@ -581,23 +514,32 @@ def _passed_on(here: Configuration, way: tuple[tuple[int, float], ...], W: Array
     return out
 
 
-def _linear(
-    places: Sequence[Place], split: Sequence[Sequence[Passed]], starts: Index, base: Array, unit: dict[int, Array]
-) -> tuple[Array, Array, Array]:
-    """``a (d, T)``, ``B (d, m, T)`` and ``C (d, d, T)`` of the normal vectors ``V = a + B n + C V`` of all places."""
-    T, m = base.shape[-1], len(places)
-    a, B, C = np.zeros((starts[-1], T)), np.zeros((starts[-1], m, T)), np.zeros((starts[-1], starts[-1], T))
-    for t, place in enumerate(places):
-        mine = slice(starts[t], starts[t + 1])
-        a[mine] = np.einsum("dct,ct->dt", place.A, base[:, place.reads])
-        for o, both in enumerate(split):
-            for parts, into in zip(both, (B[mine, o : o + 1], C[mine, starts[o] : starts[o + 1]]), strict=True):
-                for k, columns, efforts, held in parts:
-                    moved = -held if k == place.reads else np.zeros_like(held)
-                    for effort, column in zip(efforts, range(columns.start, columns.stop), strict=True):
-                        moved = moved + unit[column][:, place.reads, None] * effort
-                    into += np.einsum("dct,cnt->dnt", place.A, moved)
-    return a, B, C
+def passed_on(here: Configuration, places: Sequence[Place]) -> list[tuple[Passed, Passed]]:
+    """What frictions of unit size, and those linear in the normal vectors, load on their way, of every place."""
+    return [(_passed_on(here, place.way, place.D[:, None]), _passed_on(here, place.way, place.K)) for place in places]
+
+
+def answers(split: Sequence[tuple[Passed, Passed]], like: Array, unit: Mapping[int, Array]) -> tuple[Array, Array]:
+    """Wrenches ``(6, P, m, T)`` for frictions of unit size, and ``(6, P, d, T)`` for unit normal vectors, where those ``like (6, P, T)``
+    are for a unit effort in freedoms ``unit``, by column.
+    """
+    both = []
+    for kind in (0, 1):
+        own = []
+        for parts in (each[kind] for each in split):
+            out = np.zeros((*like.shape[:2], parts[0][3].shape[1], like.shape[2]))
+            for k, columns, efforts, held in parts:
+                out[:, k] -= held
+                for effort, column in zip(efforts, range(columns.start, columns.stop), strict=True):
+                    out += unit[column][:, :, None] * effort
+            own.append(out)
+        both.append(np.concatenate(own, axis=2))
+    return both[0], both[1]
+
+
+def reading(places: Sequence[Place], wrenches: Array) -> Array:
+    """Normal vectors ``(d, n, T)`` of all places under wrenches ``(6, P, n, T)``."""
+    return np.concatenate([np.einsum("dct,cnt->dnt", place.A, wrenches[:, place.reads]) for place in places])
 
 
 def _normals(a: Array, B: Array, C: Array, starts: Index) -> tuple[Array, Array, Array, Array, Array]:

@@ -7,8 +7,20 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
+import scipy
 
-from mechgraph.force.friction import OUTCOMES, Place, Rubbed, Why, moving_rates, places_of, rests, rubbed
+from mechgraph.force.friction import (
+    OUTCOMES,
+    Place,
+    Rubbed,
+    Why,
+    answers,
+    moving_rates,
+    passed_on,
+    places_of,
+    reading,
+    rubbed,
+)
 from mechgraph.force.reactions import (
     METHODS,
     ForceProblem,
@@ -35,7 +47,7 @@ from mechgraph.force.redundant import (
 )
 from mechgraph.kinematics.state import Configuration, FactoredClosure
 from mechgraph.kinematics.touching import ContactLines
-from mechgraph.maths.se3 import Array, Mask
+from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.tolerances import MOTIONS, STRESSES
 from mechgraph.model.friction import Friction, pairs_of
 
@@ -58,8 +70,7 @@ def rubbed_in_motion(
 
 class FrictionProblem:
     """Reactions with friction beside those without it, ``smooth``, for any directions of motion, from total ``wrenches`` on the first
-    flanks of teeth. ``yields``: the inertia wrenches with which links yield to efforts; where it is left out the motion is given. ``part``
-    of the friction, one a position or of all, is taken.
+    flanks of teeth. ``yields``: the inertia wrenches with which links yield to efforts; where it is left out the motion is given.
     """
 
     def __init__(
@@ -74,7 +85,6 @@ class FrictionProblem:
         yields: Callable[[Array], Array] | None = None,
     ) -> None:
         self.yields = yields
-        self.part: Array | float = 1.0
         self.here, self.task, self.f, self.wrenches, self.lines, self.dry = here, task, f, wrenches, lines, dry
         self.found, self.flank = self.smooth = smooth
         # which components have lifted off, of those that only push under a split by stiffness
@@ -133,12 +143,11 @@ class FrictionProblem:
         wrenches = relieved(on_settled_flanks(here, wrenches, lines), lines, flank) if lines else wrenches
         return least_forces(here, wrenches, self.f, self.task, lines, flank, known, self.lifted)
 
-    def forces(self, dq: Array, at_rest: bool = False, onward: bool = False) -> tuple[FreeForces, Rubbed, Array]:
+    def forces(self, dq: Array, at_rest: bool = False) -> tuple[FreeForces, Rubbed, Array]:
         """Forces with the friction of a motion, that friction, and the flanks ``(n, T)`` on which teeth then touch: friction may turn the
-        force between them round, or lift what only pushes; ``onward`` from what had lifted off before.
+        force between them round, or lift what only pushes.
         """
-        if not onward:
-            self._put_on(*self.smooth, None if self.lifted is None else np.zeros_like(self.lifted))
+        self._put_on(*self.smooth, None if self.lifted is None else np.zeros_like(self.lifted))
         # how often flanks and what has lifted off are changed
         for _ in range(5 if self.lifted is None else 5 + 2 * len(self.lifted)):
             found, rubs = self._on_flanks(dq, at_rest)
@@ -146,7 +155,7 @@ class FrictionProblem:
             if not (turned | moved).any():
                 break
             self._put_on(None, np.where(turned, found.multipliers, self.flank), lifted)
-        if self.push is not None and not at_rest:  # at rest a part of the friction leads there, see _tipping
+        if self.push is not None and not at_rest:
             self._try_sets(dq)
             found, rubs = self._on_flanks(dq)
             turned, moved = self._turned(found, rubs), self._lifts(found)[1]
@@ -170,7 +179,7 @@ class FrictionProblem:
             return None, np.zeros(self.here.T, dtype=bool)
         values, assumed = component_values(PairFrames(self.here), found.reactions), self.lifted
         assert found.all_stress is not None
-        gaps = openings(self.here, found.reactions, found.all_stress, assumed)
+        gaps = openings(self.here, found.reactions, found.all_stress.wrenches, assumed)
         # one at a time, as in an active set method: of several that would pull most bear again as soon as one has lifted
         pulls = _worst(np.where(self.push[:, None] & ~assumed, values, 0.0), np.abs(values))
         sinks = _worst(np.where(assumed, gaps, 0.0), np.abs(gaps)) & ~pulls.any(axis=0)
@@ -217,8 +226,6 @@ class FrictionProblem:
         # sides of balls and centers of pressure settle in a few rounds; what does not is not determined
         for _ in range(50):
             places = places_of(self.here, dq, reactions, self.dry, at_rest, (self.lines, self.flank))
-            if np.any(self.part != 1.0):
-                places = [replace(place, D=self.part * place.D, K=self.part * place.K) for place in places]
             rubs = rubbed(self.here, places, base, of)
             sums = {
                 name: getattr(found, name) + sum(one[name] * rubs.efforts[c] for c, one in self.unit.items())
@@ -262,8 +269,7 @@ class FrictionProblem:
         """Efforts of drives ``(F, 2, T)`` on the verge of motion to - and to +, the others held; infinite where it jams, NaN in motion and
         where friction is not determined there: ``why (T,)``, with the ``growth (m, T)`` of the places, as in ``Rubbed``.
 
-        Where what only pushes would pull on the verge, or be pressed without bound, it tips or lifts before: at the effort beside which
-        the greatest part of the friction lets it stand.
+        Where what only pushes would pull on the verge, or be pressed without bound, it tips or lifts before: see ``Held.greatest``.
         """
         out, rest = np.full((len(dq), 2, self.here.T), np.nan), ~dq.any(axis=0)
         why, growth = np.zeros(self.here.T, dtype=int), np.zeros((1, self.here.T))
@@ -277,7 +283,7 @@ class FrictionProblem:
             stands = self._presses(found, rubs) >= -STRESSES.rounding
             tips = rest & push.any() & ~stands & np.isin(rubs.why, (Why.KNOWN, Why.FEET))
             if tips.any():
-                effort = np.where(tips, self._tipping(rates, tips, given)[column], effort)
+                effort = np.where(tips, self._tipping(rates, tips, given, j, sense), effort)
             open_ = rest & (rubs.outcome == 3) & ~tips
             why, growth = np.where(open_, rubs.why, why), np.where(open_, rubs.growth, growth)
             out[column, side, rest] = effort[rest]
@@ -297,36 +303,15 @@ class FrictionProblem:
         lost = (rubs.outcome > 0) | (False if found.unborne is None else found.unborne)
         return np.where(lost, np.nan, np.minimum(least, 1.0))
 
-    def _tipping(self, dq: Array, at: Mask, given: Array) -> Array:
-        """Efforts ``(F, T)`` of drives beside the greatest part of the friction with which it stands, at positions ``at``; NaN where it
-        does not stand without. What has lifted off changes on the way; between changes the part is sought by regula falsi.
-        """
-        best, part = np.full_like(self.smooth[0].efforts, np.nan), np.zeros(self.here.T)
-        for change in range(2 + 2 * int(seats_of(self.here.system).push.sum())):
-            self.part = part
-            found, rubs, _ = self.forces(dq, at_rest=True, onward=change > 0)
-            presses = self._presses(found, rubs)
-            at = at & (presses >= -STRESSES.rounding)
-            if not at.any():
-                break
-            best = np.where(at, self._efforts(found, rubs, given), best)
-            low, high, ends = part, np.ones(self.here.T), [presses, np.full(self.here.T, np.nan)]
-            while (at & (high - low > STRESSES.rounding) & (ends[0] > STRESSES.rounding)).any():
-                share = np.where(np.isnan(ends[1]), 0.5, ends[0] / (ends[0] - np.nan_to_num(ends[1])))
-                self.part = middle = low + (high - low) * share
-                found, rubs = self._on_flanks(dq, at_rest=True)
-                presses, moves = self._presses(found, rubs), self._lifts(found)[1] | self._turned(found, rubs)
-                good = (presses >= -STRESSES.rounding) & ~moves
-                best = np.where(at & good, self._efforts(found, rubs, given), best)
-                low, high = np.where(good, middle, low), np.where(good, high, middle)
-                # an end that stays counts half (Illinois)
-                ends = [np.where(good, presses, 0.5 * ends[0]), np.where(good, 0.5 * ends[1], np.minimum(presses, 0.0))]
-            part = np.minimum(low + STRESSES.unique, 1.0)
-        self.part = 1.0
-        return best
+    def _tipping(self, dq: Array, at: Mask, given: Array, drive: int, sense: float) -> Array:
+        """Effort ``(T,)`` of a drive, by its place among the driven, with which it tips at positions ``at``: see ``Held.greatest``."""
+        found = self.found
+        places = places_of(self.here, dq, found.reactions, self.dry, True, (self.lines, self.flank))
+        held = self._held(list(enumerate(places)), given, found.all_stress or found.stress)
+        return held.greatest(np.flatnonzero(at), drive, sense)
 
     def holds(self, dq: Array, given: Array) -> Array:
-        """Whether friction holds it at rest with all drives off, where there are several ``(T,)``: see ``friction.rests``."""
+        """Whether friction holds it at rest with all drives off, where there are several ``(T,)``: see ``Held.alone``."""
         driven, m, s = self.task.driven, self.here.system.m, self.here.system
         out = np.full(self.here.T, np.nan)
         if len(driven) < 2 or dq.any(axis=0).all():
@@ -343,13 +328,145 @@ class FrictionProblem:
             count += len(places)
         if not ways:
             return np.where(dq.any(axis=0), np.nan, 0.0)
-        efforts = {
-            c: (one["efforts"] - one["coupled"])[driven] - (driven == c)[:, None] for c, one in self.unit.items()
-        }
-        own = (found.efforts - given - found.coupled)[driven]
-        reads = {column: self._read(one) for column, one in self.unit.items()}
-        out = rests(self.here, ways, self._read(vars(found)), reads, efforts, own)
+        out = self._held(ways, given).alone()
         return np.where(dq.any(axis=0), np.nan, out)
+
+    def _held(self, ways: Sequence[tuple[int, Place]], given: Array, stress: Stress | None = None) -> Held:
+        """What frictions may do at rest; beside all multiples of a ``stress`` if one is given, and then under what only pushes."""
+        found, unit = self.found, np.eye(len(given))[..., None]
+        units = {c: self._with_drives(one, unit[c]) for c, one in self.unit.items()}
+        free = self._with_drives(vars(found), given)
+        states = [free[:, :, None], *answers(passed_on(self.here, [place for _, place in ways]), free, units)]
+        if stress is not None:
+            under = {
+                "reactions": stress.wrenches,
+                **vars(stress),
+                "coupled": row_efforts(self.here, stress.multipliers),
+            }
+            states.append(self._with_drives(under, 0.0))
+        return Held(self.here, ways, states, len(self.task.driven))
+
+    def _with_drives(self, forces: Mapping[str, Array], given: Array | float) -> Array:
+        """See ``_read``; behind it the efforts of drives, as the first of six numbers."""
+        own = np.asarray(forces["efforts"] - given - forces["coupled"])[self.task.driven]
+        return np.concatenate([self._read(forces), [own, *np.zeros((5, *own.shape))]], axis=1)
+
+
+class Held:
+    """What may hold a mechanism at rest: of every place, by number, the frictions of the ``ways`` in which it rubs in motions of its pair,
+    in parts ``g >= 0`` with ``sum g <= |V|``, and multiples of self-stresses under which what only pushes does not pull.
+
+    With the direction u of V from the last trial ``u . V`` is below ``|V|``, and linear. ``states (6, P, n, T)``: pairs, teeth and
+    ``drives`` without friction, under those of unit size, under unit normal vectors, and self-stresses if these are free.
+    """
+
+    def __init__(
+        self, here: Configuration, ways: Sequence[tuple[int, Place]], states: list[Array], drives: int
+    ) -> None:
+        self.of, self.places = np.array([number for number, _ in ways]), [place for _, place in ways]
+        self.first = np.array([int(np.argmax(self.of == number)) for number in range(self.of.max(initial=-1) + 1)])
+        self.sums = (self.of == np.arange(len(self.first))[:, None]).astype(float)
+        self.preload = np.array([np.broadcast_to(self.places[o].preload, here.T) for o in self.first])
+        ends = np.cumsum([0, *(len(place.A) for place in self.places)])
+        self.cuts = [slice(*ends[o : o + 2]) for o in range(len(ways))]
+        self.V, self.own = [reading(self.places, each) for each in states], [each[0, -drives:] for each in states]
+        seats, frames, P = seats_of(here.system), PairFrames(here), len(here.system.m.pairs)
+        push = seats.push & (len(states) > 3)
+        self.push = [component_values(frames, each[:, :P])[push] for each in states]
+        # what only pushes presses one way, known before any trial
+        self.pressing: dict[int, Array] = {}
+        for i in np.flatnonzero(push):
+            pair, _, name = seats.labels[i].rpartition(".")
+            for p, o in enumerate(self.first):
+                if self.places[o].of == pair:
+                    k = self.places[o].reads
+                    group, member = here.system.place_of(k)
+                    j = here.system.groups[group].row.component_names.index(name)
+                    self.pressing[p] = np.einsum("dct,ct->dt", self.places[o].A, here.W[group][:, j, member])
+
+    def _rows(self, parts: list[Array], u: list[Array], t: int) -> tuple[Array, Array]:
+        """A constant ``(n,)`` and what parts and multiples add to it, with directions ``u`` of normal vectors."""
+        one, D, K, *more = (each[..., t] for each in parts)
+        along = [K[:, cut] @ u[o] for cut, o in zip(self.cuts, self.of, strict=True)]
+        return one[:, 0], np.hstack([D + np.array(along).T, *more])
+
+    def _trial(self, V: Array, t: int) -> tuple[list[Array], Array, Array]:
+        """Directions of normal vectors ``V (d,)`` and ``A x <= b`` of the parts and multiples x that these allow."""
+        each = [self.pressing[p][:, t] if p in self.pressing else V[self.cuts[o]] for p, o in enumerate(self.first)]
+        u = [v / max(float(np.linalg.norm(v)), np.finfo(float).tiny) for v in each]
+        one, per = self._rows(self.V, u, t)
+        along, limit = (
+            np.array([v @ all_[self.cuts[o]] for v, o in zip(u, self.first, strict=True)]) for all_ in (per, one)
+        )
+        sums = np.pad(self.sums, ((0, 0), (0, per.shape[1] - len(self.of))))
+        return u, sums - along, limit + self.preload[:, t]
+
+    def greatest(self, at: Index, drive: int, sense: float) -> Array:
+        """The greatest effort ``(T,)`` of a drive, with its ``sense``, at positions ``at``: a linear program for each direction of V (limit
+        analysis). Infinite where no effort is too much, NaN where nothing holds it.
+
+        Friction does not make more of what moves apart than of what slides: bodies tip where no forces that push are left.
+        """
+        out = np.full(self.preload.shape[1], np.nan)
+        for t in at:
+            V, best = self.V[0][:, 0, t], -np.inf
+            for _ in range(8):
+                u, A, b = self._trial(V, t)
+                (force, pushes), (own, rates) = self._rows(self.push, u, t), self._rows(self.own, u, t)
+                size, free = max(np.abs(b).max(), np.abs(force).max(initial=0.0)), self.V[-1].shape[1]
+                bounds = [(0.0, None)] * len(self.of) + [(None, None)] * free
+                found = scipy.optimize.linprog(
+                    -sense * rates[drive],
+                    np.vstack([A, -pushes]),
+                    np.concatenate([b, force]) / size,
+                    bounds=bounds,
+                    options={"presolve": False},
+                )
+                # unbounded: it jams; what has no solution for a start of presolve is told apart without
+                if found.status:
+                    best = np.inf if found.status == 3 else best
+                    break
+                x = found.x * size
+                effort, before = sense * (own[drive] + rates[drive] @ x), best
+                one, per = self._rows(self.V, u, t)
+                V, best = one + per @ x, max(effort, best)
+                if effort - before <= STRESSES.rounding * size:
+                    break
+            out[t] = np.nan if best == -np.inf else sense * best
+        return out
+
+    def alone(self) -> Array:
+        """Where some friction holds it though its drives supply nothing: 1 where it is found, 0 where none can be, NaN where neither is
+        proved, ``(T,)``. With what is above ``|V|``, ``|a| + sum |B| g``, too: found, or none there, by least squares under signs (Farkas).
+        """
+        # of what may slide in k independent ways frictions in these alone span a part 1 / sqrt(k) of all
+        span = np.sqrt(np.maximum(self.sums.sum(axis=1) / 2, 1.0))
+        out = np.full(self.preload.shape[1], np.nan)
+        for t in range(len(out)):
+            V = self.V[0][:, 0, t]
+            for trial in range(8):
+                u, A, b = self._trial(V, t)
+                (one, per), (own, rates) = self._rows(self.V, u, t), self._rows(self.own, u, t)
+                g, met = _mixed(rates, own, A, b)
+                if met:
+                    out[t] = 1.0
+                    break
+                V = one + per @ g
+                if trial == 0:
+                    above = np.array([np.linalg.norm(per[self.cuts[o]], axis=0) for o in self.first])
+                    size = np.array([np.linalg.norm(one[self.cuts[o]]) for o in self.first]) + self.preload[:, t]
+                    if not _mixed(rates, own, self.sums / span[:, None] - above, size)[1]:
+                        out[t] = 0.0
+                        break
+        return out
+
+
+def _mixed(rates: Array, own: Array, sums: Array, limit: Array) -> tuple[Array, bool]:
+    """Parts ``g >= 0`` with ``rates g + own = 0`` and ``sums g <= limit`` as nearly as there are, and whether these are."""
+    size = max(float(np.abs(own).max(initial=0.0)), np.finfo(float).tiny), max(float(limit.max(initial=0.0)), 1e-300)
+    A = np.block([[rates / size[0], np.zeros((len(own), len(limit)))], [sums / size[1], np.eye(len(limit)) / size[1]]])
+    found, missed = scipy.optimize.nnls(A, np.concatenate([-own / size[0], limit / size[1]]))
+    return found[: rates.shape[1]], bool(missed <= STRESSES.unique)
 
 
 def _worst(values: Array, sizes: Array) -> Mask:

@@ -358,8 +358,8 @@ class FreeForces:
     locked: Array | None = None
     of_misfit: Array | None = None
     unborne: Mask | None = None
-    all_stress: Array | None = None
-    """All self-stresses ``(6, P, s, T)`` of which stiffness decides."""
+    all_stress: Stress | None = None
+    """All self-stresses of which stiffness decides."""
 
 
 def least_on_flanks(
@@ -486,7 +486,7 @@ def _elastic(here: Configuration, found: FreeForces, lifted: Mask | None) -> Fre
         of(split.locked),
         np.einsum("cpit,ikt->cpkt", stress.wrenches, split.unit[:, split.soft]),
         split.unborne,
-        stress.wrenches,
+        stress,
     )
 
 
