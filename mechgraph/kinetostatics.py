@@ -72,6 +72,7 @@ from mechgraph.model.parameters import declared
 from mechgraph.outcome import FollowedPositions, Options, Outcome, Starts, compiled, served_before
 from mechgraph.quantities import door, wrong
 from mechgraph.result.contacts import with_other_flanks
+from mechgraph.result.notes import WHY_NOT
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import OK, PositionLabels, ranges
 from mechgraph.result.views import CouplingResult
@@ -303,29 +304,10 @@ SOLVED = tuple(
     s.value for s in (Status.OK, Status.CHANGE_POINT, Status.ACTUATORS_REST, Status.FRICTION_OPEN, Status.LIFTS_OFF)
 )
 """Outcomes that are no reason to raise."""
-DEAD = (
-    "The drivers do not determine the motion there. Drive another freedom, omit the position, or pass on_reach='flag'"
-)
+RUBBING = (Status.JAMS, Status.NO_FINITE_FORCE)
 FLAG = "Pass on_reach='flag' to keep the reachable positions"
 WITHOUT_BOUND, BEFORE_END = 1e3, 0.01
 """Slides of so many lengths L that have doubled within so much of the path before its end grow without bound."""
-RUBBING = {
-    Status.JAMS: "jams: the normal forces in {} grow without bound at {:.4g} times the friction declared. Less friction, longer guides, or "
-    "a drive closer to the axis would move it; pass on_reach='flag' to keep the other positions",
-    Status.NO_FINITE_FORCE: "has no finite force: with those in {} the solution ends at {:.4g} times the friction declared. Pass "
-    "on_reach='flag' to keep the other positions",
-}
-"""Why friction has no answer at a position, by its outcome."""
-REFUSED = {
-    Status.DEAD_POINT: f"is a dead point{{meet}}. {DEAD}",
-    Status.BEYOND_DEAD_POINT: f"is beyond a dead point; reached {{at}}{{meet}}. {DEAD}",
-    Status.OUT_OF_REACH: f"is not reachable (status 'out of reach'); the motion stops at {{at}}{{far}}. {FLAG}",
-    Status.NOT_CLOSED: f"is reachable, but the closure residual stays above round-off; last position {{at}}. {FLAG}",
-    Status.NOT_FOLLOWED: "was not reached: step limit; last position {at}. Start closer, or pass on_reach='flag'",
-    Status.BEYOND_TOLERANCE: "exceeds tol; closure residual of the declared geometry: {miss:.3g}, over all positions {most:.3g}. "
-    "Pass a larger tol, or on_reach='flag'",
-}
-"""Why a position was not solved, by its outcome."""
 
 
 def _words(solution: Solution) -> set[str]:
@@ -341,11 +323,11 @@ def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exceptio
     first = int(bad[0])
     status = Status(solution.status.reshape(-1)[first])
     wanted = (line.values("position", outcome.batch)[:, first] * line.unit).tolist()
+    values = dict(zip(line.drive.names, wanted, strict=True))
+    head, (what, why) = f"mechanism {line.m.name!r}: position {first} ({_listed(values.items())})", WHY_NOT[status]
     if status in RUBBING:
         factor, places = outcome.trajectory.friction_factor(first)
-        values = dict(zip(line.drive.names, wanted, strict=True))
-        why = RUBBING[status].format(", ".join(places), factor)
-        text = f"mechanism {line.m.name!r}: position {first} ({_listed(values.items())}) {why}"
+        text = f"{head} {what.format(factor=factor)}: {why.format(pairs=', '.join(places))}. {FLAG}"
         return FrictionError(text, values, solution, kind=status.value, factor=factor, places=places)
     if outcome.found is None:
         return None
@@ -361,7 +343,7 @@ def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exceptio
     meets = dead and len(nodes)
     ways = branches(line.system, nodes.x[:, np.argmax(nodes.place)], line.leading) if meets else ()
     misses = solution.checks.closure.reshape(-1)
-    why = REFUSED[status].format(
+    what = what.format(
         at=_listed(reached.items()),
         far=_without_bound(line.system, way),
         meet=f" ({branches_text(ways, line.drive.names[line.lead[0]])})" if ways else "",
@@ -369,12 +351,11 @@ def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exceptio
         most=np.max(misses, where=np.isfinite(misses), initial=0.0),
     )
     if still:
-        why = "is not reachable (status 'out of reach'): no finite motion keeps the loops closed from "
+        what, why = "is not reachable (status 'out of reach')", "no finite motion keeps the loops closed from "
         why += f"{_listed(reached.items())} (see mechgraph.check)"
     if outcome.found.left[first]:
-        why = f"is not reachable (status 'out of reach'): {outcome.found.left[first]}. {FLAG}"
-    asked = _listed(zip(line.drive.names, wanted, strict=True))
-    text = f"mechanism {line.m.name!r}: position {first} ({asked}) {why}"
+        what, why = "is not reachable (status 'out of reach')", outcome.found.left[first]
+    text = f"{head} {what}: {why}. {FLAG}"
     if not dead:
         return ReachError(text, reached, solution)
     error = DeadPointError(text, reached, solution)

@@ -18,7 +18,8 @@ from mechgraph.determinacy.finite_motion import branches
 from mechgraph.determinacy.mobility import stand_still
 from mechgraph.errors import DeclarationError
 from mechgraph.force.block import forces_of_block
-from mechgraph.force.redundant import FORCE_OUTCOMES, BlockForces, ForceTask
+from mechgraph.force.friction import Came
+from mechgraph.force.redundant import BlockForces, ForceTask
 from mechgraph.kernel import build
 from mechgraph.kernel.tables import HEAD_RUBS, MIDDLE, START, Kernel, Layout, Mask, Records, layout, tables, why_not
 from mechgraph.kinematics.motion_path import BLOCK, DriverPath, Positions, Status, continued, in_blocks
@@ -156,7 +157,7 @@ class Outcome:
             forces = self._forces(motion, f)
             self.trajectory.put(motion, forces)
             for number in np.unique(forces.outcome[forces.outcome > 0]):
-                self.trajectory.mark(motion.places[forces.outcome == number], FORCE_OUTCOMES[number])
+                self.trajectory.mark(motion.places[forces.outcome == number], Came(number).status)
 
     def _forces(self, motion: BlockMotion, f: FactoredClosure) -> BlockForces:
         line = self.line

@@ -50,7 +50,7 @@ def forces_of_block(
         (ranges, why, growth), holds_alone = solve.at_rest(dq, given), solve.holds(dq, given)
         found, rubs, flank = solve.forces(dq)
         verge = (why > 0) & (rubs.outcome == 0)
-        rubs.why[verge], rubs.growth[:, verge] = why[verge], growth[:, verge]
+        rubs.ends[verge], rubs.growth[:, verge] = why[verge], growth[:, verge]
         held, holds, hold_terms = held_still(here, task, f, applied + inertia, given + rubs.efforts, site.largest)
         loads = loads if held is None else applied + inertia + held
         given = given + rubs.efforts

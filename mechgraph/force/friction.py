@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from mechgraph.errors import DeclarationError
+from mechgraph.kinematics.motion_path import Status
 from mechgraph.kinematics.rates import Velocities
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.touching import ContactLines
@@ -33,21 +34,27 @@ from mechgraph.model.friction import Friction, Rubs, place_of_coupling, places_i
 from mechgraph.model.gear_facts import mean_sliding
 from mechgraph.pairs.contact_types import pressing
 
-OUTCOMES = ("ok", "jams", "no finite force", "friction not determined")
-"""What becomes of a position, by number."""
 
-
-class Why(IntEnum):
-    """Why friction is not determined: reactions that are not unique, several sets of normal forces, places that do not settle, feet that
-    would pull or be pressed without bound, teeth that press on neither flank.
+class Came(IntEnum):
+    """What becomes of the forces at a position: their status. Of friction that is not determined the reason: several sets of normal forces,
+    reactions that are not unique, places that do not settle, feet that would pull or be pressed without bound, teeth that press on neither
+    flank.
     """
 
-    KNOWN = 0
-    NOT_UNIQUE = 1
-    SEVERAL = 2
-    UNSETTLED = 3
-    FEET = 4
-    FLANKS = 5
+    OK = 0
+    JAMS = 1
+    NO_FINITE_FORCE = 2
+    SEVERAL = 3
+    NOT_UNIQUE = 4
+    UNSETTLED = 5
+    FEET = 6
+    FLANKS = 7
+    LIFTS_OFF = 8
+
+    @property
+    def status(self) -> str:
+        """The status of the position."""
+        return str(Status["FRICTION_OPEN" if self.SEVERAL <= self <= self.FLANKS else self.name].value)
 
 
 @dataclass(frozen=True)
@@ -424,7 +431,8 @@ class Rubbed:
 
     Of these, the efforts of ``teeth (F, T)``, what is ``beside (6, P, T)`` them, and their wrenches on gears b ``rubbing (6, n, T)``: they
     pass the pairs by. How the normal forces grow where the solution ends ``growth (m, T)``, ``speeds (m, T)`` of sliding and ``names``.
-    Of what is not determined ``why (T,)``, and ``growth`` is that of the places that it concerns.
+    Of what is not determined ``growth`` is that of the places that it concerns; ``ends (T,)`` says like ``outcome`` why it is not known
+    between which efforts it rests.
     """
 
     efforts: Array
@@ -438,7 +446,7 @@ class Rubbed:
     growth: Array
     speeds: Array
     names: tuple[str, ...]
-    why: Array
+    ends: Array
 
     def with_grip(self, here: Configuration, grip: Grip, sizes: Array) -> Rubbed:
         """With forces of sizes ``(d, T)`` that keep bodies from sliding beside it."""
@@ -482,15 +490,18 @@ def rubbed(here: Configuration, places: Sequence[Place], base: Array, unit: Mapp
     # what presses one way alone has passed infinity while friction grew: nothing holds it up, or it is two-valued
     over = np.linalg.det(np.eye(len(a)) - np.moveaxis(C, -1, 0)) <= 0.0 if signed else np.zeros(T, dtype=bool)
     n, V, outcome, factor, growth = _normals(a, B, np.where(over, 0.0, C), starts)
-    outcome = np.where(over, np.where((V[starts[signed]] > 0.0).any(axis=0), 2, 3), outcome)
-    why = np.where(outcome == 3, Why.SEVERAL, Why.KNOWN)
+    outcome = np.where(
+        over, np.where((V[starts[signed]] > 0.0).any(axis=0), Came.NO_FINITE_FORCE, Came.SEVERAL), outcome
+    )
     n[signed] = V[starts[signed]]
     n, V = np.where(outcome > 0, np.nan, n) + preload, np.where(outcome > 0, np.nan, V)
     P, F = len(here.system.m.pairs), here.system.n_freedoms
     speeds, names = np.array([place.speed for place in places]), tuple(place.of for place in places)
     zeros = (np.zeros(shape) for shape in ((F, T), (6, P, T), (F, T), (6, P, T), (6, len(here.system.m.couplings), T)))
     sums = dict(zip(_SUMS, zeros, strict=True))
-    out = Rubbed(normals=n, outcome=outcome, factor=factor, growth=growth, speeds=speeds, names=names, why=why, **sums)
+    out = Rubbed(
+        normals=n, outcome=outcome, factor=factor, growth=growth, speeds=speeds, names=names, ends=0 * outcome, **sums
+    )
     for t, place in enumerate(places):
         mine, teeth = V[starts[t] : starts[t + 1]], place.between_teeth(P)
         for parts, size in zip(split[t], (n[t : t + 1], mine), strict=True):
@@ -609,12 +620,12 @@ def _grown(a: Array, B: Array, C: Array, starts: Index) -> tuple[Array, int, flo
             k, n, step = ahead, new, min(2 * step, 1 / 16)
             if k == 1.0:
                 several = _others(a, B, C, starts, n)
-                return n, 3 if several else 0, np.nan, np.full_like(n, several)
+                return n, Came.SEVERAL if several else Came.OK, np.nan, np.full_like(n, several)
         else:
             step /= 2
         if step < 1e-9 or n.max() > 1e8 * scale:  # far below what tells friction from friction
             return _ended(a, B, C, starts, k, n)
-    return n, 3, np.nan, np.ones_like(n)
+    return n, Came.SEVERAL, np.nan, np.ones_like(n)
 
 
 def _rises(a: Array, B: Array, C: Array, starts: Index, k: float, n: Array) -> bool:
@@ -637,7 +648,7 @@ def _ended(a: Array, B: Array, C: Array, starts: Index, k: float, n: Array) -> t
     values, growth = np.linalg.eigvals(slope), np.abs(np.linalg.svd(np.eye(len(n)) - k * slope)[2][-1])
     real = values.real[(np.abs(values.imag) < 1e-6 * np.abs(values).max()) & (values.real > 0)]
     factor = 1.0 / float(real.max()) if without_bound and real.size and not C.any() else k
-    return n, 1 if without_bound else 2, factor, growth
+    return n, Came.JAMS if without_bound else Came.NO_FINITE_FORCE, factor, growth
 
 
 def _others(a: Array, B: Array, C: Array, starts: Index, n: Array) -> bool:

@@ -10,10 +10,9 @@ import numpy as np
 import scipy
 
 from mechgraph.force.friction import (
-    OUTCOMES,
+    Came,
     Place,
     Rubbed,
-    Why,
     answers,
     moving_rates,
     passed_on,
@@ -159,11 +158,11 @@ class FrictionProblem:
             self._try_sets(dq)
             found, rubs = self._on_flanks(dq)
             turned, moved = self._turned(found, rubs), self._lifts(found)[1]
-        found = _undetermined(found, rubs, moved, Why.FEET)
-        found = _undetermined(found, rubs, turned, Why.FLANKS)
+        found = _undetermined(found, rubs, moved, Came.FEET)
+        found = _undetermined(found, rubs, turned, Came.FLANKS)
         # forces that grow without bound between feet held in place may let them lift before: then it tips, and does not jam
-        grows = np.isin(rubs.outcome, (1, 2)) & (self.push is not None)
-        rubs.outcome[grows], rubs.factor[grows], rubs.why[grows] = 3, np.nan, Why.FEET
+        grows = np.isin(rubs.outcome, (Came.JAMS, Came.NO_FINITE_FORCE)) & (self.push is not None)
+        rubs.outcome[grows], rubs.factor[grows] = Came.FEET, np.nan
         return found, rubs, self.flank
 
     def _turned(self, found: FreeForces, rubs: Rubbed) -> Mask:
@@ -240,8 +239,8 @@ class FrictionProblem:
         follows = np.array([[place.follows] for place in places])
         doubtful = (moved > MOTIONS.still * size) & follows.any()
         loose = np.array([self._is_loose(place, unknown, self._read(sums), size) for place in places])
-        known = _undetermined(replace(found, **sums), rubs, np.asarray(loose.any(axis=0)), Why.NOT_UNIQUE, loose)
-        return _undetermined(known, rubs, doubtful, Why.UNSETTLED, follows), rubs
+        known = _undetermined(replace(found, **sums), rubs, np.asarray(loose.any(axis=0)), Came.NOT_UNIQUE, loose)
+        return _undetermined(known, rubs, doubtful, Came.UNSETTLED, follows), rubs
 
     def _is_loose(self, place: Place, stress: Array, forces: Array, size: Array) -> Mask:
         """Where ``(T,)`` a place rubs under components that a ``stress (6, P, s, T)`` may change and to which loads add: components that
@@ -275,17 +274,18 @@ class FrictionProblem:
         why, growth = np.zeros(self.here.T, dtype=int), np.zeros((1, self.here.T))
         if not rest.any():
             return out, why, growth
+        jams = Came.JAMS, Came.NO_FINITE_FORCE
         moved, push = self.f.sensitivity(), seats_of(self.here.system).push
         for (j, column), (side, sense) in product(enumerate(self.task.driven), enumerate((-1.0, 1.0))):
             rates = sense * moving_rates(moved[:, j])
             found, rubs, _ = self.forces(rates, at_rest=True)
-            effort = np.where(np.isin(rubs.outcome, (1, 2)), sense * np.inf, self._efforts(found, rubs, given)[column])
+            effort = np.where(np.isin(rubs.outcome, jams), sense * np.inf, self._efforts(found, rubs, given)[column])
             stands = self._presses(found, rubs) >= -STRESSES.rounding
-            tips = rest & push.any() & ~stands & np.isin(rubs.why, (Why.KNOWN, Why.FEET))
+            tips = rest & push.any() & ~stands & np.isin(rubs.outcome, (Came.OK, *jams, Came.FEET))
             if tips.any():
                 effort = np.where(tips, self._tipping(rates, tips, given, j, sense), effort)
-            open_ = rest & (rubs.outcome == 3) & ~tips
-            why, growth = np.where(open_, rubs.why, why), np.where(open_, rubs.growth, growth)
+            open_ = rest & (rubs.outcome > Came.NO_FINITE_FORCE) & ~tips
+            why, growth = np.where(open_, rubs.outcome, why), np.where(open_, rubs.growth, growth)
             out[column, side, rest] = effort[rest]
         return out, why, growth
 
@@ -475,12 +475,12 @@ def _worst(values: Array, sizes: Array) -> Mask:
     return np.asarray(least & (values < -STRESSES.rounding * sizes.max(axis=0)))
 
 
-def _undetermined(found: FreeForces, rubs: Rubbed, places: Mask, why: Why, of: Mask | bool = True) -> FreeForces:
+def _undetermined(found: FreeForces, rubs: Rubbed, places: Mask, why: Came, of: Mask | bool = True) -> FreeForces:
     """The same with no value where friction has no solution, or is not determined, as at some more ``places``, by the rubbing places
     ``of (m, T)`` which it is.
     """
     more = places & (rubs.outcome == 0)
-    rubs.outcome[more], rubs.why[more] = OUTCOMES.index("friction not determined"), why
+    rubs.outcome[more] = why
     rubs.growth[:, more] = np.broadcast_to(of, rubs.growth.shape)[:, more]
     for values in (rubs.efforts, rubs.taken, rubs.normals, rubs.teeth, rubs.beside, rubs.rubbing):
         values[..., places] = np.nan

@@ -23,7 +23,7 @@ import numpy as np
 import scipy
 
 from mechgraph.errors import DeclarationError
-from mechgraph.force.friction import OUTCOMES, Rubbed
+from mechgraph.force.friction import Came, Rubbed
 from mechgraph.force.loads import hold
 from mechgraph.force.reactions import (
     METHODS,
@@ -47,7 +47,6 @@ from mechgraph.force.reactions import (
     row_efforts,
     split_stress,
 )
-from mechgraph.kinematics.motion_path import Status
 from mechgraph.kinematics.rates import PassiveMotion
 from mechgraph.kinematics.state import Configuration, FactoredClosure
 from mechgraph.kinematics.system import System
@@ -58,13 +57,6 @@ from mechgraph.memo import dataclass
 from mechgraph.model.belts import pretensions
 from mechgraph.model.loads import Load
 from mechgraph.model.mechanism import Mechanism
-
-LIFTS_OFF = Status.LIFTS_OFF.value
-"""Status where what only pushes cannot bear the loads: a table that tips over."""
-
-
-FORCE_OUTCOMES = (*OUTCOMES, LIFTS_OFF)
-"""What becomes of the forces at a position, by number."""
 
 
 @dataclass(frozen=True)
@@ -109,9 +101,9 @@ class BlockForces:
 
     @property
     def outcome(self) -> Array:
-        """What became of every position ``(T,)``, by its number in ``FORCE_OUTCOMES``."""
+        """What became of every position ``(T,)``, by its number (``Came``)."""
         came = np.zeros(self.power.shape, int) if self.rubs is None else self.rubs.outcome
-        return came if self.unborne is None else np.where(self.unborne, FORCE_OUTCOMES.index(LIFTS_OFF), came)
+        return came if self.unborne is None else np.where(self.unborne, Came.LIFTS_OFF, came)
 
 
 @dataclass(frozen=True)

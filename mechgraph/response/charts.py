@@ -25,7 +25,7 @@ import scipy
 from mechgraph.determinacy.mobility import free_motion
 from mechgraph.errors import DeclarationError
 from mechgraph.force.block import forces_of_block
-from mechgraph.force.friction import OUTCOMES
+from mechgraph.force.friction import Came
 from mechgraph.force.loads import Site, kinetic_energy
 from mechgraph.force.redundant import BlockForces, ForceTask
 from mechgraph.kinematics.motion_path import in_blocks
@@ -523,7 +523,7 @@ class ChartStage:
             return None
         found = moved(closed, y[n:-2], p[1:], self._loads, at)
         if found.rubs is not None and (outcome := int(found.rubs.outcome[0])):
-            self.trouble = no_force(self.task, OUTCOMES[outcome], t)
+            self.trouble = no_force(self.task, Came(outcome).status, t)
         rates = found.rates
         state = np.concatenate([closed.here.x[:, 0], rates.dq[:, 0], rates.ddq[:, 0]])
         self._last = _Known(t, state, *self._sizes)
@@ -572,7 +572,7 @@ def trajectory_of(
         forces = replace(forces, given=given)
         if own.loads.shared:
             forces = _undetermined(forces)
-            out.mark(places, OUTCOMES[-1])
+            out.mark(places, Came.NOT_UNIQUE.status)
         out.put(BlockMotion(places, rates), forces)
         kinetic[places] = kinetic_energy(closed.here, rates.V) * s.par.L**2
         site = Site(closed.here, rates, q, (count,), np.arange(count), at)

@@ -22,7 +22,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from mechgraph.force.friction import OUTCOMES
+from mechgraph.force.friction import Came
 from mechgraph.force.loads import kinetic_energy
 from mechgraph.force.reactions import ForceProblem, user_wrench
 from mechgraph.force.redundant import unique_reactions
@@ -100,7 +100,7 @@ def _phase(D: Array, w: Array, least: Array, cones: Sequence[tuple[int, Index, f
                 p[along] = free * min(1.0, mu * p[i] / max(float(np.linalg.norm(free)), 1e-300))
         if np.abs(D @ (p - before)).max() <= 1e-15 * np.abs(w).max():
             return p
-    raise Stopped("an impact with friction has no impulses that agree with themselves", OUTCOMES[2])
+    raise Stopped("an impact with friction has no impulses that agree with themselves", Came.NO_FINITE_FORCE.status)
 
 
 class FreeEquations:

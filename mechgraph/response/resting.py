@@ -22,7 +22,7 @@ from typing import Any, Protocol
 import numpy as np
 import scipy
 
-from mechgraph.force.friction import OUTCOMES, places_of
+from mechgraph.force.friction import Came, places_of
 from mechgraph.kinematics.assembly import closed_start
 from mechgraph.kinematics.prescribed import with_pairs_at
 from mechgraph.kinematics.rates import Rates
@@ -242,7 +242,7 @@ class Rests:
         bad = np.flatnonzero(np.isnan(rates[1]).any(axis=0))
         if bad.size:
             last = begin if bad[0] == 0 else float(looks[bad[0] - 1])
-            raise no_force(self.task, OUTCOMES[2], float(looks[bad[0]]), last)
+            raise no_force(self.task, Came.NO_FINITE_FORCE.status, float(looks[bad[0]]), last)
         times: list[float | None] = []
         free = [limit for limit in self.limits if limit not in self.holding.limits]
         for limit in free:
@@ -539,7 +539,7 @@ class Rests:
                 break
             state = after
         self._painleve(_Holding(resting, (), ways), resting, t, x, dq, agrees=False)
-        raise no_force(self.task, OUTCOMES[why or OUTCOMES.index("no finite force")], t)
+        raise no_force(self.task, Came(why or Came.NO_FINITE_FORCE).status, t)
 
     def _tried(self, ways: Array, state: _State, at: _Instant) -> tuple[_Holding, Moved]:
         """A state, with the ways of what moves already, and the accelerations in it."""
@@ -628,8 +628,8 @@ class Rests:
             size = self.task.system.par.L
             law = f"contact {limit.contact} at t = {t:.6g}: its normal acceleration is b + p N with b = {b * size:.6g}, p = {p:.6g}"
             if agrees:
-                raise Stopped(f"{law}: it may press with N = -b / p, or leave (Painleve)", OUTCOMES[3])
-            raise Stopped(f"{law}: no N >= 0 holds it up (Painleve)", OUTCOMES[2])
+                raise Stopped(f"{law}: it may press with N = -b / p, or leave (Painleve)", Came.SEVERAL.status)
+            raise Stopped(f"{law}: no N >= 0 holds it up (Painleve)", Came.NO_FINITE_FORCE.status)
 
     def _normal_law(self, holding: _Holding, limit: Limit, t: float, x: Array, dq: Array) -> tuple[float, float]:
         """The normal acceleration of a contact that slips, without a normal force, and for a unit one with its friction."""

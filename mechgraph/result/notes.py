@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mechgraph.force.friction import Why
+from mechgraph.force.friction import Came
 from mechgraph.kinematics.motion_path import Status
 from mechgraph.maths.se3 import Index
 from mechgraph.maths.tolerances import MOTIONS
@@ -19,31 +19,63 @@ from mechgraph.result.values import OK, PositionLabels
 from mechgraph.result.views import BeltResult, CouplingResult, PairResult
 
 WHY_NOT = {
-    Status.DEAD_POINT: "the drivers do not determine the motion there; drive another freedom, or leave them out",
-    Status.BEYOND_DEAD_POINT: "the way there leads through a dead point; drive another freedom, or leave them out",
-    Status.OUT_OF_REACH: "the drivers do not get there on this branch; take values within reach, or another start",
-    Status.CHANGE_POINT: "branches cross, so no effort of the drivers balances every load and forces are NaN; take positions beside it, "
-    "or drive a freedom on the other side too",
-    Status.ACTUATORS_REST: "the freedoms of actuate= rest while the mechanism moves, so forces are NaN; actuate another freedom",
-    Status.NOT_CLOSED: "they are within reach, but the closure residual stays above round-off; start closer",
-    Status.NOT_FOLLOWED: "the step limit was reached on the way; start closer, or ask for positions in between",
-    Status.BEYOND_TOLERANCE: "the geometry as declared does not close to tol there; pass a larger tol=",
-    Status.JAMS: "the normal forces in {} grow without bound before friction has its full size; less friction, longer guides, or a drive "
-    "closer to the axis would move it",
-    Status.NO_FINITE_FORCE: "with friction in {} the solution ends before friction has its full size; less friction would move it",
-    Status.FRICTION_OPEN: "friction of {} has no one value, so forces are NaN: ",
-    Status.LIFTS_OFF: "{} only push and cannot bear the loads, as of a table that tips over, so forces are NaN; press on it, set them "
-    "wider, or hold them on both sides (closed='form')",
+    Status.DEAD_POINT: (
+        "is a dead point{meet}",
+        "the drivers do not determine the motion there; drive another freedom, or leave such positions out",
+    ),
+    Status.BEYOND_DEAD_POINT: (
+        "is beyond a dead point; reached {at}{meet}",
+        "the way there leads through a dead point; drive another freedom, or leave such positions out",
+    ),
+    Status.OUT_OF_REACH: (
+        "is not reachable (status 'out of reach'); the motion stops at {at}{far}",
+        "the drivers do not get there on this branch; take values within reach, or another start",
+    ),
+    Status.CHANGE_POINT: (
+        "is a change point",
+        "branches cross, so no effort of the drivers balances every load and forces are NaN; take positions beside it, or drive a freedom "
+        "on the other side too",
+    ),
+    Status.ACTUATORS_REST: (
+        "is a dead point of actuate=",
+        "the freedoms of actuate= rest while the mechanism moves, so forces are NaN; actuate another freedom",
+    ),
+    Status.NOT_CLOSED: (
+        "is not closed; last position {at}",
+        "within reach, but the closure residual stays above round-off; start closer",
+    ),
+    Status.NOT_FOLLOWED: (
+        "was not reached; last position {at}",
+        "the step limit was reached on the way; start closer, or ask for positions in between",
+    ),
+    Status.BEYOND_TOLERANCE: (
+        "exceeds tol; closure residual of the declared geometry: {miss:.3g}, over all positions {most:.3g}",
+        "the geometry as declared does not close to tol there; pass a larger tol=",
+    ),
+    Status.JAMS: (
+        "jams at {factor:.4g} times the friction declared",
+        "the normal forces in {pairs} grow without bound before friction has its full size; less friction, longer guides, or a drive "
+        "closer to the axis would move it",
+    ),
+    Status.NO_FINITE_FORCE: (
+        "has no finite force from {factor:.4g} times the friction declared on",
+        "with friction in {pairs} the solution ends before friction has its full size; less friction would move it",
+    ),
+    Status.FRICTION_OPEN: ("", "friction of {pairs} has no one value, so forces are NaN: {why}"),
+    Status.LIFTS_OFF: (
+        "",
+        "{pairs} only push and cannot bear the loads, as of a table that tips over, so forces are NaN; press on it, set them wider, or "
+        "hold them on both sides (closed='form')",
+    ),
 }
-"""Why positions have no values, and what gives them some, by status."""
+"""What the error says of one position, and why positions have no values and what gives them some, by status."""
 OPEN = {
-    Why.KNOWN: "several states of it agree with the motion",
-    Why.NOT_UNIQUE: "it follows reactions that are not unique. ",
-    Why.SEVERAL: "more than one set of normal forces agrees with it. Less friction would leave one",
-    Why.UNSETTLED: "the places at which bodies touch do not settle beside it. Less friction would let them",
-    Why.FEET: "pairs that only push would pull, or be pressed without bound; they may lift before. Less friction, feet set wider, or a "
+    Came.SEVERAL: "more than one set of normal forces agrees with it. Less friction would leave one",
+    Came.NOT_UNIQUE: "it follows reactions that are not unique. ",
+    Came.UNSETTLED: "the places at which bodies touch do not settle beside it. Less friction would let them",
+    Came.FEET: "pairs that only push would pull, or be pressed without bound; they may lift before. Less friction, feet set wider, or a "
     "lower drive would keep them down",
-    Why.FLANKS: "teeth would press on neither flank beside it. Less friction, or a load between the teeth, would settle it",
+    Came.FLANKS: "teeth would press on neither flank beside it. Less friction, or a load between the teeth, would settle it",
 }
 """The same of friction that is not determined."""
 PULLS = "a pair that only pushes would have to pull there even without friction, and lifts off; press on it"
@@ -76,22 +108,18 @@ def not_solved(values: Trajectory) -> Iterator[NotSolved]:
         for reason in dict.fromkeys(why[status == name].tolist()):
             at = np.flatnonzero((status == name) & (why == reason))
             pairs = _pairs_of(values, Status(name), at)
-            text = WHY_NOT[Status(name)].format(", ".join(pairs) or "the pairs that rub")
-            text += _open(values, reason) if Status(name) is Status.FRICTION_OPEN else ""
+            of = ", ".join(pairs) or "the pairs that rub"
+            text = WHY_NOT[Status(name)][1].format(pairs=of, why=_open(values, reason))
             yield NotSolved(name, tuple(at.tolist()), pairs, text, _where(values, at))
 
 
 def _open(values: Trajectory, reason: int) -> str:
     """Why friction is not determined, and what would determine it."""
-    if reason != Why.NOT_UNIQUE:
-        return OPEN[Why(reason)]
+    split = "Pass redundant='elastic' with stiffness= of these pairs (or 'minimum_norm')"
     if values.split_by_stiffness:
-        return (
-            OPEN[Why.NOT_UNIQUE]
-            + "Give stiffness= to the components that are still rigid, or take a redundant constraint away"
-        )
-    split = "Pass redundant='elastic' with stiffness= of these pairs (or 'minimum_norm'), or take a redundant constraint away"
-    return OPEN[Why.NOT_UNIQUE] + split
+        split = "Give stiffness= to the components that are still rigid"
+    more = f"{split}, or take a redundant constraint away" if reason == Came.NOT_UNIQUE else ""
+    return OPEN.get(Came(reason), "several states of it agree with the motion") + more
 
 
 def _pairs_of(values: Trajectory, status: Status, at: Index) -> tuple[str, ...]:

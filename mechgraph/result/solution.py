@@ -16,7 +16,6 @@ from mechgraph.document import Document, Shown, to_text
 from mechgraph.equations.terms import State
 from mechgraph.errors import DeclarationError, visible
 from mechgraph.files import Format, csv_of, format_of, json_text, optional, plain, whole_file, write_whole
-from mechgraph.force.friction import OUTCOMES
 from mechgraph.maths.newton import Work
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import CHECKS, PATH
@@ -629,7 +628,7 @@ class Solution(Shown):
     @property
     def jams(self) -> dict[int, Jam]:
         """What jams, by the flat index of every position that does (status ``'jams'`` or ``'no finite force'``)."""
-        stuck = np.flatnonzero(np.isin(self.status, OUTCOMES[1:3]))
+        stuck = np.flatnonzero(np.isin(self.status, ("jams", "no finite force")))
         return {int(i): Jam(*self._values.friction_factor(int(i))) for i in stuck}
 
     @property

@@ -77,7 +77,7 @@ KEPT = (
     "locked", "of_misfit", "range", "holds_alone",
 )  # fmt: skip
 """Fields of ``BlockForces`` that are kept for every position."""
-KEPT_OF_FRICTION = ("normals", "factor", "teeth", "rubbing", "growth", "speeds", "why")
+KEPT_OF_FRICTION = ("normals", "factor", "teeth", "rubbing", "growth", "speeds", "outcome", "ends")
 """Fields of ``Rubbed`` that are kept for every position; efforts and what pairs take up without those of teeth."""
 
 
@@ -599,8 +599,9 @@ class Trajectory:
 
     @property
     def why_open(self) -> Array:
-        """Why friction, or the ends between which it holds, are not determined ``(T,)``, by the number of ``force.friction.Why``."""
-        return np.nan_to_num(self._kept.get("why", np.zeros(self._count))).astype(int)
+        """Why friction, or the ends between which it holds, are not determined ``(T,)``, by number (``force.friction.Came``)."""
+        known = [self._kept.get(name, np.zeros(self._count)) for name in ("outcome", "ends")]
+        return np.nan_to_num(known).sum(axis=0).astype(int)
 
     def effort_range(self, pair: int) -> Array:
         """Least and greatest effort of drives at rest, ``(..., f, 2)``; the effort itself in motion and where nothing rubs."""

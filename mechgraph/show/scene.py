@@ -12,7 +12,7 @@ import scipy
 
 from mechgraph.document import plain
 from mechgraph.errors import DeclarationError
-from mechgraph.force.friction import OUTCOMES
+from mechgraph.force.friction import Came
 from mechgraph.kinematics.assembly import assembled
 from mechgraph.kinematics.state import Configuration, user_poses
 from mechgraph.kinematics.system import System
@@ -118,7 +118,7 @@ def scene(drawn: Solution | Mechanism, *, forces: bool = False, centers: bool = 
         system, x = assembled(drawn)
         found = scene_at(drawn, place_of_states(system, x[:, None]), np.zeros(1, dtype=np.intp))
     else:
-        good, place = place_of(drawn, (OK, *OUTCOMES[1:]))
+        good, place = place_of(drawn, [came.status for came in Came if came is not Came.LIFTS_OFF])
         found = scene_at(drawn.mechanism, place, good, drawn, forces=forces)
     shown = found.parts if centers else tuple(part for part in found.parts if part.role not in ("center", "tie"))
     return replace(found, parts=shown)
