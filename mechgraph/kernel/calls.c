@@ -78,7 +78,7 @@ int mgk_nodes(const int *I, const double *P, void *memory, const double *x, doub
   opened(I, P, memory, &m, &w);
   mgk_record(I, places);
   m.start = x;
-  begin(&m, &w);
+  if (begun(&m, &w)) return 0;
   Asked asked = {1, 0, 0, NULL, places, &end, &v, &v, w.record, largest, 0, node, 0, most};
   along(&m, &w, &asked);
   return asked.nodes;

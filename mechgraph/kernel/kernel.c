@@ -36,6 +36,7 @@ static const magnitude INDEPENDENT = 1e-9;  /* part of the closure rates that dr
 static const magnitude DRIVERS_ALONE = 1e-9;/* part below which the reactions of a self-stress count as none */
 static const magnitude UNIQUE = 1e-7;       /* part of a self-stress in a component above which it is not unique */
 static const magnitude STILL = 1e-8;        /* part of a passive motion above which it moves other links */
+static const magnitude UNSWUNG = 0.25;      /* way of a rotation vector, over that to a whole turn, on which its axis does not swing round */
 static const magnitude UNTURNED = 1e-13;    /* angle that is rounding */
 static const magnitude MISSING = 1e-9;      /* angle, or length / L, that may be missing to rest */
 static const magnitude TURNING = 1e-11;     /* part of the fastest rate up to which a freedom is at rest, and friction has no direction */
@@ -95,10 +96,10 @@ typedef struct {
   magnitude single, told, allowed, corrected, *speed;
   size_t n_kept;
   Node a, b, before;
-  /* the last two places on the line that are closed to rounding, and the curve through them to node b (none: x NULL) */
+  /* the last two places on the line that are closed to rounding, and the curve through them to node b (none: x NULL); that of a step */
   Node last, other;
-  Curve curve, half;
-  int known;
+  Curve curve, arc;
+  int known, stands; /* stands: node a is closed and factored at the state kept, and nothing else has been evaluated */
   long steps, evaluations, factorizations;
 } Work;
 
@@ -159,7 +160,7 @@ static size_t lay_out(const Model *m, double *memory, Work *w) {
   TAKE(passive, q * c), TAKE(twist, 6 * q), TAKE(twist_rate, 6 * q), TAKE(own_bias, 6 * p * q), TAKE(moving_bias, q ? 6 * p : 0), TAKE(moving, 6 * q);
   w->speed = (magnitude *)taken(&memory, &size, n);
   TAKE(raw, 6 * q * q + q), TAKE(apart, 2 * q * q), TAKE(trial_rate, q ? c : 0), TAKE(trial_acceleration, q ? c : 0), TAKE(still, m->drives), TAKE(series, POINTS * q);
-  w->curve.coefficient = taken(&memory, &size, POWERS * c), w->half.coefficient = taken(&memory, &size, POWERS * c);
+  w->curve.coefficient = taken(&memory, &size, POWERS * c), w->arc.coefficient = taken(&memory, &size, POWERS * c);
   Node *nodes[5] = {&w->last, &w->other, &w->a, &w->b, &w->before};
   FOR(i, 5) {
     nodes[i]->x = taken(&memory, &size, m->states), nodes[i]->rate = taken(&memory, &size, c), nodes[i]->bend = taken(&memory, &size, c);
@@ -459,11 +460,6 @@ static void on_curve(const Model *m, Work *w, const Curve *curve, double at, dou
   advance(m, curve->x, w->increment, x);
 }
 
-/* The state at a place of the curve of degree five through two nodes. */
-static void between(const Model *m, Work *w, const Node *a, const Node *b, double at, double *x) {
-  through(m, w, a, b, NULL, &w->half);
-  on_curve(m, w, &w->half, at, x);
-}
 #endif
 
 /* --- closure ----------------------------------------------------------------------------------------------------------------------- */
@@ -572,20 +568,16 @@ static int eliminate(const Model *m, Work *w) {
 }
 
 /* Unknowns from the right sides of all rows, by the independent ones; what they leave of the others. */
-static magnitude solve(const Model *m, const Work *w, const double *right, double *out) {
+static magnitude solve(const Model *m, const Work *w, const double *right, double *restrict out) {
   const int n = m->unknowns;
   const double *A = w->lu;
   magnitude left = 0.0;
-  FOR(i, n) {
-    double s = right[w->row[i]];
-    FOR(c, i) s -= A[i * n + c] * out[c];
-    out[i] = s;
-  }
+  FOR(i, n) out[i] = right[w->row[i]];
+  FOR(i, n) for (int r = i + 1; r < n; r++) out[r] -= A[r * n + i] * out[i];
   for (int r = n; r < m->rows; r++) left = raised(left, fabs(right[w->row[r]] - dot(A + r * n, out, n)));
   for (int i = n - 1; i >= 0; i--) {
-    double s = out[i];
-    for (int c = i + 1; c < n; c++) s -= A[i * n + c] * out[c];
-    out[i] = s * A[i * n + i];
+    out[i] *= A[i * n + i];
+    FOR(r, i) out[r] -= A[r * n + i] * out[i];
   }
   return left;
 }
@@ -1316,10 +1308,11 @@ static double radius(const double *M, int n, double *v) {
   double best = INFINITY, *next = v + n;
   FOR(i, n) v[i] = 1.0;
   FOR(pass, 4) {
-    double ratio = 0.0, most = 0.0;
-    FOR(i, n) next[i] = sum_of_sizes(M + i * n, v, n), ratio = raised(ratio, next[i] / v[i]), most = raised(most, next[i]);
-    best = fmin(best, ratio);
-    FOR(i, n) v[i] = raised(raised(1e-300, 1e-3 * most), next[i]);
+    FOR(i, n) next[i] = sum_of_sizes(M + i * n, v, n);
+    FOR(i, n) v[i] = next[i] / v[i];
+    best = fmin(best, size_of(v, n));
+    const double least = raised(1e-300, 1e-3 * size_of(next, n));
+    FOR(i, n) v[i] = raised(least, next[i]);
   }
   return n ? best : 0.0;
 }
@@ -1841,15 +1834,22 @@ static void continued(const Model *m, Work *w, double at) {
   }
   w->told = at;
   if (!(at > from)) return;
+  if (part * (at - from) <= UNSWUNG) return;
   const int n = (int)ceil(TOLD * fmin(part * (at - from), (at - from) / (*w->b.at - *w->a.at)));
   for (int i = 1; i < n; i++) {
-    between(m, w, &w->a, &w->b, from + (at - from) * i / n, w->trial);
+    on_curve(m, w, &w->arc, from + (at - from) * i / n, w->trial);
     coordinates(m, w, w->trial, w->dq);
   }
 }
 
-static void set_drives(const Model *m, double *x, const double *q) {
-  FOR(i, m->drives) x[m->column_state[m->drive[i]]] = q[i];
+/* Whether it moves them. */
+static int set_drives(const Model *m, double *x, const double *q) {
+  int moves = 0;
+  FOR(i, m->drives) {
+    double *own = x + m->column_state[m->drive[i]];
+    moves |= *own != q[i], *own = q[i];
+  }
+  return moves;
 }
 
 /* The inverse of the independent rows of the closure matrix that has just been factored, and its condition. */
@@ -1907,7 +1907,7 @@ static int made_node(const Model *m, Work *w, Node *node) {
 static double departed(const Model *m, Work *w, const Node *here, const Node *there, double h) {
   const int n = m->unknowns;
   const double third = h / 3.0;
-  double *whole = w->bound, *last = whole + n, *off = last + n;
+  double *restrict whole = w->bound, *restrict last = whole + n, *restrict off = last + n;
   FOR(i, n) {
     memset(whole, 0, 3 * (size_t)n * sizeof(double));
     FOR(r, n) {
@@ -1928,14 +1928,15 @@ static double departed(const Model *m, Work *w, const Node *here, const Node *th
  *
  * The closure matrix along the step is, to fourth order, the Hermite cubic through both ends and what it is off that in the middle; either
  * half of the cubic lies in the hull of its Bezier points C_i: no matrix is singular where |C^-1 (C - C_i)| < 1 for all of them, C being
- * that at its end (Banach's lemma). That b is on the branch of a and not on another one: the states' own polynomial is closed in the
- * middle, where it is furthest from the track, by a correction that is small against the distance of any two solutions, 2 / (|J^-1| |J'|)
- * at least (see maths/tracker.py, where the same limit holds). */
-static int certified(const Model *m, Work *w, double *grown) {
+ * that at its end (Banach's lemma). That b is on the branch of a and not on another one: the states' own polynomial, through the `third`
+ * node behind a too, is closed in the middle, where it is furthest from the track, by a correction that is small against the distance of
+ * any two solutions, 2 / (|J^-1| |J'|) at least (see maths/tracker.py, where the same limit holds). */
+static int certified(const Model *m, Work *w, const Node *third, double *grown) {
   const int n = m->unknowns;
   const Node *a = &w->a, *b = &w->b;
   const double h = *b->at - *a->at;
-  between(m, w, a, b, 0.5 * (*a->at + *b->at), w->trial);
+  through(m, w, a, b, third, &w->arc);
+  on_curve(m, w, &w->arc, 0.5 * (*a->at + *b->at), w->trial);
   if (!isfinite(evaluate(m, w, w->trial))) return 0;
   solve(m, w, w->residual, w->column_value);
   fill(m, w->S, w->middle, NULL, NULL, w->lu);
@@ -1944,7 +1945,7 @@ static int certified(const Model *m, Work *w, double *grown) {
   const double departure = raised(departed(m, w, b, a, -h), departed(m, w, a, b, h));
   double size = raised(1.0, raised(size_of(a->rate, m->columns), size_of(b->rate, m->columns)));
   const double correction = 4.0 * size_of(w->column_value, n), allowed = w->allowed = ALONE / (size * raised(1.0, raised(a->condition, b->condition)));
-  *grown = raised(0.4, 0.8 * fmin(DEPARTURE / raised(departure, 1e-9), pow(allowed / raised(correction, 1e-300), 1.0 / 6)));
+  *grown = raised(0.4, 0.8 * fmin(DEPARTURE / raised(departure, 1e-9), pow(allowed / raised(correction, 1e-300), third ? 1.0 / 9 : 1.0 / 6)));
   return departure <= DEPARTURE && correction <= allowed;
 }
 
@@ -2046,7 +2047,7 @@ static int rest_along(const Model *m, Work *w) {
   FOR(g, POINTS) {
     const double t = g % 2 ? point[g / 2] : -point[g / 2];
     double P[POINTS + 1], gap;
-    between(m, w, &w->a, &w->b, *w->a.at + 0.5 * (1.0 + t) * h, w->trial);
+    on_curve(m, w, &w->arc, *w->a.at + 0.5 * (1.0 + t) * h, w->trial);
     int status = closed(m, w, w->trial, NULL, CLOSED);
     if (!status) status = velocities(m, w, w->direction, w->dq, &gap);
     if (status) return status;
@@ -2145,11 +2146,12 @@ static int read_off(const Model *m, Work *w, Asked *asked, double at) {
   const double *v = asked->v + i * d, *a = asked->a + i * d;
   if (inside) predicted(m, w, at, w->x);
   else memcpy(w->x, w->b.x, m->states * sizeof(double));
-  set_drives(m, w->x, asked->q + i * d);
+  const int moves = set_drives(m, w->x, asked->q + i * d);
   continued(m, w, fmin(at, *w->b.at));
-  int status = closed_at_rest(m, w, w->x, at, NULL);
+  int status = w->stands && !moves ? MGK_OK : closed_at_rest(m, w, w->x, at, NULL);
+  w->stands &= !moves;
   if (inside && (status || !(w->corrected <= w->allowed))) { /* the step's own curve, which the certificate is about */
-    between(m, w, &w->a, &w->b, at, w->x);
+    on_curve(m, w, &w->arc, at, w->x);
     set_drives(m, w->x, asked->q + i * d);
     status = closed_at_rest(m, w, w->x, at, NULL);
   }
@@ -2172,10 +2174,11 @@ static int follow(const Model *m, Work *w, Asked *asked, const double *begin, co
     if (++w->steps > MOST_STEPS + asked->done) return MGK_TOO_FAR;
     h = fmin(h, NEAREST * w->a.reach);
     if (asked->done + AT_ONCE < until) h = fmin(h, raised(SHORTEST, along_line(m, w, asked, asked->done + AT_ONCE, begin) - *w->a.at));
+    const Node *third = known ? &w->before : NULL;
     const double left = length - *w->a.at, step = h >= left ? left : h > 0.5 * left ? 0.5 * left : h;
     *w->b.at = step == left ? length : *w->a.at + step;
     if (known) {
-      between(m, w, &w->before, &w->a, *w->b.at, w->b.x);
+      on_curve(m, w, &w->arc, *w->b.at, w->b.x);
     } else {
       FOR(c, m->columns) w->increment[c] = step * (w->a.rate[c] + 0.5 * step * w->a.bend[c]);
       advance(m, w->a.x, w->increment, w->b.x);
@@ -2186,15 +2189,18 @@ static int follow(const Model *m, Work *w, Asked *asked, const double *begin, co
     const int several = asked->done + SEVERAL < until && along_line(m, w, asked, asked->done + SEVERAL, begin) < *w->b.at;
     status = closed(m, w, w->b.x, w->b.matrix, several ? CLOSED : PASSED);
     if (!status) status = made_node(m, w, &w->b);
-    if (!status && !certified(m, w, &grown)) status = MGK_STEP;
+    if (!status && !certified(m, w, third, &grown)) status = MGK_STEP;
     if (!status && m->passives) status = rest_along(m, w);
     if (!status && m->passives) status = closed_at_rest(m, w, w->b.x, *w->b.at, w->b.matrix);
     if (!status && m->passives) status = made_node(m, w, &w->b);
     if (status) {
       h = fmin(0.8, grown) * step;
       if (h < SHORTEST) return status;
+      if (known) through(m, w, &w->before, &w->a, NULL, &w->arc);
+      furthest = h;
       continue;
     }
+    if (m->passives) through(m, w, &w->a, &w->b, third, &w->arc);
     made_known(m, w, *w->a.at, w->a.x, w->a.rate, w->a.bend, 1.0, 0.0);
     for (; asked->done < until; asked->done++) {
       const double at = along_line(m, w, asked, asked->done, begin);
@@ -2221,11 +2227,19 @@ static int follow(const Model *m, Work *w, Asked *asked, const double *begin, co
   return MGK_OK;
 }
 
-/* The first node of a line from the state x. */
-static int first_node(const Model *m, Work *w, const double *x) {
-  memcpy(w->a.x, x, m->states * sizeof(double));
+/* Node a closed and factored at the state kept. */
+static int stood(const Model *m, Work *w) {
+  if (w->stands) return MGK_OK;
+  memcpy(w->a.x, w->x, m->states * sizeof(double));
+  const int status = closed(m, w, w->a.x, w->a.matrix, CLOSED);
+  w->stands = !status && !m->passives;
+  return status;
+}
+
+/* The first node of a line from the state kept. */
+static int first_node(const Model *m, Work *w) {
   *w->a.at = w->told = 0.0;
-  int status = closed(m, w, w->a.x, w->a.matrix, CLOSED);
+  int status = stood(m, w);
   if (!status) status = made_node(m, w, &w->a);
   if (!status) set_border(m, w, &w->a);
   return status;
@@ -2244,28 +2258,27 @@ static double towards(int n, const double *p, const double *q, double *out) {
 static int along(const Model *m, Work *w, Asked *asked) {
   const int d = m->drives;
   while (asked->done < asked->count) {
-    const double here = 1e-14 * raised(1.0, size_of(w->drive, d));
+    const double here = 1e-14 * raised(1.0, size_of(w->drive, d)), *end = w->drive;
     double length = 0.0;
-    int until = asked->done, status;
-    while (until < asked->count && (length = towards(d, w->drive, asked->q + at_place(asked, until) * d, w->direction)) <= here) until++;
-    if (length <= here) {
-      FOR(i, d) w->direction[i] = i == 0;
-      if ((status = first_node(m, w, w->x))) return status;
-      *w->b.at = 0.0, w->b.condition = w->a.condition;
-      memcpy(w->b.x, w->a.x, m->states * sizeof(double));
-      for (; asked->done < until; asked->done++) if ((status = read_off(m, w, asked, 0.0))) return status;
-      continue;
-    }
-    for (until++; until < asked->count; until++) {
-      const double *last = asked->q + at_place(asked, until - 1) * d, *next = asked->q + at_place(asked, until) * d;
+    int rest = asked->done, status; /* positions up to it are where the drives stand */
+    while (rest < asked->count && (length = towards(d, w->drive, asked->q + at_place(asked, rest) * d, w->direction)) <= here) rest++;
+    int until = rest;
+    if (rest == asked->count) FOR(i, d) w->direction[i] = i == 0;
+    for (; until < asked->count; until++) {
+      const double *next = asked->q + at_place(asked, until) * d;
       double ahead = 0.0, square = 0.0;
-      FOR(i, d) ahead += (next[i] - last[i]) * w->direction[i], square += (next[i] - last[i]) * (next[i] - last[i]);
+      FOR(i, d) ahead += (next[i] - end[i]) * w->direction[i], square += (next[i] - end[i]) * (next[i] - end[i]);
       if (!(ahead >= (1.0 - STRAIGHT_ON) * sqrt(square))) break;
+      end = next;
     }
-    const double *end = asked->q + at_place(asked, until - 1) * d;
+    if (until > rest) length = towards(d, w->drive, end, w->direction);
+    if ((status = first_node(m, w))) return status;
+    *w->b.at = 0.0, w->b.condition = w->a.condition;
+    memcpy(w->b.x, w->a.x, m->states * sizeof(double));
+    for (; asked->done < rest; asked->done++) if ((status = read_off(m, w, asked, 0.0))) return status;
+    if (rest == asked->count) break;
+    w->stands = 0;
     memcpy(w->line_begin, w->drive, d * sizeof(double));
-    length = towards(d, w->drive, end, w->direction);
-    if ((status = first_node(m, w, w->x))) return status;
     if ((status = follow(m, w, asked, w->line_begin, end, length, until))) return status;
     memcpy(w->drive, end, d * sizeof(double)); /* the last position on it stands in w->x */
   }
@@ -2274,17 +2287,23 @@ static int along(const Model *m, Work *w, Asked *asked) {
 
 /* --- what is called ---------------------------------------------------------------------------------------------------------------- */
 
-static void begin(const Model *m, Work *w) {
+/* Begun at the start of P, and closed there. */
+static int begun(const Model *m, Work *w) {
   memcpy(w->x, m->start, m->states * sizeof(double));
   FOR(i, m->drives) w->drive[i] = w->x[m->column_state[m->drive[i]]];
   FOR(f, m->factors) w->begun[f] = w->angle[f] = 0.0;
   memcpy(w->border, m->border, (size_t)m->passives * m->columns * sizeof(double));
+  w->stands = 0;
+  const int status = stood(m, w);
+  if (!status) memcpy(w->x, w->a.x, m->states * sizeof(double));
+  coordinates(m, w, w->x, w->record + m->states);
+  return status;
 }
 
 static void opened(const int *I, const double *P, void *state, Model *m, Work *w) {
   read_tables(I, P, m);
   lay_out(m, state, w);
-  w->steps = w->evaluations = w->factorizations = 0;
+  w->steps = w->evaluations = w->factorizations = w->stands = 0;
 }
 
 int mgk_start(const int *I, const double *P, void *state) {
@@ -2292,10 +2311,7 @@ int mgk_start(const int *I, const double *P, void *state) {
   Work w;
   if (I[MGK_IS_FORMAT] != MGK_FORMAT) return MGK_FORMAT_ERROR;
   opened(I, P, state, &m, &w);
-  begin(&m, &w);
-  const int status = closed(&m, &w, w.x, NULL, CLOSED);
-  coordinates(&m, &w, w.x, w.record + m.states);
-  return status;
+  return begun(&m, &w);
 }
 
 int mgk_path(const int *I, const double *P, void *state, int count, const int *order, const double *q, const double *v, const double *a,
@@ -2303,10 +2319,11 @@ int mgk_path(const int *I, const double *P, void *state, int count, const int *o
   Model m;
   Work w;
   int places[MGK_PARTS + 1];
-  int status = mgk_start(I, P, state);
   *done = 0;
-  if (status) return status;
+  if (I[MGK_IS_FORMAT] != MGK_FORMAT) return MGK_FORMAT_ERROR;
   opened(I, P, state, &m, &w);
+  int status = begun(&m, &w);
+  if (status) return status;
   mgk_record(I, places);
   Asked asked = {count, with_forces, 0, order, places, q, v, a, out, largest, places[with_forces ? MGK_PARTS : MGK_POINTS], NULL, 0, 0};
   status = along(&m, &w, &asked);

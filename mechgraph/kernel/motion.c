@@ -357,7 +357,7 @@ static int tried(const Model *m, Work *w, Motion *at, double h, double *off) {
 
 /* The motion followed for a time. */
 static int followed(const Model *m, Work *w, Motion *at, double time) {
-  double done = 0.0, off;
+  double done = 0.0, off = 0.0;
   int steps = 0;
   while (done < time) {
     int status = begun_step(m, w, at);
