@@ -365,9 +365,10 @@ def test_a_weak_spring_winds_up_whatever_the_unit_of_time(second: float) -> None
 
 
 @pytest.mark.usefixtures("compiled")
-def test_a_peak_of_the_mass_beside_a_change_point_is_not_stepped_over() -> None:
-    """A crank whose pin passes the pivot of its guide at .003: w = sqrt(E / M), so that t is the integral of sqrt(M / E) over its angle."""
-    far, begin, turn = 1.003, 4.5, 4.6 * np.pi
+@pytest.mark.parametrize(("off", "begin"), [(0.003, 4.5), (0.1, np.pi)])
+def test_a_peak_of_the_mass_beside_a_change_point_is_not_stepped_over(off: float, begin: float) -> None:
+    """A crank whose pin passes the pivot of its guide at a distance: t is the integral of sqrt(M / E) over its angle."""
+    far, turn = 1.0 + off, 4.6 * np.pi
     pin, pivot = np.array([np.cos(begin), np.sin(begin), 0.0]), np.array([far, 0.0, 0.0])
     links = [mg.Link("frame"), mg.Link("block")]
     links += [mg.Link(name, 1.0, at, np.eye(3)) for name, at in (("crank", (0, 0, 0)), ("guide", pivot))]
@@ -383,7 +384,7 @@ def test_a_peak_of_the_mass_beside_a_change_point_is_not_stepped_over() -> None:
         return float(np.sqrt(1.0 + ratio**2))
 
     peaks = 2.0 * np.pi * np.arange(1, 4)[:, None] + [-0.1, -0.01, 0.0, 0.01, 0.1]
-    ends = [begin, *np.sort(peaks.ravel()).tolist(), begin + turn]
+    ends = [begin, *(at for at in np.sort(peaks.ravel()).tolist() if at < begin + turn), begin + turn]
     parts = [scipy.integrate.quad(root_of_mass, *part, epsabs=1e-11)[0] for part in pairwise(ends)]
     r = mg.respond(mg.Mechanism("guide", links, pairs), (0.0, sum(parts) / root_of_mass(begin)), rates={"A": 1.0})
-    assert r["A"].position[-1, 0] == pytest.approx(turn, abs=3e-6)
+    assert r["A"].position[-1, 0] == pytest.approx(turn, abs=1e-6)

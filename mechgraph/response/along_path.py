@@ -36,7 +36,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import Any
 
@@ -228,6 +228,8 @@ class Way:
         self._next, self._ended = 0.8, False
         self.pieces: list[SeriesPiece] = []
         self._starts: list[float] = []
+        self._roots: list[Array] = []
+        self._metrics = [0.0]
         here = Paths([self._drives(np.zeros(2))])
         self._nodes = self.follower.follow(x[:, None], here).nodes
 
@@ -238,6 +240,28 @@ class Way:
     def piece(self, at: float) -> SeriesPiece:
         """The piece in which a place lies."""
         return self.pieces[max(0, bisect_right(self._starts, at) - 1)]
+
+    def number(self, at: float) -> float:
+        """How many pieces lie before a place, in parts of the last."""
+        if not self.pieces:
+            return 0.0
+        k = max(0, bisect_right(self._starts, at) - 1)
+        return k + (at - self._starts[k]) / abs(self.pieces[k].end - self.pieces[k].begin)
+
+    def metric(self, at: float) -> float:
+        """The integral of the root of the mass up to a place."""
+        for p in self.pieces[len(self._roots) :]:
+            root = _SERIES @ np.sqrt(np.maximum(_VALUES @ p.series[:, 0], 0.0))
+            self._roots.append(np.asarray(0.5 * abs(p.end - p.begin) * np.polynomial.chebyshev.chebint(root, lbnd=-1)))
+            self._metrics.append(self._metrics[-1] + float(self._roots[-1].sum()))
+        k = max(0, bisect_right(self._starts, at) - 1)
+        z = 2.0 * (self.number(at) - k) - 1.0
+        return self._metrics[k] + float(np.cos(_ORDERS * math.acos(min(1.0, max(-1.0, z)))) @ self._roots[k])
+
+    @property
+    def size(self) -> float:
+        """The mean root of the mass so far."""
+        return self.metric(self.length) / self.length
 
     def extend(self, most: float) -> None:
         """Tabulate the next part, up to ``most`` at first."""
@@ -407,18 +431,15 @@ class Way:
 
     def _series(self, spans: list[tuple[float, float]]) -> tuple[Array, Array, Array]:
         """Series ``(spans, POINTS, 4 + m)`` over spans of places, how steep the path is in each, and the noise of the series."""
-        nodes = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
-        at = np.concatenate([0.5 * (a + b) + 0.5 * (b - a) * nodes for a, b in spans])
+        at = np.concatenate([0.5 * (a + b) + 0.5 * (b - a) * _NODES for a, b in spans])
         values, steepness, condition = self._tabulated_at(at)
         values, steepness, condition = (
             part.T.reshape(len(spans), POINTS, *part.shape[:-1]) for part in (values, steepness, condition)
         )
-        T = np.polynomial.chebyshev.chebvander(nodes, POINTS - 1) * (2.0 / POINTS)
-        T[:, 0] *= 0.5
         # rounding over the square of the distance from a singular position, which the condition measures
         # rounding of what a series is made of, times the square of the condition
         noise = 1e-14 * condition.max(axis=1) ** 2
-        return np.einsum("pk,spq->skq", T, values), steepness.max(axis=1), noise
+        return np.einsum("kp,spq->skq", _SERIES, values), steepness.max(axis=1), noise
 
     def _tabulated_at(self, at: Array) -> tuple[Array, Array, Array]:
         """Terms ``(4 + m, T)`` at places ``(T,)``, how steep the path is there and the condition ``(T,)``."""
@@ -509,12 +530,27 @@ class Arc:
                 return self.piece(u)
         return None if at > way.length or not way.length else (way.piece(at), turns)
 
-    def number(self, u: float) -> float:
-        """How many pieces lie between the beginning and a place, below zero on the way back."""
+    def home(self, u: float) -> tuple[float, float, Way]:
+        """Whole turns before a place, the distance from the beginning without them, and the way on which it is."""
         turns = 0.0 if self.advance is None else self._sense * math.floor(self._sense * (u - self.begin) / self.turn)
         at = u - self.turn * turns - self.begin
-        way = self._way((at > 0) - (at < 0) or self._first_way)
-        return turns * len(way.pieces) + way.sense * bisect_right(way._starts, way.sense * at)
+        return turns, at, self._way((at > 0) - (at < 0) or self._first_way)
+
+    def number(self, u: float) -> float:
+        """How many pieces of the table lie between the beginning and a place, in parts of the last, below zero on the way back."""
+        turns, at, way = self.home(u)
+        return turns * (self._around[0] if turns else 0.0) + way.sense * way.number(abs(at))
+
+    def metric(self, u: float) -> float:
+        """The integral of the root of the mass from the beginning to a place."""
+        turns, at, way = self.home(u)
+        return turns * (self._around[1] if turns else 0.0) + math.copysign(way.metric(abs(at)), at)
+
+    @cached_property
+    def _around(self) -> tuple[float, float]:
+        """Number and metric over a whole turn after which all comes back."""
+        way = self._way(int(self._sense))
+        return way.number(self.turn), way.metric(self.turn)
 
     def tabulated(self) -> tuple[Array, Array]:
         """All pieces in order, their ends and series ``(n, 2 + 4 POINTS)``; places between which they lie, and between which more may be
@@ -634,7 +670,7 @@ class PathStage:
             z = self._in_piece(u)
         # Chebyshev polynomials by their angles: one cosine each
         angle = math.acos(min(1.0, max(-1.0, z)))
-        return self._in_units(np.cos(_ORDERS * angle) @ self._piece.series)
+        return self._in_units(np.cos(_ORDERS[:-1] * angle) @ self._piece.series)
 
     def _in_piece(self, u: Any) -> Any:
         """Places from -1 to 1 in the piece last used."""
@@ -662,7 +698,7 @@ class PathStage:
             here = left & (np.abs(z) <= 1.0)
             if here.any() and self._piece is not None:
                 angles = np.arccos(z[here])
-                out[:, here] = self._in_units(np.cos(angles[:, None] * _ORDERS) @ self._piece.series).T
+                out[:, here] = self._in_units(np.cos(angles[:, None] * _ORDERS[:-1]) @ self._piece.series).T
                 left &= ~here
         return out
 
@@ -686,22 +722,28 @@ class PathStage:
     ) -> tuple[Callable[[Array], Array], Array] | None:
         """See ``Stage``."""
         of = self.arc.terms
-        # pieces of the table in one step from which on a peak of the mass may lie between its evaluations
-        loads, peaks = bool(of.stored or of.rest), abs(self.arc.number(float(y[0])) - self._number) > 4
-        if not (loads or peaks):
+        if not (of.stored or of.rest):
             return None
 
-        def along(times: Array) -> Array:
-            """Accelerations by loads, and the rate of the place, which the mass decides."""
+        def accelerations(times: Array) -> Array:
             u, w = dense(times)[:2]
             terms = self._terms_at(u)
             if not (terms[0] > 0.0).all():
-                return np.full((loads + peaks, len(times)), np.nan)
-            v = w / (size := np.sqrt(terms[0] / self._mass))
-            rows = [np.add(*of.forces(terms[OF_LOADS:], v, times)) / (size * self._mass)] if loads else []
-            return np.stack([*rows, v] if peaks else rows)
+                return np.full((1, len(times)), np.nan)
+            size = np.sqrt(terms[0] / self._mass)
+            return np.add(*of.forces(terms[OF_LOADS:], w / size, times))[None] / (size * self._mass)
 
-        return along, y[[1] * loads + [0] * peaks]
+        return accelerations, y[1:2]
+
+    def astray(self, t: float, y: Array, begin: float, dense: Callable[[Any], Array], allowed: Array) -> bool:
+        """See ``Stage``: the integral of ``w`` over time is that of ``sqrt(M / M_0)`` over the path, which has no peaks in time."""
+        # pieces of the table in one step from which on a peak of the mass may lie between its evaluations
+        if abs(self.arc.number(float(y[0])) - self._number) <= 1:
+            return False
+        u, w = dense(begin + (t - begin) * _IN_STEP)[:2]
+        parts = 0.25 * (t - begin) * math.sqrt(self._mass) * (w[3:].reshape(2, -1) @ _GAUSS[1])
+        missed = np.abs(np.diff([self.arc.metric(place) for place in u[:3].tolist()]) - parts).sum()
+        return not float(missed) <= allowed[0] * self.arc.home(float(y[0]))[2].size
 
     def accepted(self, t: float, y: Array) -> bool:
         """See ``Stage``."""
@@ -738,4 +780,9 @@ def _same(system: System, variants: Any) -> System:
     return system
 
 
-_ORDERS = np.arange(POINTS, dtype=float)
+_ORDERS = np.arange(POINTS + 1, dtype=float)
+_NODES = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
+_VALUES = np.polynomial.chebyshev.chebvander(_NODES, POINTS - 1)
+_SERIES = _VALUES.T * np.where(_ORDERS[:-1], 2.0, 1.0)[:, None] / POINTS
+_GAUSS = np.polynomial.legendre.leggauss(4)
+_IN_STEP = np.concatenate([[0.0, 0.5, 1.0], 0.25 + 0.25 * _GAUSS[0], 0.75 + 0.25 * _GAUSS[0]])

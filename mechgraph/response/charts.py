@@ -472,6 +472,10 @@ class ChartStage:
         rates = np.concatenate([y[self.n : -2], self.task.prescribed_at(np.array([t]))[1, :, 0]])
         return partial(self._along, dense), rates
 
+    def astray(self, t: float, y: Array, begin: float, dense: Callable[[Any], Array], allowed: Array) -> bool:
+        """See ``Stage``."""
+        return False
+
     def _along(self, dense: Callable[[Any], Array], t: Array) -> Array:
         """Accelerations ``(n + p, T)`` at times of a step, see ``unsmooth``; those by the kernel are of all loads."""
         y, own = dense(t), np.zeros((len(self.chart.moving), len(t)))

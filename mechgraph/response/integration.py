@@ -209,6 +209,9 @@ class Stage(Protocol):
         is smooth.
         """
 
+    def astray(self, t: float, y: Array, begin: float, dense: Callable[[Any], Array], allowed: Array) -> bool:
+        """Whether a step to a time ``t`` with ``y`` has left the motion further than ``allowed (k,)``, where the stage knows."""
+
     def accepted(self, t: float, y: Array) -> bool:
         """Keep what is known at the end of an accepted step; whether the stage serves on."""
 
@@ -441,6 +444,8 @@ class Integration:
             found = stage.unsmooth(end, stepper.y, along)
             return found and overlooked(found[0], *inside, self.apart, self.rtol * np.abs(found[1]) + self.atol)
 
+        if stage.astray(end, stepper.y, begin, dense, self.rtol * np.abs(stepper.y) + self.atol):
+            return True
         if (seen := missed(dense)) is not False:
             return bool(seen)
         slopes = np.stack([stage.rates(*one) for one in (before, (end, stepper.y))])
