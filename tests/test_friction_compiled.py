@@ -5,6 +5,7 @@ import warnings
 import numpy as np
 import pytest
 from test_machines_as_built import COEFFICIENTS, collar, shaft
+from test_rolling import ball
 
 import mechgraph as mg
 
@@ -48,14 +49,14 @@ def rough(m: mg.Mechanism, seed: int, many: bool) -> list[mg.Friction]:
     return dry
 
 
-def same(one: mg.Solution, other: mg.Solution, within: float = 1e-10) -> None:
+def same(one: mg.Solution, other: mg.Solution, within: float = 1e-10, least: float = 1e-300) -> None:
     """All that friction tells is the same in two solutions."""
     assert one.status.tolist() == other.status.tolist()
     for p in one.mechanism.pairs:
         for name in ("effort", "applied_effort", "friction", "normal_forces", "sliding", "reaction", "effort_range"):
             a, b = getattr(one[p.name], name), getattr(other[p.name], name)
             np.testing.assert_allclose(
-                b, a, rtol=within, atol=within * np.nanmax(np.abs(a), initial=1e-300), err_msg=f"{p.name}.{name}"
+                b, a, rtol=within, atol=within * np.nanmax(np.abs(a), initial=least), err_msg=f"{p.name}.{name}"
             )
     for name, lost in one.losses.items():
         np.testing.assert_allclose(other.losses[name], lost, rtol=within, atol=within * np.nanmax(lost, initial=1e-300))
@@ -155,3 +156,49 @@ def test_hot_and_in_studies() -> None:
     jammed = mg.compile(collar(0.3))
     assert np.isnan(jammed(0.0, 1.0)).all()
     assert jammed.status == "friction not solved"
+
+
+@pytest.mark.usefixtures("compiled")
+@pytest.mark.parametrize("seed", range(2))
+def test_feet_that_may_open(seed: int) -> None:
+    """Three feet at random on a floor that a plate slides and turns on; also pressed so that one would have to pull."""
+    rng = np.random.default_rng(seed)
+    at = rng.uniform(-1, 1, (3, 2))
+    on = {"axis": (0, 0, 1), "closed": "force", "restitution": 0.1}
+    feet = [mg.Pair(f"K{i}", "Sp", "ground", "plate", point=(*p, 0), **on) for i, p in enumerate(at)]
+    guide = mg.Pair("G", "Fr", "ground", "plate", point=(0, 0, 0.2), axis=(0, 0, 1))
+    push = mg.Wrench("plate", force=(*rng.uniform(-20, 20, 2), -100), point=(*at.mean(axis=0), 0))
+    loads = [push, *(mg.Friction(p.name, mu=0.3) for p in feet)]
+    m = mg.Mechanism("plate", pairs=[*feet, guide], drives=["G.Tx", "G.Ty", "G.Rz"], loads=loads)
+    moves = {
+        n: mg.Motion([0.0, 0.1], velocity=v) for n, v in zip(("G.Tx", "G.Ty", "G.Rz"), (0.7, -0.3, 0.5), strict=True)
+    }
+    s = mg.solve(m, moves, engine="dense")
+    same(s, mg.solve(m, moves, engine="compiled"), 1e-12, least=100.0)
+    efforts = [s["G"].effort[1, guide.freedom_names.index(n)] for n in moves]
+    np.testing.assert_allclose(mg.compile(m)([0.1] * 3, [0.7, -0.3, 0.5], [0.0] * 3), efforts, rtol=1e-12)
+
+
+def stage() -> mg.Mechanism:
+    """Two gears that rub, on journals that rub too."""
+    teeth = mg.SpurGears("t", "p", "w", teeth=(20, 40), module=0.002)
+    links = [mg.Link("frame"), *(mg.Link(n, 1.0, (x, 0, 0), 0.01 * np.eye(3)) for n, x in (("p", 0.0), ("w", 0.06)))]
+    pairs = [mg.Pair(n, "R", "frame", n, point=(x, 0, 0), axis=(0, 0, 1)) for n, x in (("p", 0.0), ("w", 0.06))]
+    dry = [mg.Friction("p", mu=0.1, radius=0.01), mg.Friction("t", mu=0.08), mg.Friction("w", mu=0.1, radius=0.01)]
+    return mg.Mechanism(
+        "stage", links, pairs, couplings=[teeth], loads=[mg.Effort("p", 3.0), mg.Effort("w", 1.0), *dry]
+    )
+
+
+@pytest.mark.usefixtures("compiled")
+@pytest.mark.parametrize(
+    "machine", [ball(0.3, 0.9), ball(0.3, 0.9, restitution=0.0), stage()], ids=("ball", "opens", "gears")
+)
+def test_what_may_roll_slips_in_time_as_by_numpy(machine: mg.Mechanism) -> None:
+    """The kernel carries it while nothing rolls."""
+    one, other = (mg.respond(machine, [0.0, 0.1, 0.2], engine=engine) for engine in ("auto", "dense"))
+    assert (one.engine, other.engine) == ("compiled", "dense")
+    for p in machine.pairs:
+        for name in ("position", "velocity", "acceleration", "friction", "normal_forces"):
+            a, b = getattr(one[p.name], name), getattr(other[p.name], name)
+            np.testing.assert_allclose(a, b, rtol=1e-11, atol=1e-11 * np.abs(b).max(initial=1e-300))

@@ -46,7 +46,7 @@ def compile(m: Mechanism) -> Compiled:
     ------
     DeclarationError
         Names what the kernel cannot carry: curves, surfaces, loads that are functions, links with several passive freedoms, gears and
-        belts whose centers move, friction of contacts that may open.
+        belts whose centers move.
     MissingExtraError
         The kernel was not installed, and there is no C compiler.
 

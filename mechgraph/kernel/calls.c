@@ -38,9 +38,9 @@ int mgk_table(const int *I, const double *P, void *state, int n, const double *m
 
 /* The right-hand side of the equations of motion (motion.c) at states one by one: y[count][2n] = u, v of the first n drives, increments u
  * counted from x0, where the others have the positions, rates and accelerations p[count][3][drives - n]. Every state is predicted from a
- * `known` one, x, q', q'', a time h before; found: the same of this one. head, way[count][columns]: what slips (NULL: nothing rubs).
+ * `known` one, x, q', q'', a time h before; found: the same of this one. rough, way[count][columns]: what slips (NULL: nothing rubs).
  * out[count][2n + 4]: u', v', what friction takes, the power, the steepness and the condition. */
-int mgk_motion(const int *I, const double *P, void *memory, int n, int stored, const double *x0, const int *head, int count, const double *y,
+int mgk_motion(const int *I, const double *P, void *memory, int n, int stored, const double *x0, const int *rough, int count, const double *y,
                const double *p, const double *way, const double *known, const double *h, double *found, double *out) {
   Model m;
   Work w;
@@ -54,7 +54,7 @@ int mgk_motion(const int *I, const double *P, void *memory, int n, int stored, c
     int status = closed_at(&m, &w, &at, n, x0, y, p, found);
     if (status) return status;
     FOR(i, d) at.y[i] = i < n ? y[n + i] : p[d - 2 * n + i];
-    status = accelerations(&m, &w, &at, n, found, at.y, p + 2 * (d - n), stored, head, way, out + 2 * n);
+    status = accelerations(&m, &w, &at, n, found, at.y, p + 2 * (d - n), stored, rough, way, out + 2 * n);
     if (status) return status;
     rates_of_increments(&m, &w, &at, n, x0, found, out);
     memcpy(out + n, at.a, n * sizeof(double));

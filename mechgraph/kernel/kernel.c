@@ -702,21 +702,23 @@ static void accelerate(const Model *m, Work *w, const double *ddq) {
 }
 
 /* The first n of `wide` columns reduced to those of the identity, in place: Gauss and Jordan; what stands behind them is solved for.
- * Whether they are independent. */
+ * Whether they are independent: the sign of their determinant, or 0. */
 static int reduced(double *U, int n, int wide) {
+  int sign = 1;
   FOR(i, n) {
     int best = i;
     for (int r = i + 1; r < n; r++) if (fabs(U[wide * r + i]) > fabs(U[wide * best + i])) best = r;
     if (!(fabs(U[wide * best + i]) > 1e-12)) return 0;
     FOR(j, wide) { const double t = U[wide * i + j]; U[wide * i + j] = U[wide * best + j], U[wide * best + j] = t; }
     const double d = 1.0 / U[wide * i + i];
+    if ((best != i) != (REAL_PART(d) < 0.0)) sign = -sign;
     for (int j = i; j < wide; j++) U[wide * i + j] *= d;
     FOR(r, n) if (r != i) {
       const double g = U[wide * r + i];
       if (g != 0.0) for (int j = i; j < wide; j++) U[wide * r + j] -= g * U[wide * i + j];
     }
   }
-  return 1;
+  return sign;
 }
 
 /* The inverse of n columns beside them. Whether there is one. */
@@ -1343,6 +1345,28 @@ static void force_at(const double *p, const double *f, double size, double *out)
   cross(p, out + 3, out);
 }
 
+/* The velocity at which bodies slide at a point that touches, by the twist of one relative to the other. */
+static void sliding_at(const double *twist, const double *at, double *out) {
+  cross(twist, at, out);
+  FOR(i, 3) out[i] += twist[3 + i];
+}
+
+/* Relative twist of the links of a place that rubs, of gear b against gear a where it is one of teeth, at rates of all freedoms. */
+static void twist_at(const Model *m, const Work *w, const int *load, const double *rate, double *twist) {
+  const int teeth = load[0] == MGK_TEETH, begin = teeth ? m->line_first[load[1]] : 0, end = teeth ? m->line_first[load[1] + 1] : 1;
+  memset(twist, 0, 6 * sizeof(double));
+  for (int s = begin; s < end; s++) {
+    const int k = teeth ? m->line_step[2 * s] : load[1], sense = teeth ? m->line_step[2 * s + 1] : 1;
+    for (int c = first_column(m, k); c < first_column(m, k + 1); c++) add_part(6, sense * rate[c], w->S + 6 * c, twist);
+  }
+}
+
+/* Where bodies touch that press on each other along n: behind the radius of b's from the middle of their frame, before a factor or (-1) last. */
+static void touching(const Work *w, int pair, int before, const double *n, double radius, double *at) {
+  const double *X = before < 0 ? w->end + 12 * pair : w->frame + 12 * before;
+  FOR(i, 3) at[i] = X[4 * i + 3] - radius * n[i];
+}
+
 /* Size of a friction wrench -f N U on gear b that leaves an efficiency of the power, see force/friction.py; not a number where none does.
  * `push`: the wrench of a unit normal force, `screws` of gears a and b in the frame X of their carrier, `twist` of b against a. */
 static double part_lost(const double *push, const double *X, const double *screws, const double *twist, const double *U, double efficiency) {
@@ -1367,19 +1391,13 @@ static void rubs_between(const Model *m, const Work *w, const int *load, double 
   const double *n = m->load_number + load[3], arm = n[MGK_RADIUS], efficiency = n[MGK_EFFICIENCY];
   const int l = load[1], other = w->flank[l], slides = REAL_PART(n[MGK_SLIDE_OF]) > 0.5;
   const double *X = w->pose + 12 * m->line[2 * l + 1], sign = other ? -1.0 : 1.0, per = n[MGK_PER + other];
-  double push[6], at[3], twist[6] = {0}, u[3], U[6] = {0};
-  for (int s = m->line_first[l]; s < m->line_first[l + 1]; s++) {
-    const int k = m->line_step[2 * s];
-    for (int c = first_column(m, k); c < first_column(m, k + 1); c++) add_part(6, m->line_step[2 * s + 1] * w->slip[c], w->S + 6 * c, twist);
-  }
+  double push[6], at[3], twist[6], u[3], U[6] = {0};
+  twist_at(m, w, load, w->slip, twist);
   along_line_of(m, w, l, push);
   FOR(i, 6) push[i] *= sign / per;
   point_of(X, n + MGK_MESHES_AT + 3 * other, at);
   memcpy(u, twist, sizeof u);
-  if (slides) {
-    cross(twist, at, u);
-    FOR(i, 3) u[i] += twist[3 + i];
-  }
+  if (slides) sliding_at(twist, at, u);
   *speed = made_unit(u, TURNING * size_of(twist, 6));
   if (slides) force_at(at, u, 1.0, U);
   else memcpy(U, u, sizeof u), *speed = REAL_PART(arm) < 0.0 ? NAN : *speed * arm;
@@ -1399,9 +1417,9 @@ static int rubs_at(const Model *m, Work *w, int t, const int *load) {
   }
   const int k = load[1], kind = load[0], turn = (int)REAL_PART(n[MGK_TURN_OF]), slide = (int)REAL_PART(n[MGK_SLIDE_OF]);
   const double *press = w->pressing + 6 * k, *A = w->frame + 12 * m->first[k], *X = REAL_PART(n[MGK_AT_B]) > 0.5 ? w->end + 12 * k : A, r = n[MGK_RADIUS];
-  double *reads = w->reads + 18 * t, *D = w->exerts + 24 * t, *K = D + 6, *speed = w->sliding + t, twist[6] = {0}, u[3], v[3], p[3] = {X[3], X[7], X[11]};
+  double *reads = w->reads + 18 * t, *D = w->exerts + 24 * t, *K = D + 6, *speed = w->sliding + t, twist[6], u[3], v[3], p[3] = {X[3], X[7], X[11]};
   memset(reads, 0, 18 * sizeof(double)), memset(D, 0, 24 * sizeof(double));
-  for (int c = first_column(m, k); c < first_column(m, k + 1); c++) add_part(6, w->slip[c], w->S + 6 * c, twist);
+  twist_at(m, w, load, w->slip, twist);
   const magnitude rolls = TURNING * size_of(twist, 6);
   if (kind == MGK_CONTACT || kind == MGK_BALL) FOR(i, 3) reads[6 * i + 3 + i] = 1.0;
   if (kind == MGK_BALL) {
@@ -1411,16 +1429,22 @@ static int rubs_at(const Model *m, Work *w, int t, const int *load) {
     FOR(i, 3) D[i] = -part * r * u[i];
     return 3;
   }
+  if (kind == MGK_OPENING) {
+    touching(w, k, turn, w->S + 6 * slide + 3, r, v);
+    sliding_at(twist, v, u);
+    *reads = 1.0, *speed = made_unit(u, rolls);
+    force_at(v, u, -coefficient(n, *speed), D);
+    return 1;
+  }
   if (kind == MGK_CONTACT) {
-    const double *C = slide < 0 ? w->end + 12 * k : w->frame + 12 * slide;
-    double c[3] = {C[3], C[7], C[11]}, normal[3] = {press[3], press[4], press[5]}, M[3], at[3];
+    double c[3], normal[3] = {press[3], press[4], press[5]}, M[3], at[3];
+    touching(w, k, slide, normal, 0.0, c);
     cross(c, press + 3, M);
     FOR(i, 3) M[i] = press[i] - M[i];
     const double size = made_unit(normal, 0.0);
     cross(normal, M, v);
     FOR(i, 3) c[i] += fabs(size) > 0.0 ? v[i] / size : 0.0, at[i] = c[i] - r * normal[i];
-    cross(twist, at, u);
-    FOR(i, 3) u[i] += twist[3 + i];
+    sliding_at(twist, at, u);
     *speed = made_unit(u, rolls);
     const double mu = coefficient(n, *speed);
     force_at(c, u, -mu, D);
@@ -1438,8 +1462,7 @@ static int rubs_at(const Model *m, Work *w, int t, const int *load) {
     FOR(i, 3) M[i] = press[i] - M[i], reads[3 + i] = z[i];
     cross(z, M, v);
     FOR(i, 3) p[i] += fabs(force) > 0.0 ? v[i] / force : 0.0;
-    cross(twist, p, v);
-    FOR(i, 3) v[i] += twist[3 + i];
+    sliding_at(twist, p, v);
     const double across = dot(v, z, 3);
     FOR(i, 3) v[i] -= across * z[i];
     *speed = sqrt(dot(v, v, 3) + r * r * about * about);
@@ -1488,11 +1511,12 @@ static int rubs_at(const Model *m, Work *w, int t, const int *load) {
   return 3;
 }
 
-/* Where in an answer a place reads, and how many numbers there a row of w->reads takes: the reaction of its pair, of teeth a multiplier. */
+/* Where in an answer a place reads, and how many numbers there a row of w->reads takes: the reaction of its pair, of teeth a multiplier, of
+ * what opens the effort in the freedom in which it does. */
 static int read_at(const Model *m, const int *load, int *width) {
-  const int teeth = load[0] == MGK_TEETH;
-  *width = teeth ? 1 : 6;
-  return teeth ? 6 * m->pairs + m->columns + m->line[2 * load[1]] : 6 * load[1];
+  *width = load[0] < MGK_OPENING ? 6 : 1;
+  if (load[0] == MGK_TEETH) return 6 * m->pairs + m->columns + m->line[2 * load[1]];
+  return load[0] == MGK_OPENING ? 6 * m->pairs + (int)REAL_PART(m->load_number[load[3] + MGK_SLIDE_OF]) : 6 * load[1];
 }
 
 /* Pairs that the friction of every place would pass, with their senses: its own, of teeth those on the way. */
@@ -1525,8 +1549,10 @@ static void unit_answers(const Model *m, Work *w, const double *on, size_t apart
   }
 }
 
-/* The equations of the normal vectors of all places, V = a + B n and what of them C V, solved for V = base + per n: rows of w->linear. */
+/* The equations of the normal vectors of all places, V = a + B n and what of them C V, solved for V = base + per n: rows of w->linear. What
+ * may open presses one way alone, n = V: no solution where it has passed infinity while friction grew. */
 static int normal_vectors(const Model *m, Work *w, const int *rubs) {
+  int opens = 0;
   const int R = m->rubs, rows = w->row_of[R], wide = rows + 1 + R, all = 6 * m->pairs + m->columns + m->couplings, *first = w->row_of + R + 1;
   FOR(t, R) for (int p = first[t]; p < first[t + 1]; p++) { /* efforts in a pair, and what it takes up */
     const int k = w->part_of[2 * p], c = first_column(m, k), n = first_column(m, k + 1) - c;
@@ -1552,15 +1578,21 @@ static int normal_vectors(const Model *m, Work *w, const int *rubs) {
         if (6 * k == at && width == 6) sum -= dot(reads, w->takes + 24 * p + 6 * j, 6);
         FOR(f, n) if (own[f] != 0.0) sum += own[f] * dot(reads, w->unit + (size_t)all * (c + f) + at, width);
       }
+      const int signed_ = m->load[4 * rubs[o]] == MGK_OPENING;
       if (j) row[w->row_of[o] + j - 1] -= sum;
-      else base[1 + o] = sum, *base += sum * m->load_number[m->load[4 * rubs[o] + 3] + MGK_PRELOAD];
+      else {
+        *base += sum * m->load_number[m->load[4 * rubs[o] + 3] + MGK_PRELOAD], base[1 + o] = signed_ ? 0.0 : sum;
+        if (signed_) row[w->row_of[o]] -= sum, opens = 1;
+      }
     }
   }
-  return reduced(w->linear, rows, wide);
+  const int sign = reduced(w->linear, rows, wide);
+  return opens ? sign > 0 : sign != 0;
 }
 
-/* Normal forces n = |base + per n| by semismooth Newton, and their vectors; whether they are found and, being a contraction, the only ones. */
-static int normal_forces(const Model *m, Work *w) {
+/* Normal forces n = |base + per n|, or V of what opens, by semismooth Newton, and their vectors; whether they are found and, being a
+ * contraction, the only ones. */
+static int normal_forces(const Model *m, Work *w, const int *rubs) {
   const int R = m->rubs, rows = w->row_of[R], wide = rows + 1 + R;
   double *n = w->normal, *V = w->vector;
   magnitude scale = 0.0;
@@ -1582,7 +1614,7 @@ static int normal_forces(const Model *m, Work *w) {
     if (done) return 1;
     FOR(t, R) {
       const int first = w->row_of[t], rank = w->row_of[t + 1] - first;
-      const double length = rank == 1 ? sense(V[first]) * V[first] : sqrt(dot(V + first, V + first, rank));
+      const double length = m->load[4 * rubs[t]] == MGK_OPENING ? V[first] : rank == 1 ? sense(V[first]) * V[first] : sqrt(dot(V + first, V + first, rank));
       double *row = w->slope + (R + 1) * t;
       FOR(o, R) {
         row[o] = o == t;
@@ -1663,7 +1695,7 @@ static int settled(const Model *m, Work *w, const double *on, size_t apart, cons
     magnitude moved = 0.0;
     w->row_of[0] = 0;
     FOR(t, R) w->row_of[t + 1] = w->row_of[t] + rubs_at(m, w, t, m->load + 4 * rubs[t]);
-    if (!normal_vectors(m, w, rubs) || !normal_forces(m, w)) break;
+    if (!normal_vectors(m, w, rubs) || !normal_forces(m, w, rubs)) break;
     memset(w->rubbed, 0, c * sizeof(double)), memset(w->taken, 0, p * sizeof(double));
     memset(w->teeth, 0, c * sizeof(double)), memset(w->beside, 0, p * sizeof(double)), memset(w->rubbing, 0, 6 * m->couplings * sizeof(double));
     FOR(t, R) {

@@ -31,7 +31,7 @@
 #define MECHGRAPH_KERNEL_H
 #include <stddef.h>
 
-#define MGK_FORMAT 7
+#define MGK_FORMAT 8
 
 /* The counts at the head of I. */
 enum {
@@ -50,11 +50,12 @@ enum { MGK_TURN = 0, MGK_SLIDE = 3, MGK_ROTATION = 6, MGK_POSE = 7 };
  * law in column i, or between points of links i and j: [p[3], q[3],] stiffness, rest, damping.
  * table likewise: [p[3], q[3],] coordinate at its 0, over the rate (1) or the coordinate (0), whether the force at its ends holds beyond them,
  * pieces n, breaks[n + 1], of every piece four coefficients behind its first break, the highest first. */
-enum { MGK_WEIGHT, MGK_WRENCH, MGK_EFFORT, MGK_LAW, MGK_BETWEEN, MGK_TABLE, MGK_TABLE_BETWEEN, MGK_CONTACT, MGK_PLANE, MGK_BALL, MGK_THREAD, MGK_AXIS, MGK_COUPLE, MGK_COLLAR, MGK_TEETH };
+enum { MGK_WEIGHT, MGK_WRENCH, MGK_EFFORT, MGK_LAW, MGK_BETWEEN, MGK_TABLE, MGK_TABLE_BETWEEN, MGK_CONTACT, MGK_PLANE, MGK_BALL, MGK_THREAD, MGK_AXIS, MGK_COUPLE, MGK_COLLAR, MGK_OPENING, MGK_TEETH };
 
 /* From MGK_CONTACT on a place of pair i that rubs, MGK_RUBS of them, numbers below: coefficients in motion and at rest, between which it
  * falls at sliding speeds (0: it does not), preload, whether marker B is its middle (else A), columns of its turn and slide (-1: none; of
- * a contact: the factor before which the frame of its normal force stands), radius, part of the force that a friction circle leaves (1) or
+ * a contact: the factor before which the frame of its normal force stands; of one that opens the column in which it does, and that factor as
+ * the turn), radius, part of the force that a friction circle leaves (1) or
  * not (0), pitch, one over the distance of two places on an axis with the side on which it lies (0: in the middle), width of a guide,
  * tangent of the flank of a thread. Of teeth in place of a pair the number among the lines; the radius is the arm at which they slide against
  * each other's turn, negative where that is not known, or where a slide is named (1) they slide at their point. Behind the others their efficiency (0: they have a

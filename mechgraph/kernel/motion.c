@@ -178,25 +178,58 @@ static void add_accelerations(const Model *m, Work *w, const Motion *at, int n, 
   }
 }
 
-/* Rates that tell where friction acts: those of freedoms that slip, by their `way`, together with the first of them in `head` (-1: none), on
- * the side of their ways also where they have just passed zero, so that the motion is smooth there. */
-static void slipping(const Model *m, Work *w, const int *head, const double *way) {
-  FOR(i, m->columns) {
-    double along = 0.0, fastest = 0.0, slips = 0.0;
-    if (head[i] >= 0) FOR(j, m->columns) if (head[j] == head[i]) {
-      along += w->dq[j] * way[j], fastest = fmax(fastest, fabs(w->dq[j])), slips = fmax(slips, fabs(way[j]));
+/* The rates d at which bodies slide on each other that may roll, at rates of all freedoms: see `force.friction.Grip`; whether a place is theirs. */
+static int slides_of(const Model *m, const Work *w, int of, const double *rate, double *d) {
+  FOR(l, m->loads) {
+    const int *load = m->load + 4 * l, kind = load[0], teeth = kind == MGK_TEETH;
+    const double *n = m->load_number + load[3];
+    double twist[6], normal[3], at[3];
+    if (teeth ? -2 - load[1] != of : load[1] != of || (kind != MGK_CONTACT && kind != MGK_OPENING)) continue;
+    twist_at(m, w, load, rate, twist);
+    memcpy(d, twist, 3 * sizeof(double));
+    if (teeth && n[MGK_SLIDE_OF] <= 0.5) return 1;
+    if (teeth) point_of(w->pose + 12 * m->line[2 * load[1] + 1], n + MGK_MESHES_AT, at);
+    else {
+      const int opens = kind == MGK_OPENING;
+      memcpy(normal, opens ? w->S + 6 * (int)n[MGK_SLIDE_OF] + 3 : w->reaction + 6 * load[1] + 3, sizeof normal);
+      made_unit(normal, 0.0);
+      touching(w, load[1], (int)n[opens ? MGK_TURN_OF : MGK_SLIDE_OF], normal, n[MGK_RADIUS], at);
     }
-    w->slip[i] = !(slips > 0.0) ? 0.0 : fastest <= VANISHING ? VANISHING * way[i] : along < 0.0 ? -w->dq[i] : w->dq[i];
+    sliding_at(twist, at, d);
+    if (!teeth) add_part(3, -dot(d, normal, 3), normal, d);
+    return 1;
+  }
+  return 0;
+}
+
+/* Rates that tell where friction acts: those of freedoms that slip, by their `way`, on the side of their ways also where they have just passed
+ * zero, so that the motion is smooth there. `rough`: how many slip together, then of each how many freedoms and these, and of bodies that
+ * may roll on each other their pair (of teeth -2 - line, else -1). */
+static void slipping(const Model *m, Work *w, const int *rough, const double *way) {
+  const int *one = rough + 1;
+  memset(w->slip, 0, m->columns * sizeof(double));
+  FOR(r, *rough) {
+    const int n = one[0], *column = one + 2;
+    double fastest = 0.0, slips = 0.0, along = 0.0, now[3], before[3], least = VANISHING;
+    FOR(i, n) {
+      const int c = column[i];
+      along += w->dq[c] * way[c], fastest = fmax(fastest, fabs(w->dq[c])), slips = fmax(slips, fabs(way[c]));
+    }
+    if (one[1] != -1 && slides_of(m, w, one[1], w->dq, now) && slides_of(m, w, one[1], way, before)) {
+      least = fmax(least, 100.0 * TURNING * fastest), fastest = size_of(now, 3), along = dot(now, before, 3);
+    }
+    FOR(i, n) w->slip[column[i]] = !(slips > 0.0) ? 0.0 : fastest <= least ? VANISHING * way[column[i]] : along < 0.0 ? -w->dq[column[i]] : w->dq[column[i]];
+    one = column + n;
   }
 }
 
 /* Friction of what slips, beside the accelerations without it, whose inertia stands in w->inertial: adds to at->a what it brings. */
-static int rubbing(const Model *m, Work *w, Motion *at, int n, const int *head, const double *way) {
+static int rubbing(const Model *m, Work *w, Motion *at, int n, const int *rough, const double *way) {
   const int d = m->drives, c = m->columns, links = 6 * m->links, places[MGK_PARTS + 1] = {0};
   if (efforts(m, w)) return MGK_SINGULAR;
   const int status = borne_on_flanks(m, w, w->inertial, w->record, places);
   if (status) return status;
-  slipping(m, w, head, way);
+  slipping(m, w, rough, way);
   double *more = at->off;
   memset(at->yields, 0, (size_t)links * c * sizeof(double));
   FOR(i, c) {
@@ -215,9 +248,9 @@ static int rubbing(const Model *m, Work *w, Motion *at, int n, const int *head, 
 
 /* Accelerations of the first n drives (at->a) at a closed state just factored, with rates v of all drives and accelerations p of the others.
  * In w the rates and accelerations of all freedoms. `power`, unless NULL: what friction takes, and the power of all loads but the first
- * `stored`, and of the prescribed drives. `head`, `way`: see `slipping`. */
+ * `stored`, and of the prescribed drives. `rough`, `way`: see `slipping`. */
 static int accelerations(const Model *m, Work *w, Motion *at, int n, const double *x, const double *v, const double *p, int stored,
-                         const int *head, const double *way, double *power) {
+                         const int *rough, const double *way, double *power) {
   const int d = m->drives, c = m->columns, links = 6 * m->links;
   if (sensitivity(m, w, at) > INDEPENDENT) return MGK_CONTRADICTION;
   double *a = at->a;
@@ -242,7 +275,7 @@ static int accelerations(const Model *m, Work *w, Motion *at, int n, const doubl
   accelerated(n, d, at->mass, at->unit, at->force, a);
   add_accelerations(m, w, at, n, a);
   if (way) {
-    const int unsure = rubbing(m, w, at, n, head, way);
+    const int unsure = rubbing(m, w, at, n, rough, way);
     if (unsure) return unsure;
     if (power) power[0] = -dot(w->dq, w->rubbed, c), power[1] -= power[0];
   }

@@ -46,7 +46,7 @@ from mechgraph.pairs.factors import ConstantScrew, Factor, Freedom, Rotation
 
 Integers = NDArray[np.int32]
 
-FORMAT = 7
+FORMAT = 8
 PARTS = (
     "x", "coordinates", "dq", "ddq", "closure", "condition", "points", "reactions", "efforts", "given", "loads", "stress", "stress_efforts",
     "coupled", "multipliers", "multiplier_stress", "coupled_stress", "shaking", "balance", "power",
@@ -482,7 +482,7 @@ def _orders(begin: Array, q: Array, batch: tuple[int, ...]) -> tuple[Integers, I
 
 WEIGHT, WRENCH, EFFORT, LAW, BETWEEN, TABLE, TABLE_BETWEEN, CONTACT = range(8)
 """Kinds of loads, as in ``kernel.h``."""
-RUBBING = ("contact", "plane", "ball", "thread", "axis", "couple", "collar")
+RUBBING = ("contact", "plane", "ball", "thread", "axis", "couple", "collar", "opening")
 """Ways in which pairs rub, in the order of their kinds from ``CONTACT`` on; behind them teeth."""
 
 
@@ -566,8 +566,6 @@ def why_not_load(load: Load, m: Mechanism) -> str | None:
         why = f"acts between points and reads the freedom {load.reads_freedom!r}"
     elif isinstance(load, Law) and load.in_freedom is None and load.along is not None:
         why = "acts along a fixed direction"
-    elif isinstance(load, Friction) and load.of in m.pair_index and m.pair(load.of).type.opens:
-        why = "is friction of a pair that may open"
     return f"load {load.where.removesuffix(': ')} {why}" if why else None
 
 
@@ -647,7 +645,12 @@ def _friction(places: _Places, load: Any, out: Acting) -> None:
         turn, slide = (-1 if j is None else first + j for j in (rubs.turn, rubs.slide))
         if rubs.way == "contact":
             slide = places.before(k, next(iter(row.reactions or ())).frame)
-        radius = {"contact": pair.radius_b, "collar": load.thrust_radius}.get(rubs.way, load.radius)
+        if rubs.way == "opening":
+            assert row.gap is not None
+            turn, slide = places.before(k, row.gap), first + row.gap
+        radius = {"contact": pair.radius_b, "opening": pair.radius_b, "collar": load.thrust_radius}.get(
+            rubs.way, load.radius
+        )
         mu, stribeck, radius, width = (0.0 if v is None else v for v in (load.mu, load.stribeck, radius, load.width))
         numbers = (
             mu, load.coefficient_at_rest, stribeck / L, load.preload / L, load.on == "b", turn, slide, radius / L, load.model == "circle",

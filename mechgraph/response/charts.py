@@ -357,7 +357,7 @@ class ChartStage:
         self.engine = task.engine if task.library is None else COMPILED
         self._shape: Callable[[], tuple[float, float]]
         self._y = np.full(0, np.nan)
-        if task.library is not None:
+        if task.library is not None and not task.loads.rolls:
             self._kernel = KernelRates(task.library, self.chart, task.loads)
         if not self._evaluated(t, self._first):
             raise Stopped(

@@ -39,6 +39,7 @@ import ctypes
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property, partial
+from itertools import chain
 from types import SimpleNamespace
 from typing import Any, Literal
 
@@ -636,11 +637,11 @@ class EvaluatedRates:
     state: Array
 
 
-def cannot(system: System, loads: Loads, held: bool) -> str | None:
-    """Why the kernel does not serve a motion; None where it does."""
+def cannot(system: System, loads: Loads, held: bool, always: bool) -> str | None:
+    """Why the kernel does not serve a motion, as long as nothing rolls in it or ``always``; None where it does."""
     if held:
         return "passive freedoms are held at rest"
-    if any(one.rolls is not None for one in rough_freedoms(system, loads.dry)):
+    if always and any(one.rolls is not None for one in rough_freedoms(system, loads.dry)):
         return "friction acts between bodies that may roll on each other, or teeth"
     if system.n_freedoms * len(system.m.links) >= SPARSE_FROM:
         return f"it has {system.n_freedoms} freedoms and {len(system.m.links)} links; expected fewer than {SPARSE_FROM} of the product"
@@ -657,7 +658,7 @@ def library_for(system: System, loads: Loads, held: bool, engine: str) -> Any:
         where the kernel was asked for by name and cannot carry it; MissingExtraError without a compiler.
     """
     library = build.built() if engine == outcome.COMPILED else outcome.at_hand() if engine == "auto" else None
-    why = None if library is None else cannot(system, loads, held)
+    why = None if library is None else cannot(system, loads, held, engine == outcome.COMPILED)
     if why is not None and engine == outcome.COMPILED:
         raise build.not_served(f"respond {system.m.name!r}", why)
     return library if why is None else None
@@ -681,9 +682,8 @@ class KernelRates:
         columns, F = np.concatenate([chart.free, chart.prescribed]), chart.system.n_freedoms
         self._tables, self._memory = _tables(library, chart.system, columns, chart.x0, loads)
         self.n, self._x0 = len(chart.free), np.ascontiguousarray(chart.x0)
-        self._heads = np.full(F, -1, dtype=np.intc)
-        for some in loads.rough:
-            self._heads[list(some.columns)] = some.columns[0]
+        slips = [(len(one.columns), one.touches(chart.system.m), *one.columns) for one in loads.rough]
+        self._rough = np.array([len(slips), *chain.from_iterable(slips)], dtype=np.intc)
         of_motion = library.mgk_motion
         of_motion.argtypes = [
             *[ctypes.c_void_p] * 3,
@@ -692,9 +692,9 @@ class KernelRates:
             ctypes.c_int,
             *[ctypes.c_void_p] * 7,
         ]
-        own = (*self._tables, self._memory, self._x0, self._heads)
-        I, P, memory, x0, heads = (array.ctypes.data for array in own)
-        self._call = partial(of_motion, I, P, memory, self.n, len(loads.stored), x0, heads)
+        own = (*self._tables, self._memory, self._x0, self._rough)
+        I, P, memory, x0, rough = (array.ctypes.data for array in own)
+        self._call = partial(of_motion, I, P, memory, self.n, len(loads.stored), x0, rough)
         # numbers of a single state, and where they lie
         size = len(chart.x0) + 2 * F
         self._one = [np.empty(n) for n in (2 * self.n, 3 * len(chart.prescribed), F, size, 1, size, 2 * self.n + 4)]

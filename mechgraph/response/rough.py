@@ -30,6 +30,7 @@ from mechgraph.model.friction import (
     Friction,
     coupling_of,
     pairs_of,
+    place_of_coupling,
     rubbing_loads,
     rubs_as_ball,
     rubs_as_contact,
@@ -53,6 +54,14 @@ class Rough:
     columns: tuple[int, ...]
     weights: tuple[float, ...]
     rolls: Friction | None = None
+
+    def touches(self, m: Mechanism) -> int:
+        """The pair of bodies that may roll on each other, by its number in the kernel; of teeth -2 - their line, of others -1."""
+        if self.rolls is None:
+            return -1
+        if self.name in m.pair_index:
+            return m.pair_index[self.name]
+        return -2 - sum(bool(c.steps) for c in m.couplings[: place_of_coupling(m, self.rolls)])
 
     def slides(self, here: Configuration, rates: Array) -> Array:
         """Sliding rates ``(d, ..., T)`` at rates ``(F, ..., T)`` of all freedoms."""
