@@ -374,6 +374,7 @@ def pairs(stage: DrawnPose) -> Iterator[DrawnPart]:
         if stage.grounded(pair):
             yield _ground(stage, pair, lines, size)
         moved = stage.piston(pair) * slide_of(pair)
+        apart = 3.0 * size if sum(name in driven for name in pair.freedom_names) > 2 else 0.0
         curves = takes_curves(pair.type)
         touches = len(curves) > 1 or any(map(is_groove, curves))  # bodies, which are drawn themselves
         for e in symbol(pair.type, pair.pitch_per_radian, size, _strokes(stage, pair, lines, size)):
@@ -388,7 +389,8 @@ def pairs(stage: DrawnPose) -> Iterator[DrawnPart]:
                 reach = 2.6 * size * line.direction
                 yield DrawnPart("axis", pair.name, "", frame, shapes.polyline([line.point - reach, line.point + reach]))
             if name in driven:
-                yield DrawnPart("drive", name, "", frame, freedom_arrow(line, 1.75 * size).moved(np.eye(3), moved / 2))
+                arrow = freedom_arrow(line, 1.75 * size, apart).moved(np.eye(3), moved / 2)
+                yield DrawnPart("drive", name, "", frame, arrow)
 
 
 def _ground(stage: DrawnPose, pair: Pair, lines: list[FreedomLine], size: float) -> DrawnPart:
@@ -429,13 +431,14 @@ def _strokes(stage: DrawnPose, pair: Pair, lines: list[FreedomLine], size: float
     return out
 
 
-def freedom_arrow(line: FreedomLine, size: float) -> Shape:
-    """An arrow about the line of a turn, or beside that of a slide."""
+def freedom_arrow(line: FreedomLine, size: float, apart: float = 0.0) -> Shape:
+    """An arrow about the line of a turn, or beside that of a slide; of many each on its own line, so far ``apart`` from the middle."""
     turn = frame_along(line.direction)
     if line.turns:
-        return shapes.turn_arrow().moved(size * turn, line.point)
+        return shapes.turn_arrow().moved((0.5 if apart else 1.0) * size * turn, line.point - apart * line.direction)
     lengthwise = turn @ np.diag([0.3 * size, 0.3 * size, 2.2 * size])
-    return shapes.arrow().moved(lengthwise, size * (turn[:, 0] - line.direction))
+    begin = 0.5 * apart * line.direction if apart else size * (turn[:, 0] - line.direction)
+    return shapes.arrow().moved(lengthwise, begin)
 
 
 def labels(stage: DrawnPose) -> Iterator[Label]:
