@@ -101,7 +101,7 @@ class Pipeline:
             self.m = drive.whole(self.start)
             self.start = closed_start(self.m)
         self.system, self.x = self.start.system, self.start.x[:, 0]
-        self.columns, _ = named_columns(self.m, self.system, dict.fromkeys(drive.names, 0.0))
+        self.columns = self.system.columns_of(drive.names)
         self.unit = np.where(self.system.is_length[self.columns], self.system.par.L, 1.0)
         self._refuse_far()
         # reactions of least norm are found position by position, where nothing is gained from many of them

@@ -8,7 +8,7 @@ follow from the parameters and are made when first asked for.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from functools import cached_property
 from typing import Any
@@ -607,6 +607,10 @@ class States(Places):
         columns, rows = (np.concatenate(part, axis=1) for part in zip(*parts, strict=True))
         return columns, rows
 
+    def columns_of(self, names: Iterable[str]) -> Index:
+        """The freedoms of that name."""
+        return np.array([self.first_column[k] + j for k, j in map(self.m.freedom, names)], dtype=np.intp)
+
     def state_of(self, coordinates: Array) -> Array:
         """State ``(nx, T)`` from user coordinates ``(F, T)`` (lengths in the user's units)."""
         q = np.where(self.is_length[:, None], coordinates / self.par.L, coordinates)
@@ -699,8 +703,7 @@ class System(States):
         """The rows of linear couplings, by their places; one without a constant keeps the value that it has at the start."""
         numbers, every = self.par.couplings, coupling_places(self.m)
         couplings, places = [self.m.couplings[g] for g in which], [every[g] for g in which]
-        found = [self.m.freedom(name) for c in couplings for name in c.freedoms]
-        columns = np.array([self.first_column[pair] + freedom for pair, freedom in found])
+        columns = self.columns_of(name for c in couplings for name in c.freedoms)
         rows = np.repeat(np.arange(len(couplings)), [len(c.terms) for c in couplings])
         first = np.searchsorted(rows, np.arange(len(couplings)))
         coefficients = np.concatenate([numbers[own] for own in places])
@@ -717,7 +720,7 @@ class System(States):
     @cached_property
     def n_rows(self) -> int:
         """Number of closure rows."""
-        return len(self.row_scale)
+        return sum(len(part.scale) for part in self.position_rows)
 
     @cached_property
     def row_scale(self) -> Array:
@@ -738,8 +741,7 @@ class System(States):
     @property
     def coupled_freedoms(self) -> Index:
         """Freedoms into which rows other than those of loops bring efforts."""
-        places = [self.m.freedom(name) for c in self.m.couplings for name in c.freedoms]
-        return np.unique(np.array([self.first_column[pair] + freedom for pair, freedom in places], dtype=np.intp))
+        return np.unique(self.columns_of(name for c in self.m.couplings for name in c.freedoms))
 
     @cached_property
     def gaps(self) -> Index:

@@ -81,8 +81,7 @@ class AlongTerms:
             link for load in others if load.in_freedom is None or not load.by_position for link in load.links(m)
         )
         self.links = {name: len(self.columns) * VALUES_OF_FREEDOM + i * VALUES_OF_LINK for i, name in enumerate(links)}
-        places = [m.freedom(name) for name in self.columns]
-        self._columns = np.array([int(system.first_column[k]) + j for k, j in places], dtype=np.intp)
+        self._columns = system.columns_of(self.columns)
         self._links = [m.link_index[name] for name in self.links]
         L, lengths = system.par.L, system.is_length[self._columns]
         unit = np.where(lengths, L, 1.0)

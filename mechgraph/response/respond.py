@@ -481,8 +481,7 @@ def start_rates(m: Mechanism, task: Task, x: Array, rates: Mapping[str, float], 
     s = task.system
     names = [*task.prescribed.names, *rates]
     values = [*task.prescribed.at(begin)[1].tolist(), *rates.values()]
-    places = [m.freedom(name) for name in names]
-    columns = np.array([int(s.first_column[k]) + j for k, j in places], dtype=np.intp)
+    columns = s.columns_of(names)
     wanted = np.array(values) / np.where(s.is_length[columns], s.par.L, 1.0)
     closure = closure_rank(Configuration(s, x[:, None]), engine=task.engine)
     N = closure.motions

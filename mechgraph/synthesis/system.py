@@ -235,8 +235,7 @@ class RowProblem:
         par = numbers.parameters(self.whole, np.repeat(self.origin[:, None], len(m.links), axis=1), self.origin, self.L)
         self.system = System(self.whole, None, par)
         s = self.system
-        places = [self.whole.freedom(name) for name in given.names]
-        self.columns: Index = np.array([s.first_column[k] + j for k, j in places], dtype=np.intp)
+        self.columns: Index = s.columns_of(given.names)
         unit = np.where(s.is_length[self.columns], self.L, 1.0)
         self.asked = user / unit
         none, factor = np.full(self.tasks.rows, np.nan), (1.0, 2.0)
