@@ -121,19 +121,14 @@ class Configuration:
         s = self.system
         dtype = self.x.dtype if s.numbers.is_real else complex
         out = np.empty((16, len(s.walk.parents), self.T), dtype=dtype)
-        for b, C, beside in s.numbers.parts():
+        for b, C, (left, right) in s.numbers.parts():
             values = b.stack.values(self.x.take(b.state_rows, axis=0))
-            if beside is None and isinstance(b.at_steps, slice):
-                np.matmul(C, values.transpose(1, 0, 2), out=out[:, b.at_steps].transpose(1, 0, 2))
-                continue
             many = C.ndim == 4
             steps = (
                 np.einsum("cmnt,mnt->cnt", C, values) if many else (C @ values.transpose(1, 0, 2)).transpose(1, 0, 2)
             )
-            if beside is not None:
-                left, right = beside
-                steps = multiplied(multiplied(left, steps.reshape(4, 4, *steps.shape[1:])), right).reshape(steps.shape)
-            out[:, b.at_steps] = steps
+            steps = multiplied(multiplied(left, steps.reshape(4, 4, *steps.shape[1:])), right)
+            out[:, b.at_steps] = steps.reshape(16, *steps.shape[2:])
         return out.reshape(4, 4, *out.shape[1:])
 
     @cached_property

@@ -163,8 +163,8 @@ class Numbers:
         out = Numbers(par, self.walk, self.batches, self.n_factors, self.n_freedoms, self.for_one)
         vars(out).update(constants=_of(self.constants, which), twists=_of(self.twists, which))
         vars(out)["poses"] = [
-            (_of(C, which) if C.ndim == 4 else C, beside and (_of(beside[0], which), _of(beside[1], which)))
-            for C, beside in self.poses
+            (_of(C, which) if C.ndim == 4 else C, (_of(left, which), _of(right, which)))
+            for C, (left, right) in self.poses
         ]
         return out
 
@@ -183,25 +183,19 @@ class Numbers:
         return not any(np.iscomplexobj(part) for part in (self.constants, self.par.pitch, self.par.frame))
 
     @cached_property
-    def poses(self) -> list[tuple[Array, tuple[Array, Array] | None]]:
-        """For every batch of factors the coefficients of the poses of its steps with the markers beside them, seen from the nodes
-        from which the steps start (from the global frame where that is the frame link).
-
-        For one mechanism the markers are part of the coefficients, ``(n, 16, m)`` for a product of matrices. For variants, of
-        which each has few positions, they stay beside them, ``(4, 4, n, B)``, and where pitches vary coefficients are
-        ``(16, m, n, B)``.
+    def poses(self) -> list[tuple[Array, tuple[Array, Array]]]:
+        """For every batch of factors the coefficients ``(n, 16, m)`` of the poses of its steps (``(16, m, n, B)`` where pitches vary), and
+        the markers beside them ``(4, 4, n, B)``, seen from the nodes from which the steps start (from the global frame where that is
+        the frame link).
         """
-        out: list[tuple[Array, tuple[Array, Array] | None]] = []
+        out: list[tuple[Array, tuple[Array, Array]]] = []
         for b in self.batches:
-            if self.constants.shape[3] == 1 and self.par.pitch.shape[1] == 1:
-                out.append((self._folded(b), None))
-                continue
-            C, left, right = self._coefficients(b), *self._beside(b)
+            C = self._coefficients(b)
             C = C.reshape(16, *C.shape[2:])
-            out.append((np.ascontiguousarray(C[..., 0].transpose(2, 0, 1)) if C.shape[3] == 1 else C, (left, right)))
+            out.append((np.ascontiguousarray(C[..., 0].transpose(2, 0, 1)) if C.shape[3] == 1 else C, self._beside(b)))
         return out
 
-    def parts(self) -> Iterator[tuple[FactorBatch, Array, tuple[Array, Array] | None]]:
+    def parts(self) -> Iterator[tuple[FactorBatch, Array, tuple[Array, Array]]]:
         """The factors with their coefficients and the poses beside them, see ``poses``: whole batches, or few factors at once."""
         if not self.for_one:
             yield from ((b, *pose) for b, pose in zip(self.batches, self.poses, strict=True))
@@ -215,21 +209,6 @@ class Numbers:
     def _coefficients(self, b: FactorBatch) -> Array:
         """Coefficients ``(4, 4, m, n, B)`` of the poses of a batch in the sense of the walk."""
         return b.stack.coefficients(self.par.pitch[b.pairs], np.asarray(self.walk.back[b.steps], dtype=bool))
-
-    def _folded(self, b: FactorBatch) -> Array:
-        """The same with the markers beside them, ``(n, 16, m)``, of one mechanism."""
-        n = len(b.pairs)
-        if n > FACTORS_AT_ONCE:
-            first = self._folded(b.part(slice(0, FACTORS_AT_ONCE)))
-            out = np.empty((n, *first.shape[1:]), dtype=first.dtype)
-            out[:FACTORS_AT_ONCE] = first
-            for i in range(FACTORS_AT_ONCE, n, FACTORS_AT_ONCE):
-                out[i : i + FACTORS_AT_ONCE] = self._folded(b.part(slice(i, i + FACTORS_AT_ONCE)))
-            return out
-        C = self._coefficients(b)[..., 0]
-        left, right = self._beside(b)
-        C = np.einsum("acmn,cdn->admn", np.einsum("abn,bcmn->acmn", left[..., 0], C), right[..., 0])
-        return np.ascontiguousarray(C.reshape(16, *C.shape[2:]).transpose(2, 0, 1))
 
     def _beside(self, b: FactorBatch) -> tuple[Array, Array]:
         """Constant poses before and behind the factors of a batch in the sense of the walk, homogeneous ``(4, 4, n, B)``."""
