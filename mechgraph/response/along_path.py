@@ -263,18 +263,18 @@ class Way:
         return self.metric(self.length) / self.length
 
     def extend(self, most: float) -> None:
-        """Tabulate the next part, up to ``most`` at first."""
-        place = min(self.length + self._next, most)
+        """Tabulate the next part, up to ``most`` at first; further than asked for where the kernel leads there."""
+        place, beside = min(self.length + self._next, most), RESPONSE.around_crossing / 2
+        if self.kernel is not None:
+            far = min(self.length + max(self._next, FURTHEST / 2), most)
+            self._take(self._led(self.kernel, far + beside), [])
+            place = far if self._reached >= far + beside else max(place, self._reached - 2.0 * beside)
         self._next *= 2.0
-        self._follow(place + RESPONSE.around_crossing / 2)
+        self._follow(place + beside)
         # a part does not end beside a change point
-        while near := [
-            c.place
-            for c in self.crossings
-            if abs(place - c.place) < RESPONSE.around_crossing / 2 - RESPONSE.at_crossing
-        ]:
-            place = max(near) + RESPONSE.around_crossing / 2
-            self._follow(place + RESPONSE.around_crossing / 2)
+        while near := [c.place for c in self.crossings if abs(place - c.place) < beside - RESPONSE.at_crossing]:
+            place = max(near) + beside
+            self._follow(place + beside)
         known = self._known()
         self.closed = place > known
         place = min(place, known)
