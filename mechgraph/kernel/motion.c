@@ -32,33 +32,11 @@ static size_t lay_out_motion(const Model *m, int load_numbers, double *memory, M
   at->place = (int *)taken(&memory, &size, c);
   at->n_kept = size;
   TAKE(kept, at->n_kept), TAKE(load_number, load_numbers);
-  TAKE(Z, d * c), TAKE(V, 6 * n * d), TAKE(momentum, 6 * n * d), TAKE(mass, d * d), TAKE(unit, d), TAKE(force, d), TAKE(a, d), TAKE(off, 2 * c);
+  TAKE(Z, d * c), TAKE(V, 6 * n * d), TAKE(momentum, 6 * n * d), TAKE(mass, d * (d + 1)), TAKE(unit, d), TAKE(force, d), TAKE(a, d), TAKE(off, 2 * c);
   TAKE(yields, m->rubs ? 6 * n * c : 0);
   TAKE(guess, m->states), TAKE(begin, m->states), TAKE(speed, 2 * c), TAKE(y, 6 * d), TAKE(slope, STAGES * 2 * d);
 #undef TAKE
   return size * sizeof(double);
-}
-
-/* Solution of A x = b (n), b in place, by pivots in its columns; 0 where A is singular. */
-static int solved_small(int n, double *A, double *b) {
-  FOR(i, n) {
-    int best = i;
-    for (int r = i + 1; r < n; r++) if (fabs(A[r * n + i]) > fabs(A[best * n + i])) best = r;
-    if (!(fabs(A[best * n + i]) > 0.0)) return 0;
-    FOR(c, n) { const double t = A[i * n + c]; A[i * n + c] = A[best * n + c], A[best * n + c] = t; }
-    const double t = b[i];
-    b[i] = b[best], b[best] = t;
-    for (int r = i + 1; r < n; r++) {
-      const double f = A[r * n + i] / A[i * n + i];
-      for (int c = i; c < n; c++) A[r * n + c] -= f * A[i * n + c];
-      b[r] -= f * b[i];
-    }
-  }
-  for (int i = n - 1; i >= 0; i--) {
-    for (int c = i + 1; c < n; c++) b[i] -= A[i * n + c] * b[c];
-    b[i] /= A[i * n + i];
-  }
-  return 1;
 }
 
 /* Rates of all freedoms for a unit rate of every drive, at a state just factored; what the closure leaves of them. */
@@ -105,13 +83,14 @@ static int closed_at(const Model *m, Work *w, Motion *at, int n, const double *x
     if (turns) {
       sensitivity(m, w, at);
       tangent(m, y, dq, moved, NULL);
-      FOR(k, n) at->a[k] = u[k] - y[m->drive[k]] - moved[m->drive[k]];
+      const int wide = n + 1;
+      FOR(r, n) at->mass[r * wide + n] = u[r] - y[m->drive[r]] - moved[m->drive[r]];
       FOR(k, n) {
         tangent(m, y, at->Z + k * m->columns, moved, NULL);
-        FOR(r, n) at->mass[r * n + k] = moved[m->drive[r]];
+        FOR(r, n) at->mass[r * wide + k] = moved[m->drive[r]];
       }
-      if (!solved_small(n, at->mass, at->a)) return MGK_SINGULAR;
-      FOR(k, n) FOR(c, m->columns) dq[c] += at->Z[k * m->columns + c] * at->a[k];
+      if (!reduced(at->mass, n, wide)) return MGK_SINGULAR;
+      FOR(k, n) FOR(c, m->columns) dq[c] += at->Z[k * m->columns + c] * at->mass[k * wide + n];
     }
     step = fmax(off, size_of(dq, m->columns)), sum += step, before = left;
     if (!(sum <= LARGEST_CORRECTION)) return MGK_STEP;
