@@ -345,6 +345,18 @@ def test_rates_that_the_callable_returns_are_taken_as_they_are():
     np.testing.assert_allclose(scalar.acceleration, -np.sin(t))
 
 
+def test_noise_is_refused_after_a_few_looks():
+    """Halved everywhere it would be asked at two million times."""
+    asked = []
+
+    def noise(t):
+        asked.append(np.size(t))
+        return np.random.default_rng(len(asked)).normal(size=np.shape(t))
+
+    assert "not smooth enough" in faults(noise, t=np.linspace(0.0, 1.0, 11))
+    assert sum(asked) < 100_000
+
+
 @pytest.mark.parametrize("function", [lambda t: np.abs(t - 0.3), lambda t: np.abs(t - 0.3) ** 3, np.ceil])
 def test_kinks_are_refused_not_smeared(function):
     said = faults(function, t=np.linspace(0.0, 1.0, 11))

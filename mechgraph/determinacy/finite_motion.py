@@ -155,6 +155,15 @@ class _Closed:
                 return h
         return 0.0
 
+    def proved(self, rng: np.random.Generator) -> tuple[Array, float]:
+        """A random direction and the length of a step after which it is ``regular``; 0 unless it is so in a second one as well.
+
+        One direction may lie by chance, to the accuracy of a step, in a branch of fewer dimensions; two do not.
+        """
+        v, other = self.random(rng), self.random(rng)
+        step = self.regular(v)
+        return v, step if step and self.regular(other if len(v) > 1 else -v) else 0.0
+
     def dimension(self) -> int:
         """Number of directions in which a step is kept."""
         table = np.stack([self.kept(v, TRIAL_STEPS[1]) for v in np.eye(self.N.shape[1])])
@@ -240,9 +249,10 @@ def finite_motion(system: System, x: Array, closure: ClosureRank, engine: Engine
     if not nullity:
         return FiniteMotion(0, closure.rank)
     rng = np.random.default_rng(STEPS_SEED)
-    v = start.random(rng)
-    step = 0.0 if closure.rank == closure.count else start.regular(v)
-    if step or closure.rank == closure.count:
+    if closure.rank == closure.count:
+        return FiniteMotion(nullity, closure.rank, (start, start.random(rng)), 0.0)
+    v, step = start.proved(rng)
+    if step:
         return FiniteMotion(nullity, closure.rank, (start, v), step)
     return _near_by(start, rng)
 
@@ -255,8 +265,7 @@ def _near_by(start: _Closed, rng: np.random.Generator) -> FiniteMotion:
         length, there = float(np.abs(change).max()), start.reached(x)
         rank = max(rank, there.closure.rank)
         dimension = there.N.shape[1]
-        # one direction may lie by chance, to the accuracy of a step, in a branch of fewer dimensions; two do not
-        if dimension and not all(there.regular(there.random(rng)) for _ in range(2)):
+        if dimension and not there.proved(rng)[1]:
             # this near to where branches meet a step may cross to another one: only where nothing else is known
             near = length < 2 * TRIAL_STEPS[1]
             dimension = 0 if near and best.mobility else there.dimension()

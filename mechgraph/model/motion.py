@@ -119,25 +119,29 @@ def _panels(function: Callable[[Array], Array], low: float, high: float) -> list
     transform[0] /= 2.0
     done: list[_Panel] = []
     ends = [(low, high)]
-    # how often the range of a callable is halved at most before it counts as not smooth
-    for _ in range(16 + 1):
-        left, right = np.array(ends).T[:, :, None]
+    # part of the range of a callable below which it counts as not smooth
+    least = (high - low) / 2.0**16.5
+    while ends:
+        # of many the last ones first, down to where they are smooth or too short: noise is found out by few
+        ends, some = ends[:-64], ends[-64:]
+        left, right = np.array(some).T[:, :, None]
         times = (left + right) / 2.0 + (right - left) / 2.0 * nodes
         values = function(times)
         steep = np.abs(times).max(1) * np.abs(np.diff(values) / np.diff(times)).max(1)
         rounding = CHEBYSHEV_NOISE * (np.abs(values).max(1) + steep / 4.0)
         halves: list[tuple[float, float]] = []
-        for (a, b), coefficients, floor in zip(ends, values @ transform.T, rounding, strict=True):
+        for (a, b), coefficients, floor in zip(some, values @ transform.T, rounding, strict=True):
             significant = np.flatnonzero(np.abs(coefficients) > floor)
             length = int(significant[-1]) + 1 if significant.size else 1
             if length <= CHEBYSHEV_POINTS - 4:
                 done.append(_Panel(a, b, coefficients[:length], float(floor)))
             else:
                 halves += [(a, (a + b) / 2.0), ((a + b) / 2.0, b)]
-        if not halves:
-            return sorted(done, key=lambda panel: panel.left)
-        ends = halves
-    raise NotSmooth(ends[0][0])
+        for a, b in halves:
+            if b - a < least:
+                raise NotSmooth(a)
+        ends += halves
+    return sorted(done, key=lambda panel: panel.left)
 
 
 Rates = tuple[Array, Array, Array]

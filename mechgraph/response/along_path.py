@@ -250,7 +250,7 @@ class Way:
     def metric(self, at: float) -> float:
         """The integral of the root of the mass up to a place."""
         for p in self.pieces[len(self._roots) :]:
-            root = _SERIES @ np.sqrt(np.maximum(_VALUES @ p.series[:, 0], 0.0))
+            root = _TO_SERIES @ np.sqrt(np.maximum(_VALUES @ p.series[:, 0], 0.0))
             self._roots.append(np.asarray(0.5 * abs(p.end - p.begin) * np.polynomial.chebyshev.chebint(root, lbnd=-1)))
             self._metrics.append(self._metrics[-1] + float(self._roots[-1].sum()))
         k = max(0, bisect_right(self._starts, at) - 1)
@@ -438,7 +438,7 @@ class Way:
         # rounding over the square of the distance from a singular position, which the condition measures
         # rounding of what a series is made of, times the square of the condition
         noise = 1e-14 * condition.max(axis=1) ** 2
-        return np.einsum("kp,spq->skq", _SERIES, values), steepness.max(axis=1), noise
+        return np.einsum("kp,spq->skq", _TO_SERIES, values), steepness.max(axis=1), noise
 
     def _tabulated_at(self, at: Array) -> tuple[Array, Array, Array]:
         """Terms ``(4 + m, T)`` at places ``(T,)``, how steep the path is there and the condition ``(T,)``."""
@@ -782,6 +782,6 @@ def _same(system: System, variants: Any) -> System:
 _ORDERS = np.arange(POINTS + 1, dtype=float)
 _NODES = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
 _VALUES = np.polynomial.chebyshev.chebvander(_NODES, POINTS - 1)
-_SERIES = _VALUES.T * np.where(_ORDERS[:-1], 2.0, 1.0)[:, None] / POINTS
+_TO_SERIES = _VALUES.T * np.where(_ORDERS[:-1], 2.0, 1.0)[:, None] / POINTS
 _GAUSS = np.polynomial.legendre.leggauss(4)
 _IN_STEP = np.concatenate([[0.0, 0.5, 1.0], 0.25 + 0.25 * _GAUSS[0], 0.75 + 0.25 * _GAUSS[0]])
