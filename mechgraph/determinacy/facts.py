@@ -510,7 +510,7 @@ class Facts(GraphFacts):
 
     @property
     def friction(self) -> tuple[str, ...]:
-        """Friction among the loads that rests on reactions that are not unique, one sentence each.
+        """Friction among the loads that rests on reactions that are not unique, in a sentence for those that rest on the same.
 
         Examples
         --------
@@ -524,16 +524,22 @@ class Facts(GraphFacts):
         ... )
         friction of 'B' rests on Fz, not unique: zero where no load adds to it, else not determined
         """
-        out = []
+        of: dict[tuple[tuple[str, ...], str], list[str]] = {}
         for load in rubbing_loads(self.mechanism, self.mechanism.loads):
             known = self.unique.get(load.of, {})
-            if loose := [name for name in rests_on(self.mechanism, load) if not known.get(name, True)]:
-                subject, it = load.where.removesuffix(": "), ("it", "them")[len(loose) > 1]
-                out.append(
-                    f"{subject} rests on {', '.join(loose)}, not unique: zero where no load adds to {it}, else not determined; change a "
-                    "pair type, or solve with redundant='elastic'"
+            if loose := tuple(name for name in rests_on(self.mechanism, load) if not known.get(name, True)):
+                soft = (
+                    getattr(self.mechanism.pair(load.of), "stiffness", None)
+                    if load.of in self.mechanism.pair_index
+                    else None
                 )
-        return tuple(out)
+                given = soft is not None and all(getattr(soft, name, None) is not None for name in loose)
+                of.setdefault((loose, "" if given else "give stiffness= and "), []).append(repr(load.of))
+        return tuple(
+            f"friction of {', '.join(pairs)} rests on {', '.join(loose)}, not unique: zero where no load adds to "
+            f"{('it', 'them')[len(loose) > 1]}, else not determined; change a pair type, or {first}solve with redundant='elastic'"
+            for (loose, first), pairs in of.items()
+        )
 
     @property
     def determinate(self) -> bool:

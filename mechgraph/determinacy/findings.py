@@ -595,21 +595,25 @@ def consequence(effect: Effect) -> str:
 
 
 def alternatives(advice: Iterable[Advice]) -> list[str]:
-    """Advice in brief, single changes of one kind and effect together: ``2-3: ... at A or B: redundancy 3 -> 1``."""
+    """Advice in brief, changes of one kind and effect together: ``2-3: ... at A or B: redundancy 3 -> 1``."""
     first: dict[tuple[Any, ...], Effect] = {}
     others: dict[tuple[Any, ...], list[str]] = {}
     numbers: dict[tuple[Any, ...], list[int]] = {}
     for number, e in enumerate(a.effect for a in advice):
         if e is not None:
             key = (tuple(sorted(change[1:] for change in e.changes)), consequence(e))
-            if key in first and len(e.changes) == 1:
-                others.setdefault(key, []).append(e.changes[0][0])
-            if key not in first or len(e.changes) == 1:
-                numbers.setdefault(key, []).append(number)
+            if key in first:
+                others.setdefault(key, []).append(joined([change[0] for change in e.changes]))
+            numbers.setdefault(key, []).append(number)
             first.setdefault(key, e)
-    return [
-        f"{_ranged(numbers[key])}: {exchanges(e, others.get(key, ()))}: {consequence(e)}" for key, e in first.items()
-    ]
+    out = []
+    for key, e in first.items():
+        also, several = others.get(key, []), len(e.changes) > 1
+        text = exchanges(e, () if several else also)
+        if also and several:  # sets by all their places
+            text += f" (or at {joined(also, 'or')})" if len(also) < 3 else f" (or at {len(also)} other sets of places)"
+        out.append(f"{_ranged(numbers[key])}: {text}: {consequence(e)}")
+    return out
 
 
 def _ranged(numbers: Sequence[int]) -> str:
