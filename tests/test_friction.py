@@ -631,6 +631,23 @@ def test_what_is_left_out_is_told() -> None:
     assert not mg.check(shaft()).friction
 
 
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+def test_a_ball_rubs_in_its_slotted_cylinder(engine: str) -> None:
+    """By hand: mu F against v + w x (-r n) of the point on the side to which the groove pushes, which slides along the axis alone."""
+    r, mu, v, wy, wx, F = 0.03, 0.2, 0.1, -4.0, 5.0, np.array([30.0, -50.0])
+    m = mg.Mechanism(
+        "slot", pairs=[mg.Pair("K", "Sc", "frame", "ball", point=(0, 0, 0), axis=Z, radius=r)], drives=["K.Tz", "K.Ry", "K.Rx"],
+        loads=[mg.Wrench("ball", force=(*F, 0), point=(0, 0, 0)), mg.Friction("K", mu=mu)],
+    )  # fmt: skip
+    rates = {"K.Tz": v, "K.Ry": wy, "K.Rx": wx}
+    s = mg.solve(m, {name: mg.Motion(0.0, velocity=rate) for name, rate in rates.items()}, engine=engine)
+    n = -F / np.linalg.norm(F)
+    slip = v - r * (wx * n[1] - wy * n[0])
+    f = -mu * np.linalg.norm(F) * np.sign(slip)
+    assert s["K"].effort == pytest.approx([-f, -r * f * n[0], r * f * n[1]], rel=1e-13)
+    assert s.losses["K"] == pytest.approx(-f * slip, rel=1e-13)
+
+
 def test_several_drives_lock_together_where_one_friction_holds_them() -> None:
     """An arm of two rough pins, each with the couple of the load about it; a table of two slides on a slope; a block on a plane."""
 
