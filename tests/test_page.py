@@ -847,3 +847,36 @@ def test_the_scripts_are_built_from_their_sources(tmp_path: Path) -> None:
         assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
     for name in ("vendor.js", "vendor.css", "view.js", "built.json"):
         assert (copy / name).read_bytes() == (WEB / name).read_bytes()
+
+
+def door(soft: bool = False) -> mg.Mechanism:
+    """A door on two hinges, on springs if it is ``soft``."""
+    stiff = {"stiffness": dict.fromkeys(("Fx", "Fy", "Fz", "Mx", "My"), 1e6)} if soft else {}
+    hinges = [
+        mg.Pair(k, "R", "frame", "door", point=(0, 0, z), axis=(0, 0, 1), **stiff) for k, z in (("A", 0.0), ("B", 1.0))
+    ]
+    return mg.Mechanism("door", pairs=hinges, drives=["A"])
+
+
+@pytest.mark.parametrize(
+    ("m", "motion", "banner"),
+    [
+        (mg.load("rcsr"), None, ("good", "All is determined")),
+        (mg.load("rcsr"), {"O1": np.deg2rad([150.0, 220.0])}, ("fair", "See warnings")),
+        (door(), None, ("fair", "Not all reactions are unique")),
+        (door(soft=True), {"A": 0.0}, ("fair", "Split by stiffness")),
+        (door().replace(drives=[]), None, ("bad", "No solution")),
+        (mg.Mechanism("graph", pairs=[mg.Pair(k, "R", a, b) for k, a, b in zip("ABC", "fab", "abf", strict=True)], frame="f"), None,
+         ("fair", "Topology only")),
+    ],
+)  # fmt: skip
+def test_the_banner_says_what_stands_below(m: mg.Mechanism, motion: Any, banner: tuple[str, str]) -> None:
+    """Green only where no warning follows; its word for those who do not see the color."""
+    elastic = any(p.stiffness for p in m.pairs)
+    s = None if motion is None else mg.solve(m, motion, on_reach="flag", redundant="elastic" if elastic else "nan")
+    assert write._judged(mg.check(m), s) == banner
+
+
+def test_the_banner_stands_in_its_color_on_the_page() -> None:
+    found = re.findall(r'<p class="verdict (\w+)"><span class="word">([^<]*)</span>', page_of("four-bar"))
+    assert found == [("good", "All that a planar model has is unique")]
