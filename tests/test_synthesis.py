@@ -8,12 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ladder import LADDER, PUBLISHED, by_markers, dyad, four_bar, geared_five_bar, slider_crank, spatial
+from ladder import LADDER, PUBLISHED, by_markers, dyad, four_bar, geared_five_bar, slider_crank, spatial, turned
 
 import mechgraph as mg
-from mechgraph.synthesis.classes import TaskClass
-from mechgraph.synthesis.solve import kept
-from mechgraph.synthesis.system import RowProblem
 
 QUICK = [name for name in LADDER if name.split(",")[0] in ("R-R dyad", "four-bar function", "spherical R-R")]
 LONG = [name for name in LADDER if name not in QUICK]
@@ -245,15 +242,14 @@ def test_a_geared_five_bar_is_found_again_from_its_path() -> None:
 )
 def test_a_start_set_serves_whatever_the_order_of_pairs_links_and_unknowns(name: str) -> None:
     m, task, unknown, total = LADDER[name]()
-    turned = [
+    changed = [
         p.replace(a=p.b, b=p.a) if i % 2 and p.type.symbol in ("R", "P") else p for i, p in enumerate(m.pairs[::-1])
     ]
-    for pairs in (m.pairs[1:] + m.pairs[:1], turned):
-        of = TaskClass(RowProblem(m.replace(pairs=pairs), task, unknown[::-1]), np.random.default_rng(7))
-        start = kept(of)
-        assert start is not None
-        assert start.x.shape[1] == total
-        assert of.error(of.at(start.member, start.x)).max() < 1e-9
+    for pairs in (m.pairs[1:] + m.pairs[:1], changed):
+        words = list[str]()
+        s = mg.synthesize(m.replace(pairs=pairs), task, unknown[::-1], progress=words.append)
+        assert s.total == total
+        assert len(words) == 1, "only tracks to the task"
 
 
 def test_the_first_task_of_a_kind_is_told_before_it_takes_its_time(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -286,20 +282,18 @@ def test_the_first_task_of_a_kind_is_told_before_it_takes_its_time(monkeypatch: 
         assert "first task of its kind" in "".join(words)
 
 
-def test_of_an_element_only_what_matters_is_sought() -> None:
+@pytest.mark.parametrize(
+    ("element", "count"), [("O", 4), ("P", 5), ("Q", 4), ("ball", 3), ("direction", 1)], ids=lambda value: str(value)
+)
+def test_of_an_element_only_what_matters_is_sought(element: str, count: int) -> None:
     """A line is four numbers, a direction in the plane one, a ball three, a plane with a point on it five."""
-    from mechgraph.synthesis.unknowns import mattering
-
-    lines = LADDER["R-Sp-R function, 6 pairs"]()[0]
-    every = [f"P.{what}.{at}" for what in ("point", "axis", "second") for at in "xyz"]
-    counts = {}
-    for k, pair in enumerate(lines.pairs):
-        counts[pair.name] = len(mattering(lines, k, [name.replace("P", pair.name, 1) for name in every]))
-    assert counts == {"O": 4, "P": 5, "Q": 4}
     balls = spatial("S-S", ("S", (0, 0, 0), None), ("S", (1, 0.3, 0.1), None))
-    assert len(mattering(balls, 1, every)) == 3
-    planar = slider_crank()
-    assert mattering(planar, 3, [f"D.axis.{at}" for at in "xy"]) == ["D.axis.y"]
+    m, task, name = {
+        "ball": (balls, mg.poses("body", turned(2, 1.0)), "P"),
+        "direction": (slider_crank(), mg.function("A", "D", [[0, 0], [1, 1], [2, 1]]), "D.axis"),
+    }.get(element, (LADDER["R-Sp-R function, 6 pairs"]()[0], mg.function("O", "Q", [[0, 0], [0.3, 0.2]]), element))
+    with pytest.raises(mg.DeclarationError, match=f" for {count} unknown"):
+        mg.synthesize(m, task, [name])
 
 
 def test_what_no_mechanism_can_do_is_refused_before_anything_is_solved() -> None:
