@@ -257,11 +257,6 @@ class Way:
         z = 2.0 * (self.number(at) - k) - 1.0
         return self._metrics[k] + float(np.cos(_ORDERS * math.acos(min(1.0, max(-1.0, z)))) @ self._roots[k])
 
-    @property
-    def size(self) -> float:
-        """The mean root of the mass so far."""
-        return self.metric(self.length) / self.length
-
     def extend(self, most: float) -> None:
         """Tabulate the next part, up to ``most`` at first; further than asked for where the kernel leads there."""
         place, beside = min(self.length + self._next, most), RESPONSE.around_crossing / 2
@@ -741,8 +736,9 @@ class PathStage:
             return False
         u, w = dense(begin + (t - begin) * _IN_STEP)[:2]
         parts = 0.25 * (t - begin) * math.sqrt(self._mass) * (w[3:].reshape(2, -1) @ _GAUSS[1])
-        missed = np.abs(np.diff([self.arc.metric(place) for place in u[:3].tolist()]) - parts).sum()
-        return not float(missed) <= allowed[0] * self.arc.home(float(y[0]))[2].size
+        way = np.diff([self.arc.metric(place) for place in u[:3].tolist()])
+        # over the mean root of the mass in the step it is what is missed of the place
+        return not float(np.abs(way - parts).sum() * abs(u[2] - u[0])) <= allowed[0] * abs(float(way.sum()))
 
     def accepted(self, t: float, y: Array) -> bool:
         """See ``Stage``."""
