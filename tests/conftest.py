@@ -1,5 +1,6 @@
 """Hypothesis profiles: ``dev`` at the desk, ``ci`` (always the same examples) where CI is set. Golden files."""
 
+import functools
 import importlib
 import itertools
 import os
@@ -83,6 +84,16 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         daily = marker.kwargs.get("daily", always[:DAILY])
         late = (pytest.param(seed, marks=pytest.mark.slow) for seed in always if seed not in daily)
         metafunc.parametrize("seed", [*daily, *late, *range(FURTHER, FURTHER + more)])
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """What tests are given as cases: every mechanism of the library is read once."""
+    load, mg.load = mg.load, functools.cache(mg.load)
+    try:
+        return (yield)
+    finally:
+        mg.load = load
 
 
 @pytest.hookimpl(optionalhook=True)
