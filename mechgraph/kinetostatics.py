@@ -69,7 +69,7 @@ from mechgraph.memo import dataclass
 from mechgraph.model.loads import Effort, Load
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import declared
-from mechgraph.outcome import FollowedPositions, Options, Outcome, Starts, compiled, served_before
+from mechgraph.outcome import FollowedPositions, Options, Outcome, Starts, closed_beside, compiled, served_before
 from mechgraph.quantities import door, wrong
 from mechgraph.result.contacts import with_other_flanks
 from mechgraph.result.notes import WHY_NOT
@@ -96,7 +96,8 @@ class Pipeline:
     def __init__(self, drive: DriverMotion, options: Options, trusting: bool = False) -> None:
         """``trusting``: where the kernel is likely to serve, its solution is the proof that the drivers determine the motion."""
         self.drive, self.m, self.options = drive, drive.m, options
-        self.start = closed_start(self.m, drive.first)
+        self.passive: tuple[PassiveMotion, ...] = ()
+        self.start = closed_start(self.m, drive.first, closer=self._closed_beside if trusting and not drive.free else None)
         if drive.free:
             self.m = drive.whole(self.start)
             self.start = closed_start(self.m)
@@ -108,13 +109,17 @@ class Pipeline:
         positions = 1 if options.redundant == "minimum_norm" else prod(drive.batch)
         self.engine = engine_for(self.system.n_rows, positions, options.engine)
         self.lead = np.arange(len(self.columns))
-        self.passive: tuple[PassiveMotion, ...] = ()
         self.hold: Index | None = None
         self.acting = self.columns
         self.trusts = trusting and drive.actuated is None and served_before(self)
         self.solver: ClosureSolver = closure_solver(self.engine, self.columns)
         if not self.trusts:
             self._determine()
+
+    def _closed_beside(self, system: System, x: Array) -> Array | None:
+        """See ``assembly.Closer``."""
+        self.system, self.columns = system, system.columns_of(self.drive.names)
+        return closed_beside(self, x)
 
     def _determine(self) -> None:
         """What leads, what is passive, and what solves the closure equations; raises where the drivers do not determine the motion."""

@@ -556,6 +556,18 @@ def served_before(line: Started) -> bool:
     return line.options.engine in ("auto", COMPILED) and isinstance(line.system.sized_once.get(_key(line)), Layout)
 
 
+def closed_beside(line: Started, x: Array) -> Array | None:
+    """The state ``(nx,)`` near ``x`` that the kernel closes, the drives kept; None where it served no mechanism of the graph before."""
+    library = at_hand()
+    if library is None or not served_before(line):
+        return None
+    found = _layout(line)
+    assert isinstance(found, Layout)
+    filled = tables(found, line.system, x[:, None], None)
+    assert filled is not None
+    return Kernel(library, found, *filled).closed(len(x))
+
+
 def _key(line: Started) -> tuple[object, ...]:
     """What of a mechanism is in the layout, beside its graph."""
     key = COMPILED, line.columns.tobytes(), _passive(line), tuple((c.freedoms, c.steps) for c in line.m.couplings)

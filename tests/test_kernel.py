@@ -382,6 +382,21 @@ def test_what_it_cannot_carry_is_named(make, why):
     assert mg.solve(m, swing(m)).engine == "dense"
 
 
+def test_a_changed_mechanism_is_closed_in_the_kernel(monkeypatch):
+    m = mg.load("7r")
+    pair = m.pairs[1]
+    point = (0.051, *pair.on_a.point[1:])
+    longer = m.replace(
+        pairs=[m.pairs[0], pair.replace(on_a=mg.Marker(point, pair.on_a.axis, pair.on_a.second)), *m.pairs[2:]]
+    )
+    alone = mg.solve(longer, {"O1": 0.2}, engine="dense")
+    mg.solve(m, {"O1": 0.2})
+    monkeypatch.setattr("mechgraph.kinematics.assembly.close", None)
+    s = mg.solve(longer.replace(name="again"), {"O1": 0.2})
+    for one in m.pairs:
+        np.testing.assert_allclose(s[one.name].position, alone[one.name].position, atol=1e-12)
+
+
 def test_auto_is_numpy_where_no_library_is(monkeypatch):
     m = mg.load("four-bar")
     monkeypatch.setattr(outcome, "at_hand", lambda: None)

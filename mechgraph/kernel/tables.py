@@ -454,6 +454,13 @@ class Kernel:
         )  # fmt: skip
         return np.asarray(whole > 0)
 
+    def closed(self, states: int) -> Array | None:
+        """The start of one mechanism closed by small corrections ``(states,)``, its drives kept; None where these do not lead there."""
+        room = self._room()
+        if self.library.mgk_start(*map(pointer, (self.I, self.P, room))):
+            return None
+        return room[:states].copy()
+
     def _room(self) -> Array:
         """Memory for one state; every call has its own."""
         return np.empty(ctypes.c_size_t(self.library.mgk_state_size(pointer(self.I))).value // 8 + 1)

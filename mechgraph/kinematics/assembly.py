@@ -9,7 +9,7 @@ make a singular value of about that part of the size; where it counts as zero, m
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -209,11 +209,17 @@ def _state(here: Configuration) -> tuple[System, Array]:
     return here.system, here.x[:, 0]
 
 
-def closed_start(m: Mechanism, preferred: Mapping[str, float] | None = None, tol: float = 0.0) -> Configuration:
+Closer = Callable[[System, Array], Array | None]
+"""Gives the closed state nearest to one ``(nx,)``, coordinates of the drives kept; None where it does not serve."""
+
+
+def closed_start(
+    m: Mechanism, preferred: Mapping[str, float] | None = None, tol: float = 0.0, closer: Closer | None = None
+) -> Configuration:
     """A closed state near ``start``, of the scaled system; closed to ``tol`` (radians, or lengths / L) where that is given.
 
     Tried in this order: as it stands; drives kept at their start; drives at the ``preferred`` values; everything free;
-    then guesses around the start, further and further away.
+    then guesses around the start, further and further away. What a ``closer`` gives of the first guess is taken where it is closed.
 
     Raises
     ------
@@ -222,13 +228,13 @@ def closed_start(m: Mechanism, preferred: Mapping[str, float] | None = None, tol
     DeclarationError
         where lengths are too far apart, unless the geometry is meant to ``tol``.
     """
-    here = _closed_start(m, preferred or {}, tol)
+    here = _closed_start(m, preferred or {}, tol, closer)
     if not tol:
         refuse_mixed_lengths(here)
     return here
 
 
-def _closed_start(m: Mechanism, preferred: Mapping[str, float], tol: float) -> Configuration:
+def _closed_start(m: Mechanism, preferred: Mapping[str, float], tol: float, closer: Closer | None) -> Configuration:
     if not m.has_geometry:
         bare = [p.name for p in m.pairs if not p.has_geometry]
         raise DeclarationError(
@@ -244,7 +250,7 @@ def _closed_start(m: Mechanism, preferred: Mapping[str, float], tol: float) -> C
         return scaled(Configuration(system, close_all(system, here.x, np.arange(0))[0]))
     known, asked = m.once(_kept)["searched"], x.tobytes()
     if not tol or known.get(asked, (x, 0.0))[1] <= tol:  # a search with a tolerance begins at the same guesses
-        known[asked] = _search(m, system, x, preferred, tol)
+        known[asked] = _search(m, system, x, preferred, tol, closer)
     x, error = known[asked]
     if error > max(CLOSED, tol):
         words = m.once(_kept)["opposite"]
@@ -324,8 +330,14 @@ def _closed_nearby(system: System, attempts: Sequence[tuple[Array, Index]], tol:
     return best, best_error
 
 
-def _search(m: Mechanism, system: System, x: Array, preferred: Mapping[str, float], tol: float) -> tuple[Array, float]:
+def _search(
+    m: Mechanism, system: System, x: Array, preferred: Mapping[str, float], tol: float, closer: Closer | None
+) -> tuple[Array, float]:
     attempts, goal = _attempts(m, system, x, preferred), max(CLOSED, tol)
+    if closer is not None and (closed := closer(system, attempts[0][0])) is not None:
+        error = float(Configuration(system, closed[:, None]).closure[0])
+        if error <= 10 * CLOSURE_GOAL:
+            return closed, error
     best, best_error = _closed_nearby(system, attempts, tol)
     if best_error <= goal:
         return best, best_error
