@@ -24,6 +24,7 @@ import mechgraph as mg
 from mechgraph import outcome
 from mechgraph.kernel import build, tables
 from mechgraph.kernel.tables import pointer
+from mechgraph.kinematics import assembly
 from mechgraph.kinematics.prescribed import DriverMotion
 from mechgraph.kinetostatics import Pipeline
 from mechgraph.outcome import Options
@@ -391,7 +392,7 @@ def test_a_changed_mechanism_is_closed_in_the_kernel(monkeypatch):
     )
     alone = mg.solve(longer, {"O1": 0.2}, engine="dense")
     mg.solve(m, {"O1": 0.2})
-    monkeypatch.setattr("mechgraph.kinematics.assembly.close", None)
+    monkeypatch.setattr(assembly, "close", None)
     s = mg.solve(longer.replace(name="again"), {"O1": 0.2})
     for one in m.pairs:
         np.testing.assert_allclose(s[one.name].position, alone[one.name].position, atol=1e-12)
