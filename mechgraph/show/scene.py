@@ -604,7 +604,7 @@ def _friction_circle(
     line = LONGEST_ARROW * stage.size * np.where(radius > 0, 1.0, np.nan)
     role: Role
     for role, what, along, middle, size, shape in (
-        ("drive", "circle", spin, at, radius, shapes.polyline(shapes.ring(1.0))),
+        ("reaction", "circle", spin, at, radius, shapes.polyline(shapes.ring(1.0))),
         ("axis", "line", force, at + np.nan_to_num(off), line, shapes.polyline([(0, 0, -1), (0, 0, 1)])),
     ):
         stage.frames[f"friction {what}:{name}"] = stretched(np.nan_to_num(along), middle, size, size)
