@@ -295,7 +295,7 @@ def test_forces_are_tangent_to_friction_circles() -> None:
     lines = []
     for p in pins:
         (circle,), (line,) = (
-            drawn(ax, f"{what} {p.name} friction {of}") for what, of in (("drive", "circle"), ("axis", "line"))
+            drawn(ax, f"{what} {p.name} friction {of}") for what, of in (("reaction", "circle"), ("axis", "line"))
         )
         ring, ends = circle.get_segments()[0], line.get_segments()[0]
         center, rho = 0.5 * (ring.min(axis=0) + ring.max(axis=0)), 0.5 * np.ptp(ring[:, 0])
