@@ -268,8 +268,7 @@ class FrictionProblem:
         """Efforts of drives ``(F, 2, T)`` on the verge of motion to - and to +, the others held; infinite where it jams, NaN in motion and
         where friction is not determined there: ``why (T,)``, with the ``growth (m, T)`` of the places, as in ``Rubbed``.
 
-        Where what only pushes would pull on the verge, or be pressed without bound, it tips or lifts before: see
-        ``HeldByFriction.greatest``.
+        Where what only pushes would pull on the verge, or be pressed without bound, it tips or lifts before: see ``AtRest.greatest``.
         """
         out, rest = np.full((len(dq), 2, self.here.T), np.nan), ~dq.any(axis=0)
         why, growth = np.zeros(self.here.T, dtype=int), np.zeros((1, self.here.T))
@@ -305,14 +304,14 @@ class FrictionProblem:
         return np.where(lost, np.nan, np.minimum(least, 1.0))
 
     def _tipping(self, dq: Array, at: Mask, given: Array, drive: int, sense: float) -> Array:
-        """Effort ``(T,)`` of a drive, by its place among the driven, with which it tips at positions ``at``."""
+        """Effort ``(T,)`` of a drive, by its place among the driven, with which it tips at positions ``at``: see ``AtRest.greatest``."""
         found = self.found
         places = places_of(self.here, dq, found.reactions, self.dry, True, (self.lines, self.flank))
         held = self._held(list(enumerate(places)), given, found.all_stress or found.stress)
         return held.greatest(np.flatnonzero(at), drive, sense)
 
     def holds(self, dq: Array, given: Array) -> Array:
-        """Whether friction holds it at rest with all drives off, where there are several ``(T,)``: see ``HeldByFriction.alone``."""
+        """Whether friction holds it at rest with all drives off, where there are several ``(T,)``: see ``AtRest.alone``."""
         driven, m, s = self.task.driven, self.here.system.m, self.here.system
         out = np.full(self.here.T, np.nan)
         if len(driven) < 2 or dq.any(axis=0).all():
@@ -332,7 +331,7 @@ class FrictionProblem:
         out = self._held(ways, given).alone()
         return np.where(dq.any(axis=0), np.nan, out)
 
-    def _held(self, ways: Sequence[tuple[int, Place]], given: Array, stress: Stress | None = None) -> HeldByFriction:
+    def _held(self, ways: Sequence[tuple[int, Place]], given: Array, stress: Stress | None = None) -> AtRest:
         """What frictions may do at rest; beside all multiples of a ``stress`` if one is given, and then under what only pushes."""
         found, unit = self.found, np.eye(len(given))[..., None]
         units = {c: self._with_drives(one, unit[c]) for c, one in self.unit.items()}
@@ -345,7 +344,7 @@ class FrictionProblem:
                 "coupled": row_efforts(self.here, stress.multipliers),
             }
             states.append(self._with_drives(under, 0.0))
-        return HeldByFriction(self.here, ways, states, len(self.task.driven))
+        return AtRest(self.here, ways, states, len(self.task.driven))
 
     def _with_drives(self, forces: Mapping[str, Array], given: Array | float) -> Array:
         """See ``_read``; behind it the efforts of drives, as the first of six numbers."""
@@ -353,7 +352,7 @@ class FrictionProblem:
         return np.concatenate([self._read(forces), [own, *np.zeros((5, *own.shape))]], axis=1)
 
 
-class HeldByFriction:
+class AtRest:
     """What may hold a mechanism at rest: of every place, by number, the frictions of the ``ways`` in which it rubs in motions of its pair,
     in parts ``g >= 0`` with ``sum g <= |V|``, and multiples of self-stresses under which what only pushes does not pull.
 

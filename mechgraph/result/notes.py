@@ -20,54 +20,29 @@ from mechgraph.result.views import BeltResult, CouplingResult, PairResult
 
 WHY_NOT = {
     Status.DEAD_POINT: (
-        "is a dead point{meet}",
-        "the drivers do not determine the motion there; drive another freedom, or leave such positions out",
-    ),
-    Status.BEYOND_DEAD_POINT: (
-        "is beyond a dead point; reached {at}{meet}",
-        "the way there leads through a dead point; drive another freedom, or leave such positions out",
-    ),
-    Status.OUT_OF_REACH: (
-        "is not reachable (status 'out of reach'); the motion stops at {at}{far}",
-        "the drivers do not get there on this branch; take values within reach, or another start",
-    ),
-    Status.CHANGE_POINT: (
-        "is a change point",
-        "branches cross, so no effort of the drivers balances every load and forces are NaN; take positions beside it, or drive a freedom "
-        "on the other side too",
-    ),
-    Status.ACTUATORS_REST: (
-        "is a dead point of actuate=",
-        "the freedoms of actuate= rest while the mechanism moves, so forces are NaN; actuate another freedom",
-    ),
+        "is a dead point{meet}", "the drivers do not determine the motion there; drive another freedom, or leave such positions out"),
+    Status.BEYOND_DEAD_POINT: ("is beyond a dead point; reached {at}{meet}",
+        "the way there leads through a dead point; drive another freedom, or leave such positions out"),
+    Status.OUT_OF_REACH: ("is not reachable (status 'out of reach'); the motion stops at {at}{far}",
+        "the drivers do not get there on this branch; take values within reach, or another start"),
+    Status.CHANGE_POINT: ("is a change point", "branches cross, so no effort of the drivers balances every load and forces are NaN; take "
+        "positions beside it, or drive a freedom on the other side too"),
+    Status.ACTUATORS_REST: ("is a dead point of actuate=",
+        "the freedoms of actuate= rest while the mechanism moves, so forces are NaN; actuate another freedom"),
     Status.NOT_CLOSED: (
-        "is not closed; last position {at}",
-        "within reach, but the closure residual stays above round-off; start closer",
-    ),
-    Status.NOT_FOLLOWED: (
-        "was not reached; last position {at}",
-        "the step limit was reached on the way; start closer, or ask for positions in between",
-    ),
-    Status.BEYOND_TOLERANCE: (
-        "exceeds tol; closure residual of the declared geometry: {miss:.3g}, over all positions {most:.3g}",
-        "the geometry as declared does not close to tol there; pass a larger tol=",
-    ),
-    Status.JAMS: (
-        "jams at {factor:.4g} times the friction declared",
-        "the normal forces in {pairs} grow without bound before friction has its full size; less friction, longer guides, or a drive "
-        "closer to the axis would move it",
-    ),
-    Status.NO_FINITE_FORCE: (
-        "has no finite force from {factor:.4g} times the friction declared on",
-        "with friction in {pairs} the solution ends before friction has its full size; less friction would move it",
-    ),
+        "is not closed; last position {at}", "within reach, but the closure residual stays above round-off; start closer"),
+    Status.NOT_FOLLOWED: ("was not reached; last position {at}",
+        "the step limit was reached on the way; start closer, or ask for positions in between"),
+    Status.BEYOND_TOLERANCE: ("exceeds tol; closure residual of the declared geometry: {miss:.3g}, over all positions {most:.3g}",
+        "the geometry as declared does not close to tol there; pass a larger tol="),
+    Status.JAMS: ("jams at {factor:.4g} times the friction declared", "the normal forces in {pairs} grow without bound before friction has "
+        "its full size; less friction, longer guides, or a drive closer to the axis would move it"),
+    Status.NO_FINITE_FORCE: ("has no finite force from {factor:.4g} times the friction declared on",
+        "with friction in {pairs} the solution ends before friction has its full size; less friction would move it"),
     Status.FRICTION_OPEN: ("", "friction of {pairs} has no one value, so forces are NaN: {why}"),
-    Status.LIFTS_OFF: (
-        "",
-        "{pairs} only push and cannot bear the loads, as of a table that tips over, so forces are NaN; press on it, set them wider, or "
-        "hold them on both sides (closed='form')",
-    ),
-}
+    Status.LIFTS_OFF: ("", "{pairs} only push and cannot bear the loads, as of a table that tips over, so forces are NaN; press on it, set "
+        "them wider, or hold them on both sides (closed='form')"),
+}  # fmt: skip
 """What the error says of one position, and why positions have no values and what gives them some, by status."""
 OPEN = {
     Came.SEVERAL: "more than one set of normal forces agrees with it. Less friction would leave one",
