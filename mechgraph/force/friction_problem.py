@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 import scipy
@@ -338,12 +339,8 @@ class FrictionProblem:
         free = self._with_drives(vars(found), given)
         states = [free[:, :, None], *answers(passed_on(self.here, [place for _, place in ways]), free, units)]
         if stress is not None:
-            under = {
-                "reactions": stress.wrenches,
-                **vars(stress),
-                "coupled": row_efforts(self.here, stress.multipliers),
-            }
-            states.append(self._with_drives(under, 0.0))
+            coupled = row_efforts(self.here, stress.multipliers)
+            states.append(self._with_drives({"reactions": stress.wrenches, "coupled": coupled, **vars(stress)}, 0.0))
         return AtRest(self.here, ways, states, len(self.task.driven))
 
     def _with_drives(self, forces: Mapping[str, Array], given: Array | float) -> Array:
@@ -375,14 +372,11 @@ class AtRest:
         self.push = [component_values(frames, each[:, :P])[push] for each in states]
         # what only pushes presses one way, known before any trial
         self.pressing: dict[int, Array] = {}
-        for i in np.flatnonzero(push):
-            pair, _, name = seats.labels[i].rpartition(".")
-            for p, o in enumerate(self.first):
-                if self.places[o].of == pair:
-                    k = self.places[o].reads
-                    group, member = here.system.place_of(k)
-                    j = here.system.groups[group].row.component_names.index(name)
-                    self.pressing[p] = np.einsum("dct,ct->dt", self.places[o].A, here.W[group][:, j, member])
+        by = dict(seats.labels[i].rsplit(".", 1) for i in np.flatnonzero(push))
+        for p, place in ((p, self.places[o]) for p, o in enumerate(self.first) if self.places[o].of in by):
+            group, member = here.system.place_of(place.reads)
+            j = here.system.groups[group].row.component_names.index(by[place.of])
+            self.pressing[p] = np.einsum("dct,ct->dt", place.A, here.W[group][:, j, member])
 
     def _rows(self, parts: list[Array], u: list[Array], t: int) -> tuple[Array, Array]:
         """A constant ``(n,)`` and what parts and multiples add to it, with directions ``u`` of normal vectors."""
@@ -390,8 +384,8 @@ class AtRest:
         along = [K[:, cut] @ u[o] for cut, o in zip(self.cuts, self.of, strict=True)]
         return one[:, 0], np.hstack([D + np.array(along).T, *more])
 
-    def _trial(self, V: Array, t: int) -> tuple[list[Array], Array, Array]:
-        """Directions of normal vectors ``V (d,)`` and ``A x <= b`` of the parts and multiples x that these allow."""
+    def _trial(self, V: Array, t: int) -> tuple[list[Array], tuple[Array, Array], Array, Array]:
+        """Directions of normal vectors ``V (d,)``, these by parts and multiples x, and ``A x <= b`` of those that are allowed."""
         each = [self.pressing[p][:, t] if p in self.pressing else V[self.cuts[o]] for p, o in enumerate(self.first)]
         u = [v / max(float(np.linalg.norm(v)), np.finfo(float).tiny) for v in each]
         one, per = self._rows(self.V, u, t)
@@ -399,36 +393,34 @@ class AtRest:
             np.array([v @ all_[self.cuts[o]] for v, o in zip(u, self.first, strict=True)]) for all_ in (per, one)
         )
         sums = np.pad(self.sums, ((0, 0), (0, per.shape[1] - len(self.of))))
-        return u, sums - along, limit + self.preload[:, t]
+        return u, (one, per), sums - along, limit + self.preload[:, t]
 
     def greatest(self, at: Index, drive: int, sense: float) -> Array:
         """The greatest effort ``(T,)`` of a drive, with its ``sense``, at positions ``at``: a linear program for each direction of V (limit
         analysis). Infinite where no effort is too much, NaN where nothing holds it.
-
-        Friction does not make more of what moves apart than of what slides: bodies tip where no forces that push are left.
         """
         out = np.full(self.preload.shape[1], np.nan)
         for t in at:
             V, best = self.V[0][:, 0, t], -np.inf
             for _ in range(8):
-                u, A, b = self._trial(V, t)
+                u, (one, per), A, b = self._trial(V, t)
                 (force, pushes), (own, rates) = self._rows(self.push, u, t), self._rows(self.own, u, t)
-                size, free = max(np.abs(b).max(), np.abs(force).max(initial=0.0)), self.V[-1].shape[1]
-                bounds = [(0.0, None)] * len(self.of) + [(None, None)] * free
-                found = scipy.optimize.linprog(
+                limits = np.concatenate([b, force])
+                size = max(float(np.abs(limits).max()), np.finfo(float).tiny)
+                bounds = [(0.0, None)] * len(self.of) + [(None, None)] * (per.shape[1] - len(self.of))
+                # presolve would not tell what is unbounded, and jams, from what has no solution
+                found: Any = scipy.optimize.linprog(
                     -sense * rates[drive],
                     np.vstack([A, -pushes]),
-                    np.concatenate([b, force]) / size,
+                    limits / size,
                     bounds=bounds,
                     options={"presolve": False},
                 )
-                # unbounded: it jams; what has no solution for a start of presolve is told apart without
                 if found.status:
                     best = np.inf if found.status == 3 else best
                     break
-                x = found.x * size
-                effort, before = sense * (own[drive] + rates[drive] @ x), best
-                one, per = self._rows(self.V, u, t)
+                x, before = found.x * size, best
+                effort = sense * (own[drive] + rates[drive] @ x)
                 V, best = one + per @ x, max(effort, best)
                 if effort - before <= STRESSES.rounding * size:
                     break
@@ -445,8 +437,8 @@ class AtRest:
         for t in range(len(out)):
             V = self.V[0][:, 0, t]
             for trial in range(8):
-                u, A, b = self._trial(V, t)
-                (one, per), (own, rates) = self._rows(self.V, u, t), self._rows(self.own, u, t)
+                u, (one, per), A, b = self._trial(V, t)
+                own, rates = self._rows(self.own, u, t)
                 g, met = _mixed(rates, own, A, b)
                 if met:
                     out[t] = 1.0
