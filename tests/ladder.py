@@ -184,6 +184,9 @@ LARGE: dict[str, Callable[[], Rung]] = {
     "four-bar function, 3 pairs and 2 slopes": lambda: (
         four_bar(), mg.function("A", "D", _rows(3, 2), rates=[np.nan, 0.6, 0.7]), ["B.point", "C.point"], 3,
     ),
+    "four-bar path, 9 points": lambda: (
+        four_bar(), mg.path("coupler.tip", _rows(9, 2, (1.5, 1.2))), ["A.point", "B.point", "C.point", "D.point"], 8652,
+    ),
 }  # fmt: skip
 """Rungs of minutes, without kept start sets: for ``benchmarks/make_task_starts.py``."""
 
@@ -194,6 +197,10 @@ PUBLISHED = {
     "S-S dyad, 7 poses": "Innocenti, Polynomial solution of the spatial Burmester problem, J. Mech. Des. 117, 1995",
     "four-bar path, 5 points, both pivots given": (
         "36 or fewer, Morgan and Wampler, Solving a planar four-bar design problem using continuation, J. Mech. Des. 112, 1990"
+    ),
+    "four-bar path, 9 points": (
+        "Wampler, Morgan and Sommese, Complete solution of the nine-point path synthesis problem for four-bar linkages, J. Mech. Des. 114, "
+        "1992"
     ),
     "R-R dyad, 4 poses": "the center-point curve is a cubic, Burmester, Lehrbuch der Kinematik, 1888",
 }

@@ -386,3 +386,29 @@ def test_a_real_solution_of_large_dimensions_is_none_of_the_complex_ones() -> No
     np.testing.assert_allclose(
         large, [-3023.87347842258, 1669.70465986535, 4.39956101537635, 0.237225493006354], rtol=2e-6
     )
+
+
+@pytest.mark.slow
+def test_four_bars_through_nine_points_are_1442_times_six_over_the_complex_numbers() -> None:
+    """The points of a four-bar of our own: one of those found leads its point along the same curve; all pass through the nine points."""
+    own = four_bar(B=(0.2, 0.8), C=(2.1, 1.7), D=(2.3, 0.1))
+    motion = mg.Motion(np.linspace(0.0, 2.4, 9), np.ones(9), np.zeros(9))
+    tip = mg.kinematics(own, {"A": motion}).link("coupler").at("tip")
+    points, along = (values[:, :2] @ [1, 1j] for values in (tip.position, tip.velocity))
+    task = mg.path("coupler.tip", tip.position[:, :2])
+    s = mg.synthesize(four_bar(), task, ["A.point", "B.point", "C.point", "D.point"])
+    assert (s.total, s.classes) == (8652, 1442)
+    assert 2 * len(s.distinct) == len(s)
+    same = []
+    for values, X in zip(s.values, s.poses[:, :, 2], strict=True):
+        A, B, C, D = values.reshape(4, 2) @ [1, 1j]
+        turn, place = X[:, 0, 0] + 1j * X[:, 1, 0], X[:, 0, 3] + 1j * X[:, 1, 3]
+        assert np.abs(place + turn * points[0] - points).max() < 1e-9
+        crank, rocker = (place + turn * pin - pivot for pin, pivot in ((B, A), (C, D)))
+        size = np.abs(values).max()
+        for arm in (crank, rocker):
+            assert np.ptp(np.abs(arm)) < 1e-8 * size
+        # velocities are square to the lines from where crank and rocker meet
+        meet = A + crank * np.imag((D - A) * rocker.conj()) / np.imag(crank * rocker.conj())
+        same.append(np.abs(np.real((points - meet) * along.conj())).max() < 1e-6 * size * np.abs(along).max())
+    assert sum(same) == 2

@@ -450,15 +450,13 @@ def distinct(poses: Array, known: Array | None = None, least: Array | None = Non
 
     ``least (V,)`` are differences, against their size, up to which they are one.
     """
-    have = [] if known is None else list(known.T)
-    out = []
-    for i, p in enumerate(poses.T):
-        if not np.isfinite(p).all():
-            continue
-        size = max(1.0, float(np.abs(p).max()))
+    n, out = 0 if known is None else known.shape[1], list[int]()
+    have = np.concatenate([known, poses], axis=1) if known is not None and n else poses.copy()
+    for i in np.flatnonzero(np.isfinite(poses).all(axis=0)).tolist():
+        size = max(1.0, float(np.abs(poses[:, i]).max(initial=0.0)))
         one = MODES.one_assembly if least is None else least[i]
-        if all(np.abs(p - q).max() > one * size for q in have):
-            have.append(p)
+        if (np.abs(have[:, : n + len(out)] - poses[:, [i]]).max(axis=0, initial=0.0) > one * size).all():
+            have[:, n + len(out)] = poses[:, i]
             out.append(i)
     return np.array(out, dtype=np.intp)
 

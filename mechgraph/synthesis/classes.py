@@ -151,7 +151,7 @@ class TaskClass:
         p = self.problem
         if not isinstance(p, RodProblem):
             return member, x
-        numbers = self._numbers(member, x)
+        numbers = self.numbers_at(member, x)
         rows = x[self.head :].reshape(self.R, self.nx, -1)
         back = np.argsort(p.order)
         states = p.lifted(numbers, rows[:, : self.states])
@@ -251,7 +251,7 @@ class TaskClass:
         n, ranks, settled = J.shape[1], [], []
         self._leave_followers(J, B)
         for i, free in enumerate(self.free):
-            own = slice(self._counted(n, i))
+            own = slice(self.counted(n, i))
             settled.append(_rank(J[i][own, free]))
             ranks.append(_rank(np.concatenate([J[i][own, free], B[i][own]], axis=1)))
         self.conditions = np.array(ranks) - np.array(settled)
@@ -273,7 +273,7 @@ class TaskClass:
         """
         angles_first, every = np.argsort(self.is_length, kind="stable"), self.given.copy()
         for i, own in enumerate(every):
-            k, F = self._counted(J.shape[1], i), self.problem.system.n_freedoms
+            k, F = self.counted(J.shape[1], i), self.problem.system.n_freedoms
             # a declared row that is closed by itself stays where it is: of it rates alone may follow
             columns = [c for c in angles_first if own[c] and (not self._rests(i) or self.columns[c] >= F)]
             A = np.concatenate([J[i][:k, self.columns[columns]], J[i][:k, self.free[i]], B[i][:k]], axis=1)
@@ -299,7 +299,7 @@ class TaskClass:
             at = np.array([*range(of.u), *(of.head + i * of.F + free)])
             for _ in range(40):
                 rows = of.at(goal, x)
-                k = of._counted(rows.residual.shape[1], i)
+                k = of.counted(rows.residual.shape[1], i)
                 J = np.concatenate([rows.by_unknowns[i][:k], rows.by_coordinates[i][:k, free]], axis=1)
                 step = np.zeros((of.head + of.R * of.F, T))
                 step[at] = least_norm_steps(J, rows.residual[i][:k], MODES.generic).real
@@ -393,19 +393,19 @@ class TaskClass:
         found, x = self.random_closed(rng, 3 * n)
         return [found[i] for i in self._by_condition(found, x)[:n]]
 
-    def _counted(self, n: int, i: int) -> int:
+    def counted(self, n: int, i: int) -> int:
         """How many of ``n`` equations, order by order, count at a row: of no higher order than is asked there."""
         return n * (1 + int(self.orders[i])) // (1 + len(self.problem.rates))
 
     def error(self, rows: ArrowRows) -> Array:
         """The largest part of what is left open at any row ``(T,)``."""
-        left = [np.abs(own[: self._counted(len(own), i)]).max(axis=0) for i, own in enumerate(rows.residual)]
+        left = [np.abs(own[: self.counted(len(own), i)]).max(axis=0) for i, own in enumerate(rows.residual)]
         return np.max(left, axis=0, initial=0.0) if left else np.zeros(rows.T)
 
     def _block(self, shape: tuple[int, int, int, int], rows: list[int], n: int, rng: np.random.Generator) -> RowBlock:
         """Rows of ``(rank, settled, free, order)`` such equations and coordinates, of ``n`` equations in all."""
         rank, settled, free, _ = shape
-        k = self._counted(n, rows[0])
+        k = self.counted(n, rows[0])
         mix = np.zeros((len(rows), rank, n), dtype=complex)
         mix[:, :, :k] = np.linalg.qr(rng.normal(size=(len(rows), k, k)) + 1j * rng.normal(size=(len(rows), k, k)))[0][
             :, :rank
@@ -422,13 +422,13 @@ class TaskClass:
         """Numbers of a state before those of rows: unknowns, and norms of directions where these are unknown."""
         return self.u + self.W
 
-    def _wide(self, values: Array) -> Array:
+    def wide(self, values: Array) -> Array:
         """``(R n, T)`` as ``(n, R T)``."""
         T = values.shape[1]
         n = len(values) // self.R
         return values.reshape(self.R, n, T).transpose(1, 0, 2).reshape(n, self.R * T)
 
-    def _tall(self, values: Array) -> Array:
+    def tall(self, values: Array) -> Array:
         """``(n, R T)`` as ``(R n, T)``."""
         n = len(values)
         T = values.shape[1] // self.R
@@ -436,27 +436,27 @@ class TaskClass:
 
     def advance(self, x: Array, dq: Array) -> Array:
         """States after increments."""
-        here, step, F = self._wide(x[self.head :]), self._wide(dq[self.head :]), self.problem.system.n_freedoms
+        here, step, F = self.wide(x[self.head :]), self.wide(dq[self.head :]), self.problem.system.n_freedoms
         rows = self.problem.system.advance(here[: self.states], step[:F])
         return self._joined(x[: self.head] + dq[: self.head], rows, here[self.states :] + step[F:])
 
     def _joined(self, head: Array, rows: Array, rates: Array) -> Array:
         """What stands before rows, in them, and in the rates behind them."""
-        return np.concatenate([head, self._tall(np.concatenate([rows, rates]))])
+        return np.concatenate([head, self.tall(np.concatenate([rows, rates]))])
 
     def state_rates(self, x: Array, dq: Array) -> Array:
         """Rates of states for rates of increments."""
-        here, step, F = self._wide(x[self.head :]), self._wide(dq[self.head :]), self.problem.system.n_freedoms
+        here, step, F = self.wide(x[self.head :]), self.wide(dq[self.head :]), self.problem.system.n_freedoms
         return self._joined(dq[: self.head], self.of_row.state_rates(here[: self.states], step[:F]), step[F:])
 
     def normal(self, x: Array) -> Array:
         """States with unit quaternions."""
-        here = self._wide(x[self.head :])
+        here = self.wide(x[self.head :])
         return self._joined(x[: self.head], self.of_row.normal(here[: self.states]), here[self.states :])
 
     def far(self, x: Array, angle: float = ENDLESS_STATE[0]) -> Mask:
         """Which are on their way to infinity."""
-        here = self._wide(x[self.head :])
+        here = self.wide(x[self.head :])
         rows = self.of_row.far(here[: self.states], angle) | (
             np.abs(here[self.states :]).max(axis=0, initial=0.0) > ENDLESS_STATE[1]
         )
@@ -464,11 +464,11 @@ class TaskClass:
 
     def wound(self, change: Array) -> Array:
         """Largest change ``(T,)`` of an angle."""
-        return self.of_row.wound(self._wide(change[self.head :])[: self.states]).reshape(self.R, -1).max(axis=0)
+        return self.of_row.wound(self.wide(change[self.head :])[: self.states]).reshape(self.R, -1).max(axis=0)
 
     def size(self, x: Array, dq: Array) -> Array:
         """Largest increment ``(T,)``, against the size of lengths."""
-        here, step, F = self._wide(x[self.head :]), self._wide(dq[self.head :]), self.problem.system.n_freedoms
+        here, step, F = self.wide(x[self.head :]), self.wide(dq[self.head :]), self.problem.system.n_freedoms
         rates = (np.abs(step[F:]) / (1.0 + np.abs(here[self.states :]))).max(axis=0, initial=0.0)
         rows = np.maximum(self.of_row.size(here[: self.states], step[:F]), rates).reshape(self.R, -1).max(axis=0)
         own = (np.abs(dq[: self.u]) / (1.0 + np.abs(x[: self.u]))).max(axis=0, initial=0.0)
@@ -497,14 +497,14 @@ class TaskClass:
         drive = np.nan_to_num(self.asked)[:, :, None].astype(complex)
         return ClassMember(numbers, np.repeat(drive, numbers.point.shape[-1], axis=-1))
 
-    def _numbers(self, member: ClassMember, x: Array) -> RowNumbers:
+    def numbers_at(self, member: ClassMember, x: Array) -> RowNumbers:
         """The numbers of members at states, with the unknown ones of these."""
         near = x[self.u : self.head].reshape(2, 2, len(self.problem.order), x.shape[1]) if self.W else None
         return member.numbers.with_values(self.problem.places, x[: self.u], near)
 
     def at(self, member: ClassMember, x: Array) -> ArrowRows:
         """The equations of members at states of which what is asked is set to what they ask."""
-        numbers = self._numbers(member, x)
+        numbers = self.numbers_at(member, x)
         X, drive = x[self.head :].reshape(self.R, self.nx, -1).copy(), member.drive * self.problem.factors(numbers)
         for i, given in enumerate(self.given):
             X[i, self.asked_rows[given]] = drive[i, given]
@@ -623,7 +623,9 @@ class Arrow:
     def noise(self) -> Array:
         """Rounding ``(T,)`` to be expected of a Newton step."""
         size = np.abs(self.rows.here.poses).max(axis=(0, 1, 2)).reshape(-1, self.rows.T).max(axis=0)
-        return rounding(size)
+        lengths = np.maximum(size, np.abs(self.x[: self.of.u]).max(axis=0, initial=1.0))
+        # of rows in squares of lengths; seen at tracks on which these are thousands
+        return 6.0 * rounding(np.cbrt(size * lengths**2))
 
     def _mixed(self, block: RowBlock, values: Array) -> Array:
         """``(R, n, k, T)`` as the combinations of every row of a block, ``(G, T, rank, k)``."""

@@ -11,7 +11,8 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Hashable, Iterator
-from functools import cached_property
+from copy import copy
+from functools import cached_property, partial
 from itertools import permutations
 from typing import Any
 
@@ -19,11 +20,12 @@ import numpy as np
 
 from mechgraph.graph.chains import least_order, ranked
 from mechgraph.graph.linkgraph import components_of_edges, members
-from mechgraph.maths.se3 import Index
+from mechgraph.maths.newton import least_norm_steps
+from mechgraph.maths.se3 import Index, Mask
 from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
 from mechgraph.modes.family import Array, same_back
-from mechgraph.modes.start_sets import distinct
+from mechgraph.modes.homotopy import polished
 from mechgraph.synthesis.classes import ClassMember, TaskClass
 from mechgraph.synthesis.system import RowNumbers, RowProblem
 from mechgraph.variants.numbers import MARKER
@@ -125,6 +127,14 @@ class TaskLabelling:
             for own in self.of.problem.places
         ]
         return np.array(sorted(range(len(told)), key=told.__getitem__), dtype=np.intp)
+
+    def unknowns_ordered(self, z: Array) -> Array:
+        """Unknowns ``(u, ...)`` in canonical order."""
+        return z[self._unknowns] if len(z) else z
+
+    def unknowns_taken(self, z: Array) -> Array:
+        """Unknowns from those in canonical order."""
+        return z[np.argsort(self._unknowns)] if len(z) else z
 
     @cached_property
     def _asked(self) -> tuple[Index, Array]:
@@ -249,11 +259,13 @@ def orbits(z: Array, of: tuple[Symmetry, ...], motions: Array) -> list[list[int]
     """Solutions ``z (u, n)`` that exchanges make of each other, or that do the same: whose ``motions (k, n)`` are the same."""
     n, ends = z.shape[1], list[tuple[int, int]]()
     for i in range(n):
+        alike = same_motions(motions, i)
         for one in of:
-            there = np.empty_like(z[:, i])
-            there[one.places] = z[:, i]
-            ends += [(i, j) for j in range(i + 1, n) if not len(distinct(there[:, None], z[:, [j]]))]
-        ends += [(i, j) for j in range(i + 1, n) if does_the_same(motions, i, j)]
+            there = np.empty_like(z[:, [i]])
+            there[one.places] = z[:, [i]]
+            size = max(1.0, float(np.abs(there).max(initial=0.0)))
+            alike |= np.abs(z - there).max(axis=0, initial=0.0) <= MODES.one_assembly * size
+        ends += [(i, j) for j in np.flatnonzero(alike).tolist()]
     return members(components_of_edges(n, ends)) if n else []
 
 
@@ -276,14 +288,51 @@ def motions_of(of: TaskClass, member: ClassMember, x: Array) -> Array:
     return np.concatenate(out) if out else np.zeros((0, x.shape[1]))
 
 
-def does_the_same(motions: Array, i: int, j: int) -> bool:
-    """Whether two solutions of ``motions (k, n)`` do the same."""
-    return bool(len(motions) and np.abs(motions[:, i] - motions[:, j]).max() < MODES.real_singular)
+def same_motions(motions: Array, i: int) -> Mask:
+    """Which solutions of ``motions (k, n)`` do the same as one of them."""
+    n = motions.shape[1]
+    return np.abs(motions - motions[:, [i]]).max(axis=0) < MODES.real_singular if len(motions) else np.arange(n) == i
+
+
+def placed(of: TaskClass, member: ClassMember, z: Array, rng: np.random.Generator) -> tuple[Array, Mask]:
+    """States ``(nx, n)`` of unknowns ``z (u, n)``, which may be rounded, at a task that they do, from random positions; which close."""
+    p, s, n = of.problem, of.problem.system, z.shape[1]
+    numbers = p.numbers.with_values(p.places, z)
+    X, open_ = np.zeros((of.R, of.nx, n), dtype=complex), np.ones((of.R, n), dtype=bool)
+    # random positions, and Gauss-Newton steps from them
+    for _ in range(16):
+        some = rng.normal(size=(s.n_freedoms, of.R * n, 2)) @ [1.0, 0.5j]
+        states = s.advance(np.repeat(p.at_rest[:, None].astype(complex), of.R * n, axis=1), some)
+        trial = np.zeros_like(X)
+        trial[:, : of.states] = np.moveaxis(states.reshape(of.states, of.R, n), 0, 1)
+        x = np.concatenate([z, numbers.norms.reshape(-1, n)[: of.W], np.where(open_[:, None], trial, X).reshape(-1, n)])
+        for _ in range(12):
+            rows = of.at(member, x)
+            step = np.zeros((of.R, of.F, n), dtype=complex)
+            for i, free in enumerate(of.free):
+                k = of.counted(rows.residual.shape[1], i)
+                step[i, free] = least_norm_steps(rows.by_coordinates[i][:k, free], rows.residual[i][:k], MODES.generic)
+            step /= np.maximum(1.0, np.abs(step).max(axis=1, keepdims=True))
+            x = of.advance(of.state(rows), np.concatenate([np.zeros((of.head, n)), step.reshape(-1, n)]))
+        rows, X = of.at(member, x), x[of.head :].reshape(X.shape)
+        # unknowns may be rounded
+        open_ = ~(np.abs(rows.residual).max(axis=1) < 1e-2)
+        if not open_.any():
+            break
+    x, closed = polished(of.leg(member, member), x, 1.0, np.zeros(n, dtype=np.intp))
+    return x, closed & ~open_.any(axis=0)
+
+
+def by_motions(of: TaskClass) -> TaskClass:
+    """The class with solutions that do the same as one."""
+    out = copy(of)
+    vars(out)["fingerprints"] = partial(motions_of, of)
+    return out
 
 
 def cognates(copies: list[list[int]], of: tuple[Symmetry, ...], motions: Array) -> tuple[Symmetry, ...]:
     """What is said where solutions do the same and are more than exchanges make."""
-    same = max((sum(does_the_same(motions, mine[0], i) for i in mine) for mine in copies), default=1) // (1 + len(of))
+    same = max((int(same_motions(motions, mine[0]).sum()) for mine in copies), default=1) // (1 + len(of))
     text = (
         f"Of {same} mechanisms each the numbers asked move in the same directions at all positions: they do the same."
     )

@@ -12,21 +12,24 @@ from __future__ import annotations
 
 import sys
 import zipfile
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import field, replace
 from fractions import Fraction
 from functools import partial
 from math import lcm, prod
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from mechgraph.errors import MechgraphError, counted
 from mechgraph.files import cache_folder, whole_file
+from mechgraph.maths.se3 import Index
 from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
 from mechgraph.modes.family import Array
-from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, follow
+from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, follow, polished
 from mechgraph.modes.start_sets import (
     MISSED,
     MISSED_AGAIN,
@@ -40,7 +43,7 @@ from mechgraph.modes.start_sets import (
 )
 from mechgraph.modes.targets import TrackRun, run_tracks
 from mechgraph.synthesis.classes import ClassMember, TaskClass
-from mechgraph.synthesis.labelling import TaskLabelling
+from mechgraph.synthesis.labelling import TaskLabelling, by_motions, motions_of, placed, symmetries
 from mechgraph.variants.numbers import MARKER
 
 Progress = Callable[[str], None] | None
@@ -50,7 +53,8 @@ Progress = Callable[[str], None] | None
 class TaskStart:
     """All solutions ``x (nx, N)`` known of a task of a class, and what that they are all rests on (see ``modes.start_sets.StartSet``).
 
-    ``source``: who published that there are so many, for sets that came with the package.
+    ``source``: who published that there are so many, for sets that came with the package. Of a large set ``x`` has one of
+    ``each`` solutions that do the same, and ``copies (u, N, k)`` are unknowns of the others, but for exchanges.
     """
 
     member: ClassMember
@@ -61,6 +65,13 @@ class TaskStart:
     followed: int
     trace: Trace
     source: str = ""
+    copies: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
+    each: int = 1
+
+    @property
+    def total(self) -> int:
+        """How many solutions there are."""
+        return self.x.shape[1] * self.each
 
     @property
     def word(self) -> str:
@@ -70,15 +81,20 @@ class TaskStart:
         return "tested" if self.trace.passed and self.chance <= MISSED else "searched"
 
     @property
+    def _each(self) -> str:
+        told = f" ({self.x.shape[1]} times {self.each} that do the same, of which one is followed)"
+        return told if self.each > 1 else ""
+
+    @property
     def evidence(self) -> tuple[str, ...]:
         """What that rests on."""
         loops = (
-            f"A random complex task of the class has {counted(self.x.shape[1], 'solution')}: {counted(self.loops, 'loop')} of such tasks "
-            f"brought no further one (chance of one missed {self.chance:.1g} where all permutations are as likely), {self.lost} of "
+            f"A random complex task of the class has {counted(self.total, 'solution')}{self._each}: {counted(self.loops, 'loop')} of such "
+            f"tasks brought no further one (chance of one missed {self.chance:.1g} where all permutations are as likely), {self.lost} of "
             f"{self.followed} tracks lost."
         )
         if self.source:
-            return (f"As many as such tasks have in general: {self.source}.",)
+            return (f"As many as such tasks have in general: {self.total}{self._each}, {self.source}.",)
         if not self.trace.passed:
             return (loops, "No trace test passed; solutions may be missing.")
         return (
@@ -144,10 +160,16 @@ def start_set(
     of: TaskClass, rng: np.random.Generator, progress: Progress, published: tuple[int, str] | None = None
 ) -> TaskStart:
     """All solutions of a random task of a class; where there are as many as were ``published``, no test is needed."""
-    # solutions from which on they are not looked for any further
-    most, source = published or (20_000, "")
-    group = TrackGroup(of, of.start, of.x[:, None], most)
+    # solutions from which on they are not looked for any further, and from which on one is followed of those that do the same
+    (most, source), many = published or (20_000, ""), 100
+    group = TrackGroup(of, of.start, of.x[:, None], min(most, many))
     group.grow(MISSED, rng, progress)
+    if group.x.shape[1] >= many:
+        if len(motions_of(of, group.base, group.x)):
+            found = _of_each(of, group, rng, progress)
+            return replace(found, source=source if found.total == most else "")
+        group.most = most
+        group.grow(MISSED, rng, progress)
     known = group.quiet, group.chance
     group.move(*tame(of, group.base, group.x, rng))
     if source and group.x.shape[1] == most:
@@ -158,6 +180,90 @@ def start_set(
         known = group.quiet, group.chance
         trace = trace_test(of, group.base, group.x, rng, progress, TaskPencil) if known[1] <= MISSED_AGAIN else trace
     return TaskStart(group.base, group.x, *known, group.lost, group.followed, trace)
+
+
+def _of_each(of: TaskClass, group: TrackGroup, rng: np.random.Generator, progress: Progress) -> TaskStart:
+    """One of all solutions that do the same, by straight ways between all pairs of some tasks, which make three loops; and their copies."""
+    followed, n = by_motions(of), 4
+    tasks, told = [group.base, *of.random_members(rng, n - 1)], followed.fingerprints(group.base, group.x)
+    x, prints = ([v[:, distinct(told)], *[v[:, :0]] * (n - 1)] for v in (group.x, told))
+    met = {(a, b): set[int]() for a in range(n) for b in range(n) if a != b}
+    ways, lost, tracks = list[Way](), group.lost, group.followed
+    while (longest := max((x[a].shape[1] - len(done), a, b) for (a, b), done in met.items()))[0]:
+        left, a, b = longest
+        todo = np.setdiff1d(np.arange(x[a].shape[1]), list(met[a, b]))[:TRACKS_TOGETHER]
+        if progress is not None:
+            progress(f"{[v.shape[1] for v in x]} solutions of {n} random tasks so far, {left} tracks to the next")
+        tracked = follow(of.leg(tasks[a], tasks[b]), x[a][:, todo], Care())
+        there = tracked.x[:, tracked.arrived]
+        found = followed.fingerprints(tasks[b], there)
+        new = distinct(found, prints[b])
+        x[b], prints[b] = (np.concatenate(v, axis=1) for v in ((x[b], there[:, new]), (prints[b], found[:, new])))
+        place = [int(np.abs(prints[b] - one[:, None]).max(axis=0).argmin()) for one in found.T]
+        met[a, b].update(todo.tolist())
+        met[b, a].update(place)
+        led = todo[tracked.arrived].tolist()
+        ways += [Way((a, i), (b, k), x[a][:, i], y) for i, k, y in zip(led, place, there.T, strict=True)]
+        lost, tracks = lost + len(todo) - len(place), tracks + len(todo)
+    N = [v.shape[1] for v in x]
+    chance = (1.0 / (N[0] + 1) + lost / tracks) ** 3 if len(set(N)) == 1 else 1.0
+    copies, each = _copies(of, tasks, x[0], ways)
+    return TaskStart(group.base, x[0], 3, chance, lost, tracks, NOT_PASSED, copies=copies, each=each)
+
+
+class Way(NamedTuple):
+    """A track between solutions ``(task, number)``: its own ones at both ends, which may be copies of those."""
+
+    begin: tuple[int, int]
+    end: tuple[int, int]
+    x: Array
+    y: Array
+
+
+def _copies(of: TaskClass, tasks: list[ClassMember], x: Array, ways: list[Way]) -> tuple[Array, int]:
+    """Unknowns ``(u, N, k)`` of copies of solutions ``x (nx, N)`` of the first task, none an exchange of another; and how many there are.
+
+    Those of one solution are all to which different ways have led; they are led on to the next ones beside tracks that are known.
+    """
+    turns = [np.arange(of.u), *(np.argsort(one.places) for one in symmetries(of.whole))]
+
+    def among(z: Array, others: Sequence[Array]) -> bool:
+        near = 1e-6 * (1.0 + np.abs(z[: of.u]).max())
+        return any(np.abs(z[: of.u][turn] - y[: of.u]).max() < near for turn in turns for y in others)
+
+    same = {(0, i): [own] for i, own in enumerate(x.T)}
+    for way in (way for way in ways if not way.end[0] and not among(way.y, same[way.end])):
+        same[way.end].append(way.y)
+    first, k = max(same, key=lambda i: len(same[i])), max(map(len, same.values()))
+    known = {first: same[first]}
+    # those to the first task before others, which lead to solutions of it that are not known
+    both = sorted([*ways, *(Way(w.end, w.begin, w.y, w.x) for w in ways)], key=lambda way: way.end[0] > 0)
+    onto, tried = {way.begin: way.end for way in both if not way.end[0]}, set[tuple[tuple[int, int], ...]]()
+    while k > 1:
+        step, aside = dict[tuple[int, int], Way](), dict[tuple[int, int], Way]()
+        for way in both:
+            goal = onto.get(way.end, way.end) if way.end[0] else way.end
+            if way.begin in known and way.end not in known and (way.begin, way.end) not in tried:
+                (aside if goal in known else step).setdefault(goal, way)
+        if not (step := step or aside):
+            break
+        a, b = Counter((way.begin[0], way.end[0]) for way in step.values()).most_common(1)[0][0]
+        some = [way for way in step.values() if (way.begin[0], way.end[0]) == (a, b)]
+        if further := [way for way in some if not among(way.x, known[way.begin])]:
+            # all over again from where there is a further one
+            known, k = {further[0].begin: [*known[further[0].begin], further[0].x]}, k + 1
+            tried.clear()
+            continue
+        tried.update((way.begin, way.end) for way in some)
+        others = [[y for y in known[way.begin] if not among(y, [way.x])] for way in some]
+        tracked = follow(of.leg(tasks[a], tasks[b]), np.array([y for own in others for y in own]).T, Care())
+        ends = zip(tracked.x.T.reshape(len(some), k - 1, -1), tracked.arrived.reshape(-1, k - 1), strict=True)
+        known |= {way.end: [way.y, *led] for way, (led, came) in zip(some, ends, strict=True) if came.all()}
+    out = np.full((of.u, x.shape[1], k - 1), np.nan, dtype=complex)
+    for (task, i), found in known.items():
+        if not task:
+            out[:, i] = np.array([y[: of.u] for y in found if not among(y, [x[:, i]])]).T
+    return out, k * len(turns)
 
 
 # --- kept in a folder ----------------------------------------------------------------------------------------------------
@@ -181,11 +287,20 @@ def _read(labelling: TaskLabelling, file: Path, prefix: str) -> TaskStart | None
             chance, last, beyond = f[prefix + "sizes"].tolist()
             source = str(f[prefix + "source"])
             vectors = {name: f[prefix + name] for name in MARKER}
-            member, x = labelling.taken(vectors, f[prefix + "drive"], f[prefix + "x"])
-        found = TaskStart(member, x, loops, chance, lost, followed, Trace(degree, samples, last, beyond), source)
-        here = labelling.of.at(found.member, found.x)
+            each, stored = int(f[prefix + "each"]), f[prefix + "x"]
+            if not np.iscomplexobj(stored):
+                stored = stored.astype(float) @ [1.0, 1.0j]
+                stored[:, f[prefix + "exactly"]] = f[prefix + "exact"]
+            member, x = labelling.taken(vectors, f[prefix + "drive"], stored)
+            copies = labelling.unknowns_taken(f[prefix + "copies"])
+        # digits that were left out come back
+        of, tracks = labelling.of, np.zeros(x.shape[1], dtype=np.intp)
+        x, closed = polished(of.leg(member, member), x, 1.0, tracks)
+        trace = Trace(degree, samples, last, beyond)
+        found = TaskStart(member, x, loops, chance, lost, followed, trace, source, copies, each)
+        here = of.at(member, x)
         size = np.maximum(1.0, np.abs(here.here.poses).max())
-        return found if labelling.of.error(here).max() < MODES.member_closed * size else None
+        return found if closed.all() and of.error(here).max() < MODES.member_closed * size else None
     except (OSError, ValueError, KeyError, IndexError, EOFError, RuntimeError, zipfile.BadZipFile, TypeError):
         return None
 
@@ -194,7 +309,8 @@ def arrays(labelling: TaskLabelling, start: TaskStart) -> dict[str, Any]:
     """A start set as arrays by name."""
     sizes = np.array([start.chance, start.trace.last, start.trace.beyond])
     counts = np.array([start.loops, start.lost, start.followed, start.trace.degree, start.trace.samples])
-    told = {"sizes": sizes, "counts": counts, "source": np.array(start.source)}
+    told = {"sizes": sizes, "counts": counts, "source": np.array(start.source), "each": np.array(start.each)}
+    told["copies"] = labelling.unknowns_ordered(start.copies)
     return labelling.ordered(start.member, start.x) | told
 
 
@@ -214,23 +330,30 @@ def _keep(of: TaskClass, start: TaskStart) -> None:
 
 @dataclass
 class TaskEnds:
-    """What tracks to a task came to: regular solutions ``x (nx, n)``, singular ones, and how many went to infinity or were lost."""
+    """What tracks to a task came to: regular solutions ``x (nx, n)``, singular ones, and how many went to infinity or were lost.
+
+    ``which (n,)`` are the tracks of regular ones, of a single run.
+    """
 
     x: Array
     singular: Array
     infinite: int
     lost: int
     runs: int
+    which: Index
 
 
 def ends(
     of: TaskClass, start: TaskStart, goals: ClassMember, rng: np.random.Generator, progress: Progress
 ) -> list[TaskEnds]:
-    """Tracks of all solutions of a start set to tasks; further runs by way of random tasks make up for tracks that are lost."""
+    """Tracks of all solutions of a start set to tasks; of sets that are not large further runs make up for tracks that are lost, by way of
+    random tasks.
+    """
     n, N = goals.drive.shape[-1], start.x.shape[1]
-    every, left = [TaskEnds(start.x[:, :0], start.x[:, :0], 0, N, 0) for _ in range(n)], np.arange(n)
+    of = by_motions(of) if start.each > 1 else of
+    every, left = [TaskEnds(start.x[:, :0], start.x[:, :0], 0, N, 0, np.arange(0)) for _ in range(n)], np.arange(n)
     # runs of all tracks, at most
-    for run in range(4):
+    for run in range(4 if N < TRACKS_TOGETHER else 1):
         if progress is not None:
             progress(f"{counted(N, 'track')} to {counted(len(left), 'task')}, run {run + 1}")
         care = Care() if run < 2 else Care().finer
@@ -246,19 +369,20 @@ def ends(
                 continue
             here = run_tracks(of.leg(begin, goals.taken(some), which), np.tile(x, len(some)), care)
             for j, place in enumerate(some.tolist()):
-                _account(of, every[place], here.taken(np.flatnonzero(which == j)), N - x.shape[1])
+                goal = goals.taken(np.array([place]))
+                _account(of, goal, every[place], here.taken(np.flatnonzero(which == j)), N - x.shape[1])
         left = left[[every[i].lost > 0 for i in left]]
         if not left.size:
             break
     return every
 
 
-def _account(of: TaskClass, known: TaskEnds, run: TrackRun, lost_before: int) -> None:
+def _account(of: TaskClass, goal: ClassMember, known: TaskEnds, run: TrackRun, lost_before: int) -> None:
     """Put the ends of a run to those that are known."""
-    u, N = of.u, lost_before + len(run.regular)
-    regular = run.x[:, run.regular]
-    new = distinct(regular[:u], known.x[:u])
+    N, regular = lost_before + len(run.regular), run.x[:, run.regular]
+    new = distinct(of.fingerprints(goal, regular), of.fingerprints(goal, known.x))
     known.x = np.concatenate([known.x, regular[:, new]], axis=1)
+    known.which = np.append(known.which, np.flatnonzero(run.regular)[new])
     singular, infinite = run.x[:, run.singular], int(run.infinite.sum())
     # the run counts in which most is known
     if not known.runs or singular.shape[1] + infinite > known.singular.shape[1] + known.infinite:
@@ -285,6 +409,20 @@ def start_of(of: TaskClass, rng: np.random.Generator, cache: bool, progress: Pro
     if cache and (made.word == "tested" or made.chance <= MISSED_AGAIN):
         _keep(of, made)
     return made
+
+
+def unfolded(of: TaskClass, start: TaskStart, goal: ClassMember, found: TaskEnds, rng: np.random.Generator) -> Array:
+    """Solutions ``(nx, n)`` of a task with those that do the same, where one of these may be real: where they move in real directions."""
+    if start.each == 1:
+        return found.x
+    real = np.flatnonzero(np.abs(motions_of(of, goal, found.x).imag).max(axis=0, initial=0.0) < MODES.real_singular)
+    z = start.copies[:, found.which[real]].reshape(of.u, -1)
+    x, closed = placed(of, start.member, z[:, np.isfinite(z).all(axis=0)], rng)
+    tracked = follow(of.leg(start.member, goal), x[:, closed], Care())
+    every = np.concatenate([found.x[:, real], tracked.x[:, tracked.arrived]], axis=1)[: of.u]
+    swapped = [every[np.argsort(one.places)] for one in symmetries(of.whole)]
+    x, closed = placed(of, goal, np.concatenate([every[:, len(real) :], *swapped], axis=1), rng)
+    return np.concatenate([found.x, x[:, closed]], axis=1)
 
 
 # --- real solutions ------------------------------------------------------------------------------------------------------

@@ -33,7 +33,7 @@ from mechgraph.synthesis.classes import ClassMember, NoClass, TaskClass
 from mechgraph.synthesis.fitness import Fitness, Measure, fitness, limits_of
 from mechgraph.synthesis.fits import Fit, FitPoint, Fitted, fitted
 from mechgraph.synthesis.labelling import cognates, motions_of, orbits, symmetries
-from mechgraph.synthesis.solve import Progress, TaskEnds, TaskStart, ends, kept, real_states, start_of
+from mechgraph.synthesis.solve import Progress, TaskEnds, TaskStart, ends, kept, real_states, start_of, unfolded
 from mechgraph.synthesis.structures import WHERE, structures
 from mechgraph.synthesis.system import RowNumbers, RowProblem
 from mechgraph.synthesis.tasks import FunctionTask, function, path, poses, positions
@@ -147,7 +147,9 @@ class Synthesis:
             numbers = numbers.with_values(own.placed(self.sweep.places), p.scaled(self.sweep.places, self.swept))
         goals = self.of.goal(numbers)
         found = ends(self.of, start, goals, self.rng, self.progress)
-        apart = len(orbits(start.x[: self.of.u], self.symmetries, motions_of(self.of, start.member, start.x)))
+        apart = start.x.shape[1]
+        if start.each == 1:
+            apart = len(orbits(start.x[: self.of.u], self.symmetries, motions_of(self.of, start.member, start.x)))
         return [
             self._answer(start, apart, goals.taken(np.array([i])) if n > 1 else goals, one, i)
             for i, one in enumerate(found)
@@ -156,17 +158,21 @@ class Synthesis:
     def _answer(self, start: TaskStart, apart: int, goal: ClassMember, found: TaskEnds, i: int) -> Syntheses:
         """The answer to the task numbered ``i``; ``apart``: how many solutions of the start set no symmetry makes of others."""
         p, of = self.problem, self.of.full
-        x, error, which = real_states(self.of, goal, found.x)
-        # rounding of rows in squares of lengths grows with these
-        fits = error <= CLOSED_TO * np.maximum(1.0, np.abs(x[: self.of.u]).max(axis=0, initial=0.0)) ** 2
+        every = unfolded(self.of, start, goal, found, self.rng)
+        x, error, which = real_states(self.of, goal, every)
+        # rounding of rows grows with lengths, of those of rods with their squares
+        power = 1 if self.of.problem is p else 2
+        fits = error <= CLOSED_TO * np.maximum(1.0, np.abs(x[: self.of.u]).max(axis=0, initial=0.0)) ** power
         told = [*start.evidence, self._tracks(start, found)]
+        listed = (1 + len(self.symmetries)) * (1 + start.copies.shape[-1])
+        told += [f"Of {start.each} mechanisms each that do the same {listed} are listed."] * (start.each > listed)
         condition, motions = self._conditions(goal, x[:, fits]), motions_of(self.of, goal, x[:, fits].astype(complex))
         goal, x = self.of.lifted(goal, x[:, fits])
         x, error = self._upright(goal, x)
         against, merged = error > CLOSED_TO, self._merged(goal, x)
         left = ~merged & ~against
         x, error, condition, motions = x[:, left], error[left], condition[left], motions[:, left]
-        others = np.delete(found.x[: of.u], which, axis=1)
+        others = np.delete(every[: of.u], which, axis=1)
         values = p.outside(x[: of.u]).T
         order = np.lexsort(np.round(values, 9).T[::-1]) if len(values) else np.zeros(0, dtype=np.intp)
         x, error, values, condition = x[:, order], error[order], values[order], condition[order]
@@ -201,7 +207,7 @@ class Synthesis:
             np.array([q for _, q, _ in made]).reshape(len(made), shape[0], len(p.m.freedom_names())),
             error,
             ComplexSyntheses(p.outside(others).T),
-            start.x.shape[1],
+            start.total,
             tuple(one for one in degenerate if one.count),
             found.infinite,
             start.word if not found.lost else "searched",
