@@ -416,12 +416,16 @@ def unfolded(of: TaskClass, start: TaskStart, goal: ClassMember, found: TaskEnds
     if start.each == 1:
         return found.x
     real = np.flatnonzero(np.abs(motions_of(of, goal, found.x).imag).max(axis=0, initial=0.0) < MODES.real_singular)
-    z = start.copies[:, found.which[real]].reshape(of.u, -1)
-    x, closed = placed(of, start.member, z[:, np.isfinite(z).all(axis=0)], rng)
-    tracked = follow(of.leg(start.member, goal), x[:, closed], Care())
-    every = np.concatenate([found.x[:, real], tracked.x[:, tracked.arrived]], axis=1)[: of.u]
+    every, z = found.x[: of.u, real], start.copies[:, found.which[real]].reshape(of.u, -1)
+    if (known := np.isfinite(z).all(axis=0)).any():
+        x, closed = placed(of, start.member, z[:, known], rng)
+        tracked = follow(of.leg(start.member, goal), x[:, closed], Care())
+        every = np.concatenate([every, tracked.x[: of.u, tracked.arrived]], axis=1)
     swapped = [every[np.argsort(one.places)] for one in symmetries(of.whole)]
-    x, closed = placed(of, goal, np.concatenate([every[:, len(real) :], *swapped], axis=1), rng)
+    new = np.concatenate([every[:, len(real) :], *swapped], axis=1)
+    if not new.shape[1]:
+        return found.x
+    x, closed = placed(of, goal, new, rng)
     return np.concatenate([found.x, x[:, closed]], axis=1)
 
 

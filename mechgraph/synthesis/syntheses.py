@@ -490,30 +490,22 @@ def synthesize(
     >>> len(s), s.total
     (1, 1)
     """
+    given = {
+        "fit": fit, "bounds": bounds, "conditions": conditions, "require": require, "minimize": minimize,
+        "maximize": maximize, "sweep": sweep, "over": over, "starts": starts,
+    }  # fmt: skip
     if executor is not None:
         if not callable(getattr(executor, "submit", None)):
             raise DeclarationError("synthesis", [wrong(executor, "executor", "an executor, with submit()")])
-        asked = {
-            "fit": fit, "bounds": bounds, "conditions": conditions, "require": require, "minimize": minimize,
-            "maximize": maximize, "sweep": sweep, "over": over, "starts": starts, "seed": seed, "cache": cache, "progress": progress,
-        }  # fmt: skip
         context = copy_context()
         context.run(ELSEWHERE.set, executor)
-        return context.run(partial(synthesize, m, tasks, unknown, **asked))
+        return context.run(partial(synthesize, m, tasks, unknown, **given, seed=seed, cache=cache, progress=progress))
     if not isinstance(m, Mechanism):
-        given = {
-            "fit": fit, "bounds": bounds, "conditions": conditions, "require": require, "minimize": minimize,
-            "maximize": maximize, "sweep": sweep, "over": over, "starts": starts,
-        }  # fmt: skip
         return _of_chains(m, tasks, unknown, given, int(seed), cache, progress)
     where, faults = f"synthesis of {m.name!r}", list[str]()
     if tasks is None and unknown is None and m.synthesis is not None:
-        asked = {
-            "fit": fit, "bounds": bounds, "conditions": conditions, "require": require, "minimize": minimize,
-            "maximize": maximize, "sweep": sweep, "over": over, "starts": starts,
-        }  # fmt: skip
-        given = {name: value for name, value in asked.items() if value != _USUAL[name]}
-        return synthesize(m, **_stored(m.synthesis) | given, seed=seed, cache=cache, progress=progress)
+        own = {name: value for name, value in given.items() if value != _USUAL[name]}
+        return synthesize(m, **_stored(m.synthesis) | own, seed=seed, cache=cache, progress=progress)
     if tasks is None or unknown is None:
         raise DeclarationError(where, ["tasks and unknown: expected both, or a mechanism with synthesis="])
     unknown = [unknown] if isinstance(unknown, str) else list(unknown)
