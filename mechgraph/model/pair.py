@@ -527,7 +527,7 @@ class Pair(Described):
         marker = Marker(self.point, self.axis, self.second)
         return marker, marker
 
-    @cached_property
+    @property
     def freedom_names(self) -> tuple[str, ...]:
         """Full names of the freedoms, ``"B.Tz"``."""
         if not isinstance(self.type, PairType) or not isinstance(self.name, str):
