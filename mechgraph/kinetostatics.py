@@ -97,7 +97,9 @@ class Pipeline:
         """``trusting``: where the kernel is likely to serve, its solution is the proof that the drivers determine the motion."""
         self.drive, self.m, self.options = drive, drive.m, options
         self.passive: tuple[PassiveMotion, ...] = ()
-        self.start = closed_start(self.m, drive.first, closer=self._closed_beside if trusting and not drive.free else None)
+        self.start = closed_start(
+            self.m, drive.first, closer=self._closed_beside if trusting and not drive.free else None
+        )
         if drive.free:
             self.m = drive.whole(self.start)
             self.start = closed_start(self.m)

@@ -128,14 +128,6 @@ class TaskLabelling:
         ]
         return np.array(sorted(range(len(told)), key=told.__getitem__), dtype=np.intp)
 
-    def unknowns_ordered(self, z: Array) -> Array:
-        """Unknowns ``(u, ...)`` in canonical order."""
-        return z[self._unknowns] if len(z) else z
-
-    def unknowns_taken(self, z: Array) -> Array:
-        """Unknowns from those in canonical order."""
-        return z[np.argsort(self._unknowns)] if len(z) else z
-
     @cached_property
     def _asked(self) -> tuple[Index, Array]:
         """For every number that is asked, in canonical order, its place and its sign."""

@@ -12,20 +12,17 @@ from __future__ import annotations
 
 import sys
 import zipfile
-from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import field, replace
+from collections.abc import Callable
 from fractions import Fraction
 from functools import partial
 from math import lcm, prod
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from mechgraph.errors import MechgraphError, counted
 from mechgraph.files import cache_folder, whole_file
-from mechgraph.maths.se3 import Index
 from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
 from mechgraph.modes.family import Array
@@ -54,7 +51,7 @@ class TaskStart:
     """All solutions ``x (nx, N)`` known of a task of a class, and what that they are all rests on (see ``modes.start_sets.StartSet``).
 
     ``source``: who published that there are so many, for sets that came with the package. Of a large set ``x`` has one of
-    ``each`` solutions that do the same, and ``copies (u, N, k)`` are unknowns of the others, but for exchanges.
+    ``each`` solutions that do the same.
     """
 
     member: ClassMember
@@ -65,7 +62,6 @@ class TaskStart:
     followed: int
     trace: Trace
     source: str = ""
-    copies: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
     each: int = 1
 
     @property
@@ -165,9 +161,8 @@ def start_set(
     group = TrackGroup(of, of.start, of.x[:, None], min(most, many))
     group.grow(MISSED, rng, progress)
     if group.x.shape[1] >= many:
-        if len(motions_of(of, group.base, group.x)):
-            found = _of_each(of, group, rng, progress)
-            return replace(found, source=source if found.total == most else "")
+        if source and len(motions_of(of, group.base, group.x)):
+            return _of_each(of, group, most, source, rng, progress)
         group.most = most
         group.grow(MISSED, rng, progress)
     known = group.quiet, group.chance
@@ -182,13 +177,18 @@ def start_set(
     return TaskStart(group.base, group.x, *known, group.lost, group.followed, trace)
 
 
-def _of_each(of: TaskClass, group: TrackGroup, rng: np.random.Generator, progress: Progress) -> TaskStart:
-    """One of all solutions that do the same, by straight ways between all pairs of some tasks, which make three loops; and their copies."""
+def _of_each(
+    of: TaskClass, group: TrackGroup, most: int, source: str, rng: np.random.Generator, progress: Progress
+) -> TaskStart:
+    """One of all solutions that do the same, by straight ways between all pairs of some tasks, which make three loops.
+
+    They are all where those of all tasks are a whole part of how ``most`` there are.
+    """
     followed, n = by_motions(of), 4
     tasks, told = [group.base, *of.random_members(rng, n - 1)], followed.fingerprints(group.base, group.x)
     x, prints = ([v[:, distinct(told)], *[v[:, :0]] * (n - 1)] for v in (group.x, told))
     met = {(a, b): set[int]() for a in range(n) for b in range(n) if a != b}
-    ways, lost, tracks = list[Way](), group.lost, group.followed
+    lost, tracks = group.lost, group.followed
     while (longest := max((x[a].shape[1] - len(done), a, b) for (a, b), done in met.items()))[0]:
         left, a, b = longest
         todo = np.setdiff1d(np.arange(x[a].shape[1]), list(met[a, b]))[:TRACKS_TOGETHER]
@@ -202,68 +202,12 @@ def _of_each(of: TaskClass, group: TrackGroup, rng: np.random.Generator, progres
         place = [int(np.abs(prints[b] - one[:, None]).max(axis=0).argmin()) for one in found.T]
         met[a, b].update(todo.tolist())
         met[b, a].update(place)
-        led = todo[tracked.arrived].tolist()
-        ways += [Way((a, i), (b, k), x[a][:, i], y) for i, k, y in zip(led, place, there.T, strict=True)]
         lost, tracks = lost + len(todo) - len(place), tracks + len(todo)
     N = [v.shape[1] for v in x]
-    chance = (1.0 / (N[0] + 1) + lost / tracks) ** 3 if len(set(N)) == 1 else 1.0
-    copies, each = _copies(of, tasks, x[0], ways)
-    return TaskStart(group.base, x[0], 3, chance, lost, tracks, NOT_PASSED, copies=copies, each=each)
-
-
-class Way(NamedTuple):
-    """A track between solutions ``(task, number)``: its own ones at both ends, which may be copies of those."""
-
-    begin: tuple[int, int]
-    end: tuple[int, int]
-    x: Array
-    y: Array
-
-
-def _copies(of: TaskClass, tasks: list[ClassMember], x: Array, ways: list[Way]) -> tuple[Array, int]:
-    """Unknowns ``(u, N, k)`` of copies of solutions ``x (nx, N)`` of the first task, none an exchange of another; and how many there are.
-
-    Those of one solution are all to which different ways have led; they are led on to the next ones beside tracks that are known.
-    """
-    turns = [np.arange(of.u), *(np.argsort(one.places) for one in symmetries(of.whole))]
-
-    def among(z: Array, others: Sequence[Array]) -> bool:
-        near = 1e-6 * (1.0 + np.abs(z[: of.u]).max())
-        return any(np.abs(z[: of.u][turn] - y[: of.u]).max() < near for turn in turns for y in others)
-
-    same = {(0, i): [own] for i, own in enumerate(x.T)}
-    for way in (way for way in ways if not way.end[0] and not among(way.y, same[way.end])):
-        same[way.end].append(way.y)
-    first, k = max(same, key=lambda i: len(same[i])), max(map(len, same.values()))
-    known = {first: same[first]}
-    # those to the first task before others, which lead to solutions of it that are not known
-    both = sorted([*ways, *(Way(w.end, w.begin, w.y, w.x) for w in ways)], key=lambda way: way.end[0] > 0)
-    onto, tried = {way.begin: way.end for way in both if not way.end[0]}, set[tuple[tuple[int, int], ...]]()
-    while k > 1:
-        step, aside = dict[tuple[int, int], Way](), dict[tuple[int, int], Way]()
-        for way in both:
-            goal = onto.get(way.end, way.end) if way.end[0] else way.end
-            if way.begin in known and way.end not in known and (way.begin, way.end) not in tried:
-                (aside if goal in known else step).setdefault(goal, way)
-        if not (step := step or aside):
-            break
-        a, b = Counter((way.begin[0], way.end[0]) for way in step.values()).most_common(1)[0][0]
-        some = [way for way in step.values() if (way.begin[0], way.end[0]) == (a, b)]
-        if further := [way for way in some if not among(way.x, known[way.begin])]:
-            # all over again from where there is a further one
-            known, k = {further[0].begin: [*known[further[0].begin], further[0].x]}, k + 1
-            tried.clear()
-            continue
-        tried.update((way.begin, way.end) for way in some)
-        others = [[y for y in known[way.begin] if not among(y, [way.x])] for way in some]
-        tracked = follow(of.leg(tasks[a], tasks[b]), np.array([y for own in others for y in own]).T, Care())
-        ends = zip(tracked.x.T.reshape(len(some), k - 1, -1), tracked.arrived.reshape(-1, k - 1), strict=True)
-        known |= {way.end: [way.y, *led] for way, (led, came) in zip(some, ends, strict=True) if came.all()}
-    out = np.full((of.u, x.shape[1], k - 1), np.nan, dtype=complex)
-    for (task, i), found in known.items():
-        if not task:
-            out[:, i] = np.array([y[: of.u] for y in found if not among(y, [x[:, i]])]).T
-    return out, k * len(turns)
+    agree = len(set(N)) == 1
+    chance, whole = (1.0 / (N[0] + 1) + lost / tracks) ** 3 if agree else 1.0, agree and most % N[0] == 0
+    known = (source, most // N[0]) if whole else ("", 1)
+    return TaskStart(group.base, x[0], 3, chance, lost, tracks, NOT_PASSED, *known)
 
 
 # --- kept in a folder ----------------------------------------------------------------------------------------------------
@@ -292,12 +236,11 @@ def _read(labelling: TaskLabelling, file: Path, prefix: str) -> TaskStart | None
                 stored = stored.astype(float) @ [1.0, 1.0j]
                 stored[:, f[prefix + "exactly"]] = f[prefix + "exact"]
             member, x = labelling.taken(vectors, f[prefix + "drive"], stored)
-            copies = labelling.unknowns_taken(f[prefix + "copies"])
         # digits that were left out come back
         of, tracks = labelling.of, np.zeros(x.shape[1], dtype=np.intp)
         x, closed = polished(of.leg(member, member), x, 1.0, tracks)
         trace = Trace(degree, samples, last, beyond)
-        found = TaskStart(member, x, loops, chance, lost, followed, trace, source, copies, each)
+        found = TaskStart(member, x, loops, chance, lost, followed, trace, source, each)
         here = of.at(member, x)
         size = np.maximum(1.0, np.abs(here.here.poses).max())
         return found if closed.all() and of.error(here).max() < MODES.member_closed * size else None
@@ -310,7 +253,6 @@ def arrays(labelling: TaskLabelling, start: TaskStart) -> dict[str, Any]:
     sizes = np.array([start.chance, start.trace.last, start.trace.beyond])
     counts = np.array([start.loops, start.lost, start.followed, start.trace.degree, start.trace.samples])
     told = {"sizes": sizes, "counts": counts, "source": np.array(start.source), "each": np.array(start.each)}
-    told["copies"] = labelling.unknowns_ordered(start.copies)
     return labelling.ordered(start.member, start.x) | told
 
 
@@ -330,17 +272,13 @@ def _keep(of: TaskClass, start: TaskStart) -> None:
 
 @dataclass
 class TaskEnds:
-    """What tracks to a task came to: regular solutions ``x (nx, n)``, singular ones, and how many went to infinity or were lost.
-
-    ``which (n,)`` are the tracks of regular ones, of a single run.
-    """
+    """What tracks to a task came to: regular solutions ``x (nx, n)``, singular ones, and how many went to infinity or were lost."""
 
     x: Array
     singular: Array
     infinite: int
     lost: int
     runs: int
-    which: Index
 
 
 def ends(
@@ -351,7 +289,7 @@ def ends(
     """
     n, N = goals.drive.shape[-1], start.x.shape[1]
     of = by_motions(of) if start.each > 1 else of
-    every, left = [TaskEnds(start.x[:, :0], start.x[:, :0], 0, N, 0, np.arange(0)) for _ in range(n)], np.arange(n)
+    every, left = [TaskEnds(start.x[:, :0], start.x[:, :0], 0, N, 0) for _ in range(n)], np.arange(n)
     # runs of all tracks, at most
     for run in range(4 if N < TRACKS_TOGETHER else 1):
         if progress is not None:
@@ -382,7 +320,6 @@ def _account(of: TaskClass, goal: ClassMember, known: TaskEnds, run: TrackRun, l
     N, regular = lost_before + len(run.regular), run.x[:, run.regular]
     new = distinct(of.fingerprints(goal, regular), of.fingerprints(goal, known.x))
     known.x = np.concatenate([known.x, regular[:, new]], axis=1)
-    known.which = np.append(known.which, np.flatnonzero(run.regular)[new])
     singular, infinite = run.x[:, run.singular], int(run.infinite.sum())
     # the run counts in which most is known
     if not known.runs or singular.shape[1] + infinite > known.singular.shape[1] + known.infinite:
@@ -412,20 +349,14 @@ def start_of(of: TaskClass, rng: np.random.Generator, cache: bool, progress: Pro
 
 
 def unfolded(of: TaskClass, start: TaskStart, goal: ClassMember, found: TaskEnds, rng: np.random.Generator) -> Array:
-    """Solutions ``(nx, n)`` of a task with those that do the same, where one of these may be real: where they move in real directions."""
+    """Solutions ``(nx, n)`` of a task with exchanges of those that may be real: where they move in real directions."""
     if start.each == 1:
         return found.x
     real = np.flatnonzero(np.abs(motions_of(of, goal, found.x).imag).max(axis=0, initial=0.0) < MODES.real_singular)
-    every, z = found.x[: of.u, real], start.copies[:, found.which[real]].reshape(of.u, -1)
-    if (known := np.isfinite(z).all(axis=0)).any():
-        x, closed = placed(of, start.member, z[:, known], rng)
-        tracked = follow(of.leg(start.member, goal), x[:, closed], Care())
-        every = np.concatenate([every, tracked.x[: of.u, tracked.arrived]], axis=1)
-    swapped = [every[np.argsort(one.places)] for one in symmetries(of.whole)]
-    new = np.concatenate([every[:, len(real) :], *swapped], axis=1)
-    if not new.shape[1]:
+    swapped = [found.x[: of.u, real][np.argsort(one.places)] for one in symmetries(of.whole)]
+    if not swapped or not len(real):
         return found.x
-    x, closed = placed(of, goal, new, rng)
+    x, closed = placed(of, goal, np.concatenate(swapped, axis=1), rng)
     return np.concatenate([found.x, x[:, closed]], axis=1)
 
 

@@ -164,7 +164,7 @@ class Synthesis:
         power = 1 if self.of.problem is p else 2
         fits = error <= CLOSED_TO * np.maximum(1.0, np.abs(x[: self.of.u]).max(axis=0, initial=0.0)) ** power
         told = [*start.evidence, self._tracks(start, found)]
-        listed = (1 + len(self.symmetries)) * (1 + start.copies.shape[-1])
+        listed = 1 + len(self.symmetries)
         told += [f"Of {start.each} mechanisms each that do the same {listed} are listed."] * (start.each > listed)
         condition, motions = self._conditions(goal, x[:, fits]), motions_of(self.of, goal, x[:, fits].astype(complex))
         goal, x = self.of.lifted(goal, x[:, fits])

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from ladder import LADDER, LARGE, PUBLISHED
 
+from mechgraph.modes.homotopy import polished
 from mechgraph.synthesis.classes import TaskClass
 from mechgraph.synthesis.labelling import TaskLabelling
-from mechgraph.modes.homotopy import polished
 from mechgraph.synthesis.solve import PACKED, TaskStart, arrays, kept, start_set
 from mechgraph.synthesis.system import RowProblem
 
@@ -61,8 +61,7 @@ def shortened(of: TaskClass, start: TaskStart) -> dict[str, Any]:
     lost = np.flatnonzero(~closed | (np.abs(back - x)[: of.u].max(axis=0) > 1e-6 * np.abs(x[: of.u]).max(axis=0)))
     ordered = TaskLabelling(of).ordered(start.member, x)["x"]
     short = np.stack([ordered.real, ordered.imag], axis=-1).astype(np.float16)
-    short_copies = told["copies"].astype(np.complex64)
-    return told | {"x": short, "exactly": lost, "exact": ordered[:, lost], "copies": short_copies}
+    return told | {"x": short, "exactly": lost, "exact": ordered[:, lost]}
 
 
 if __name__ == "__main__":
