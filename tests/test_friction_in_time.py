@@ -470,3 +470,16 @@ def test_six_blocks_on_each_other_decide_at_once_which_slip():
 def test_a_puck_without_a_radius_is_refused():
     with pytest.raises(mg.DeclarationError, match="give the radius="):
         mg.respond(alone("E", mg.Friction("A", mu=0.1), axis=Z), (0, 1))
+
+
+@pytest.mark.parametrize("begun", [np.greater, np.greater_equal])
+def test_a_block_that_sticks_is_pushed_off_at_once(begun):
+    """Whether a pulse of force has its new value at the break itself or only behind it; friction held the block there without any load."""
+    push = mg.Effort("A", lambda q, v, t: np.where(begun(t, 0.5), 60.0, 0.0), breaks=[0.5])
+    slide = mg.Pair("A", "P", "frame", "block", point=(0, 0, 0), axis=(1, 0, 0))
+    links = [mg.Link("frame"), mg.Link("block", 2.0, (0, 0, 0))]
+    m = mg.Mechanism("slide", links, [slide], loads=[mg.Gravity((0, 0, -9.81)), push, mg.Friction("A", mu=0.2)])
+    r = mg.respond(m, [0.0, 0.5, 0.52])
+    assert [str(one).split(" at t")[0] for one in r.events] == ["A slips"]
+    assert r.events[0].t == pytest.approx(0.5, abs=1e-11)
+    assert r["A"].position[-1, 0] == pytest.approx(0.5 * (30.0 - 0.2 * 9.81) * 0.02**2, rel=1e-9)

@@ -168,13 +168,20 @@ class _Holding:
 
 
 def _first_below(height: Callable[[Array], Array], t: Array, h: Array, slack: float) -> float | None:
-    """The first of the times at which a height has fallen below zero by more than ``slack``; the first one, if it was never above."""
+    """The first of the times at which a height has fallen below zero by more than ``slack``, if it has; where it jumps, behind the jump."""
     t, h = with_turns(height, t, h)
     deep = np.flatnonzero(h < -slack)
     if not deep.size:
         return None
-    before = np.flatnonzero(h[: deep[0]] > 0.0)
-    return first_root(height, t[before[-1]], t[deep[0]]) if before.size else float(t[0])
+    if not deep[0]:
+        return float(t[0])
+    above = np.flatnonzero(h[: deep[0]] > 0.0)
+    # what holds without any load is never above
+    level, last = (0.0, above[-1]) if above.size else (slack, deep[0] - 1)
+    found, end = first_root(lambda at: height(at) + level, t[last], t[deep[0]]), float(t[deep[0]])
+    # of a step: twice as far as a root is found
+    behind = min(found + 2e-12 * (end - float(t[last])), end)
+    return behind if float(height(np.array([behind]))[0]) < -slack else found
 
 
 @dataclass
