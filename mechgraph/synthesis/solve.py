@@ -182,7 +182,7 @@ def _of_each(
 ) -> TaskStart:
     """One of all solutions that do the same, by straight ways between all pairs of some tasks, which make three loops.
 
-    They are all where those of all tasks are a whole part of how ``most`` there are.
+    They are all where they are a whole part of how ``most`` there are, and no other task has more.
     """
     followed, n = by_motions(of), 4
     tasks, told = [group.base, *of.random_members(rng, n - 1)], followed.fingerprints(group.base, group.x)
@@ -204,9 +204,8 @@ def _of_each(
         met[b, a].update(place)
         lost, tracks = lost + len(todo) - len(place), tracks + len(todo)
     N = [v.shape[1] for v in x]
-    agree = len(set(N)) == 1
-    chance, whole = (1.0 / (N[0] + 1) + lost / tracks) ** 3 if agree else 1.0, agree and most % N[0] == 0
-    known = (source, most // N[0]) if whole else ("", 1)
+    chance = (1.0 / (N[0] + 1) + lost / tracks) ** 3 if len(set(N)) == 1 else 1.0
+    known = (source, most // N[0]) if N[0] == max(N) and most % N[0] == 0 else ("", 1)
     return TaskStart(group.base, x[0], 3, chance, lost, tracks, NOT_PASSED, *known)
 
 
