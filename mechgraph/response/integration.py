@@ -158,6 +158,23 @@ def first_root(height: Callable[[Array], Array], begin: float, end: float) -> fl
     return float(root)
 
 
+def first_below(height: Callable[[Array], Array], t: Array, h: Array, slack: float) -> float | None:
+    """The first of the times at which a height has fallen below zero by more than ``slack``, if it has; where it jumps, behind the jump."""
+    t, h = with_turns(height, t, h)
+    deep = np.flatnonzero(h < -slack)
+    if not deep.size:
+        return None
+    if not deep[0]:
+        return float(t[0])
+    above = np.flatnonzero(h[: deep[0]] > 0.0)
+    # what holds without any load is never above
+    level, last = (0.0, above[-1]) if above.size else (slack, deep[0] - 1)
+    found, end = first_root(lambda at: height(at) + level, t[last], t[deep[0]]), float(t[deep[0]])
+    # of a step: twice as far as a root is found
+    behind = min(found + 2e-12 * (end - float(t[last])), end)
+    return behind if float(height(np.array([behind]))[0]) < -slack else found
+
+
 def read_events(m: Mechanism, events: Any, faults: list[str]) -> tuple[Event, ...]:
     """The events of a call; adds what is wrong with them to ``faults``."""
     given = (events,) if isinstance(events, Event) else items_of(events, "events", faults)

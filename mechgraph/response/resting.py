@@ -13,7 +13,7 @@ Source: Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts, 1996,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from functools import partial
 from itertools import combinations, product
@@ -39,7 +39,7 @@ from mechgraph.pairs.pair_type import PairType
 from mechgraph.quantities import items_of, wrong
 from mechgraph.response.charts import Prescribed, Task, no_force
 from mechgraph.response.impact import FreeEquations, FrictionCone, Limit, evaluated
-from mechgraph.response.integration import LOOKS_IN_STEP, first_root, with_turns
+from mechgraph.response.integration import LOOKS_IN_STEP, first_below
 from mechgraph.response.motion_equations import Moved, Stopped
 from mechgraph.response.rough import Rough, rough_freedoms
 
@@ -167,23 +167,6 @@ class _Holding:
         return any(one in some.of for some in self.stuck)
 
 
-def _first_below(height: Callable[[Array], Array], t: Array, h: Array, slack: float) -> float | None:
-    """The first of the times at which a height has fallen below zero by more than ``slack``, if it has; where it jumps, behind the jump."""
-    t, h = with_turns(height, t, h)
-    deep = np.flatnonzero(h < -slack)
-    if not deep.size:
-        return None
-    if not deep[0]:
-        return float(t[0])
-    above = np.flatnonzero(h[: deep[0]] > 0.0)
-    # what holds without any load is never above
-    level, last = (0.0, above[-1]) if above.size else (slack, deep[0] - 1)
-    found, end = first_root(lambda at: height(at) + level, t[last], t[deep[0]]), float(t[deep[0]])
-    # of a step: twice as far as a root is found
-    behind = min(found + 2e-12 * (end - float(t[last])), end)
-    return behind if float(height(np.array([behind]))[0]) < -slack else found
-
-
 @dataclass
 class Rests:
     """The stops and the friction of a motion; ``task`` is what moves without them, ``holding`` what holds freedoms now."""
@@ -254,11 +237,11 @@ class Rests:
         free = [limit for limit in self.limits if limit not in self.holding.limits]
         for limit in free:
             gap = limit.sign * (x[limit.row] - limit.value)
-            times.append(_first_below(partial(_gap, motion, limit), looks, gap, RESPONSE.touching))
+            times.append(first_below(partial(_gap, motion, limit), looks, gap, RESPONSE.touching))
         if self.holding.limits:
             push = partial(self._pressing, motion)
             if push(looks[-1:])[0] < 0.0:
-                times.append(_first_below(push, looks, push(looks), 0.0) or looks[0])
+                times.append(first_below(push, looks, push(looks), 0.0) or looks[0])
         met = min((one for one in times if one is not None), default=None)
         self._leaving = None
         if self.rough:
@@ -286,7 +269,7 @@ class Rests:
                 # of several freedoms the way as the step begins: it may turn on and on
                 way = slides[:, 0] if len(columns) > 1 else ways[columns]
                 way = way / (np.linalg.norm(way) or 1.0)
-                found = _first_below(partial(_rate, motion, self.task, one, way), looks, way @ slides, noise)
+                found = first_below(partial(_rate, motion, self.task, one, way), looks, way @ slides, noise)
             elif not self.holding.sticks(one) and not set(columns) <= set(self.holding.columns):
                 moves = np.flatnonzero(np.abs(slides).max(axis=0) > noise)
                 found = float(looks[moves[0]]) if moves.size else None
@@ -320,7 +303,7 @@ class Rests:
                 return -self._verge(self.holding, kept, t, x, dq)[0]
 
             beyond, _ = self._verge(self.holding, kept, looks, x, rates, held)
-            found = _first_below(height, looks, -beyond, MOTIONS.rounding)
+            found = first_below(height, looks, -beyond, MOTIONS.rounding)
             if found is not None and (met is None or found < met):
                 at = np.array([found])
                 x_there, (dq, _) = motion.motion(at)
