@@ -528,12 +528,8 @@ class Facts(GraphFacts):
         for load in rubbing_loads(self.mechanism, self.mechanism.loads):
             known = self.unique.get(load.of, {})
             if loose := tuple(name for name in rests_on(self.mechanism, load) if not known.get(name, True)):
-                soft = (
-                    getattr(self.mechanism.pair(load.of), "stiffness", None)
-                    if load.of in self.mechanism.pair_index
-                    else None
-                )
-                given = soft is not None and all(getattr(soft, name, None) is not None for name in loose)
+                soft = self.mechanism.pair(load.of).stiffness if load.of in self.mechanism.pair_index else None
+                given = soft is not None and set(loose) <= set(soft.by_component)
                 of.setdefault((loose, "" if given else "give stiffness= and "), []).append(repr(load.of))
         return tuple(
             f"friction of {', '.join(pairs)} rests on {', '.join(loose)}, not unique: zero where no load adds to "

@@ -1578,11 +1578,11 @@ static int normal_vectors(const Model *m, Work *w, const int *rubs) {
         if (6 * k == at && width == 6) sum -= dot(reads, w->takes + 24 * p + 6 * j, 6);
         FOR(f, n) if (own[f] != 0.0) sum += own[f] * dot(reads, w->unit + (size_t)all * (c + f) + at, width);
       }
-      const int signed_ = m->load[4 * rubs[o]] == MGK_OPENING;
+      const int one_way = m->load[4 * rubs[o]] == MGK_OPENING;
       if (j) row[w->row_of[o] + j - 1] -= sum;
       else {
-        *base += sum * m->load_number[m->load[4 * rubs[o] + 3] + MGK_PRELOAD], base[1 + o] = signed_ ? 0.0 : sum;
-        if (signed_) row[w->row_of[o]] -= sum, opens = 1;
+        *base += sum * m->load_number[m->load[4 * rubs[o] + 3] + MGK_PRELOAD], base[1 + o] = one_way ? 0.0 : sum;
+        if (one_way) row[w->row_of[o]] -= sum, opens = 1;
       }
     }
   }
@@ -1849,8 +1849,8 @@ static void coordinates(const Model *m, Work *w, const double *x, double *out) {
       w->begun[f] = 1.0;
     }
     if (w->begun[f] == 0.0) continue;
-    const double signed_ = dot(v, axis, 3), turn = 8.0 * atan(1.0);
-    *angle = signed_ + turn * floor((*angle - signed_) / turn + 0.5);
+    const double one_way = dot(v, axis, 3), turn = 8.0 * atan(1.0);
+    *angle = one_way + turn * floor((*angle - one_way) / turn + 0.5);
     if (clear || fabs(*angle) > 1.0) FOR(i, 3) out[c + i] = *angle * axis[i];
   }
 }

@@ -512,10 +512,8 @@ class Arc:
 
     def piece(self, u: float) -> tuple[SeriesPiece, float] | None:
         """The piece in which a place lies, and the whole turns by which the place is further on; None where the table ends before."""
-        turns = 0.0 if self.advance is None else self._sense * math.floor(self._sense * (u - self.begin) / self.turn)
-        u -= self.turn * turns
-        way = self._way((u > self.begin) - (u < self.begin) or self._first_way)
-        at = way.sense * (u - self.begin)
+        turns, at, way = self.home(u)
+        at *= way.sense
         if not at < way.length + FURTHEST:
             return None
         while (at > way.length or not way.length) and not way.closed:
@@ -615,7 +613,7 @@ class Arc:
             return None
         # what acts in a freedom is small beside inertia where it is slow, or the unit of time is short, and counts turns all the same
         for load in (load for load in (*loads.stored, *loads.rest) if load.freedoms):
-            alone = Loads((load,), ()) if load in loads.stored else Loads((), (load,))
+            alone = Loads((load,), ()) if any(one is load for one in loads.stored) else Loads((), (load,))
             now, then = (along_one(*one, alone)[1:] for one in both)
             if (np.abs(now - then) > RESPONSE.periodic * np.abs(now).max(axis=1, keepdims=True)).any():
                 return None

@@ -164,11 +164,11 @@ def first_below(height: Callable[[Array], Array], t: Array, h: Array, slack: flo
     deep = np.flatnonzero(h < -slack)
     if not deep.size:
         return None
-    if not deep[0]:
+    held, above = np.flatnonzero(h[: deep[0]] >= -slack), np.flatnonzero(h[: deep[0]] > 0.0)
+    if not held.size:
         return float(t[0])
-    above = np.flatnonzero(h[: deep[0]] > 0.0)
     # what holds without any load is never above
-    level, last = (0.0, above[-1]) if above.size else (slack, deep[0] - 1)
+    level, last = (0.0, above[-1]) if above.size else (slack, held[-1])
     found, end = first_root(lambda at: height(at) + level, t[last], t[deep[0]]), float(t[deep[0]])
     # of a step: twice as far as a root is found
     behind = min(found + 2e-12 * (end - float(t[last])), end)

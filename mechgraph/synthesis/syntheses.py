@@ -165,7 +165,8 @@ class Synthesis:
         fits = error <= CLOSED_TO * np.maximum(1.0, np.abs(x[: self.of.u]).max(axis=0, initial=0.0)) ** power
         told = [*start.evidence, self._tracks(start, found)]
         listed = 1 + len(self.symmetries)
-        told += [f"Of {start.each} mechanisms each that do the same {listed} are listed."] * (start.each > listed)
+        partly = start.each > listed
+        told += [f"Of {start.each} mechanisms each that do the same {listed} are listed."] * partly
         condition, motions = self._conditions(goal, x[:, fits]), motions_of(self.of, goal, x[:, fits].astype(complex))
         goal, x = self.of.lifted(goal, x[:, fits])
         x, error = self._upright(goal, x)
@@ -210,7 +211,7 @@ class Synthesis:
             start.total,
             tuple(one for one in degenerate if one.count),
             found.infinite,
-            start.word if not found.lost else "searched",
+            "searched" if found.lost or partly else start.word,
             tuple(told),
             condition,
             Fitnesses([cache(partial(self._fitness, m, q)) for m, q, _ in made]),

@@ -320,8 +320,8 @@ def _faults(m: Mechanism, solution: Any, study: Any) -> list[str]:
 
 
 def _content(m: Mechanism, report: DeterminacyReport, s: Solution | None, study: Study | None) -> dict[str, Any]:
-    told = _told(s)
-    side, word = _judged(report, s)
+    told = tuple(map(str, s.warnings)) if s is not None and s.has_forces else ()
+    side, word = _judged(report, s, bool(told))
     data = view_data(report, s)
     drawn = data is not None
     remarks = [report.rounding.text] if report.rounding is not None else []
@@ -369,18 +369,13 @@ def _equations(m: Mechanism) -> Document:
     return Document("", f.document(components=len(f.unknowns) <= 300).blocks)
 
 
-def _told(s: Solution | None) -> tuple[str, ...]:
-    """The warnings of a solution with forces."""
-    return tuple(map(str, s.warnings)) if s is not None and s.has_forces else ()
-
-
-def _judged(r: DeterminacyReport, s: Solution | None) -> tuple[str, str]:
-    """A color and a word for the verdict, the word for those who do not see the color."""
+def _judged(r: DeterminacyReport, s: Solution | None, told: bool) -> tuple[str, str]:
+    """A color and a word for the verdict, the word for those who do not see the color; ``told``: whether the solution warns."""
     if not r.mechanism.has_geometry:
         return "fair", "Topology only"
     if r.mobility is None or r.undriven or r.contradicting_drives:
         return "bad", "No solution"
-    if _told(s) or r.near or any(p.load_bearing for p in r.passive):
+    if told or r.near or any(p.load_bearing for p in r.passive):
         return "fair", "See warnings"
     if not (r.determinate or r.own_forces_unique):
         by_stiffness = s is not None and s.split_by_stiffness
