@@ -118,9 +118,10 @@ class Pipeline:
         if not self.trusts:
             self._determine()
 
-    def _closed_beside(self, system: System, x: Array) -> Array | None:
+    def _closed_beside(self, system: System, x: Array) -> Configuration | None:
         """See ``assembly.Closer``."""
-        self.system, self.columns = system, system.columns_of(self.drive.names)
+        self.system = system
+        self.columns = self.acting = system.columns_of(self.drive.names)
         return closed_beside(self, x)
 
     def _determine(self) -> None:

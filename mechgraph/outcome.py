@@ -531,13 +531,17 @@ def _kernel(line: Started, library: Any) -> tuple[Kernel, bool]:
 
     The start may be shared with mechanisms under other loads.
     """
-    key, kept = (line.columns.tobytes(), gives_forces(line), _passive(line)), line.start.solvers
+    key, kept = _tables_key(line), line.start.solvers
     known = kept.get(COMPILED)
     loads = line.m.loads
     if known is None or known[0] != key or len(known[1]) != len(loads) or any(map(is_not, known[1], loads)):
         kept[COMPILED] = known = key, loads, _filled(line, library, line.system, line.x[:, None], loads)
     found: tuple[Kernel, bool] = known[2]
     return found
+
+
+def _tables_key(line: Started) -> tuple[object, ...]:
+    return line.columns.tobytes(), gives_forces(line), _passive(line)
 
 
 def _filled(line: Started, library: Any, system: System, x: Array, loads: tuple[Load, ...]) -> tuple[Kernel, bool]:
@@ -556,16 +560,21 @@ def served_before(line: Started) -> bool:
     return line.options.engine in ("auto", COMPILED) and isinstance(line.system.sized_once.get(_key(line)), Layout)
 
 
-def closed_beside(line: Started, x: Array) -> Array | None:
-    """The state ``(nx,)`` near ``x`` that the kernel closes, the drives kept; None where it served no mechanism of the graph before."""
+def closed_beside(line: Started, x: Array) -> Configuration | None:
+    """The state near ``x (nx,)`` that the kernel closes, the drives kept, with its tables; None where it served no mechanism of the graph
+    before.
+    """
     library = at_hand()
     if library is None or not served_before(line):
         return None
-    found = _layout(line)
-    assert isinstance(found, Layout)
-    filled = tables(found, line.system, x[:, None], None)
-    assert filled is not None
-    return Kernel(library, found, *filled).closed(len(x))
+    filled = _filled(line, library, line.system, x[:, None], line.m.loads)
+    closed = filled[0].closed(len(x))
+    if closed is None:
+        return None
+    filled[0].P[:, START : START + len(x)] = closed
+    here = Configuration(line.system, closed[:, None])
+    here.solvers[COMPILED] = _tables_key(line), line.m.loads, filled
+    return here
 
 
 def _key(line: Started) -> tuple[object, ...]:

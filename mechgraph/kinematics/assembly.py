@@ -209,8 +209,8 @@ def _state(here: Configuration) -> tuple[System, Array]:
     return here.system, here.x[:, 0]
 
 
-Closer = Callable[[System, Array], Array | None]
-"""Gives the closed state nearest to one ``(nx,)``, coordinates of the drives kept; None where it does not serve."""
+Closer = Callable[[System, Array], Configuration | None]
+"""Gives the closed configuration nearest to a state ``(nx,)``, coordinates of the drives kept; None where it does not serve."""
 
 
 def closed_start(
@@ -247,10 +247,17 @@ def _closed_start(m: Mechanism, preferred: Mapping[str, float], tol: float, clos
     if error <= 10 * CLOSURE_GOAL or (error <= CLOSED and system.graph.n_loops > 16):
         return here
     if error <= CLOSED:
-        return scaled(Configuration(system, close_all(system, here.x, np.arange(0))[0]))
+        return Configuration(system, close_all(system, here.x, np.arange(0))[0])
+    # lengths and origin of a guess that misses by less than a hundredth serve as those of the closed state do
+    placed = scaled if error > 0.01 else _itself
     known, asked = m.once(_kept)["searched"], x.tobytes()
     if not tol or known.get(asked, (x, 0.0))[1] <= tol:  # a search with a tolerance begins at the same guesses
-        known[asked] = _search(m, system, x, preferred, tol, closer)
+        attempts = _attempts(m, system, x, preferred)
+        beside = closer(system, attempts[0][0]) if closer is not None else None
+        if beside is not None and beside.closure[0] <= 10 * CLOSURE_GOAL:
+            known[asked] = beside.x[:, 0], float(beside.closure[0])
+            return placed(beside)
+        known[asked] = _search(system, attempts, tol)
     x, error = known[asked]
     if error > max(CLOSED, tol):
         words = m.once(_kept)["opposite"]
@@ -264,7 +271,11 @@ def _closed_start(m: Mechanism, preferred: Mapping[str, float], tol: float, clos
             error,
             best,
         )
-    return scaled(Configuration(system, x[:, None]))
+    return placed(Configuration(system, x[:, None]))
+
+
+def _itself(here: Configuration) -> Configuration:
+    return here
 
 
 def _belts_off(m: Mechanism) -> str:
@@ -330,14 +341,8 @@ def _closed_nearby(system: System, attempts: Sequence[tuple[Array, Index]], tol:
     return best, best_error
 
 
-def _search(
-    m: Mechanism, system: System, x: Array, preferred: Mapping[str, float], tol: float, closer: Closer | None
-) -> tuple[Array, float]:
-    attempts, goal = _attempts(m, system, x, preferred), max(CLOSED, tol)
-    if closer is not None and (closed := closer(system, attempts[0][0])) is not None:
-        error = float(Configuration(system, closed[:, None]).closure[0])
-        if error <= 10 * CLOSURE_GOAL:
-            return closed, error
+def _search(system: System, attempts: Sequence[tuple[Array, Index]], tol: float) -> tuple[Array, float]:
+    goal = max(CLOSED, tol)
     best, best_error = _closed_nearby(system, attempts, tol)
     if best_error <= goal:
         return best, best_error
