@@ -228,13 +228,6 @@ def closed_start(
     DeclarationError
         where lengths are too far apart, unless the geometry is meant to ``tol``.
     """
-    here = _closed_start(m, preferred or {}, tol, closer)
-    if not tol:
-        refuse_mixed_lengths(here)
-    return here
-
-
-def _closed_start(m: Mechanism, preferred: Mapping[str, float], tol: float, closer: Closer | None) -> Configuration:
     if not m.has_geometry:
         bare = [p.name for p in m.pairs if not p.has_geometry]
         raise DeclarationError(
@@ -243,20 +236,34 @@ def _closed_start(m: Mechanism, preferred: Mapping[str, float], tol: float, clos
         )
     here = scaled_start(m)
     system, x, error = here.system, here.x[:, 0], float(here.closure[0])
-    # of many loops dense least squares take longer than what they gain is worth
-    if error <= 10 * CLOSURE_GOAL or (error <= CLOSED and system.graph.n_loops > 16):
-        return here
     if error <= CLOSED:
-        return Configuration(system, close_all(system, here.x, np.arange(0))[0])
-    # lengths and origin of a guess that misses by less than a hundredth serve as those of the closed state do
-    placed = scaled if error > 0.01 else _itself
+        # of many loops dense least squares take longer than what they gain is worth
+        if error > 10 * CLOSURE_GOAL and system.graph.n_loops <= 16:
+            here = Configuration(system, close_all(system, here.x, np.arange(0))[0])
+    else:
+        attempts = _attempts(m, system, x, preferred or {})
+        beside = closer(system, attempts[0][0]) if closer is not None else None
+        # size, place and distances of points of a guess that misses by less than a tenth serve as those of the closed state do
+        if beside is not None and error <= 0.1:
+            refuse_mixed_lengths(here)
+            return beside
+        here = scaled(beside or _found(m, here, attempts, preferred or {}, tol))
+    if not tol:
+        refuse_mixed_lengths(here)
+    return here
+
+
+def _found(
+    m: Mechanism,
+    guess: Configuration,
+    attempts: Sequence[tuple[Array, Index]],
+    preferred: Mapping[str, float],
+    tol: float,
+) -> Configuration:
+    """The closed state that a search finds."""
+    system, x = guess.system, guess.x[:, 0]
     known, asked = m.once(_kept)["searched"], x.tobytes()
     if not tol or known.get(asked, (x, 0.0))[1] <= tol:  # a search with a tolerance begins at the same guesses
-        attempts = _attempts(m, system, x, preferred)
-        beside = closer(system, attempts[0][0]) if closer is not None else None
-        if beside is not None and beside.closure[0] <= 10 * CLOSURE_GOAL:
-            known[asked] = beside.x[:, 0], float(beside.closure[0])
-            return placed(beside)
         known[asked] = _search(system, attempts, tol)
     x, error = known[asked]
     if error > max(CLOSED, tol):
@@ -271,11 +278,7 @@ def _closed_start(m: Mechanism, preferred: Mapping[str, float], tol: float, clos
             error,
             best,
         )
-    return placed(Configuration(system, x[:, None]))
-
-
-def _itself(here: Configuration) -> Configuration:
-    return here
+    return Configuration(system, x[:, None])
 
 
 def _belts_off(m: Mechanism) -> str:

@@ -112,6 +112,13 @@ def scattered_sum(values: Array, index: Index, count: int) -> Array:
     return np.moveaxis(np.asarray(to @ flat).reshape(count, values.shape[0], values.shape[2]), 0, 1)
 
 
+def chebyshev(count: int) -> tuple[Array, Array, Array]:
+    """Chebyshev points ``(n,)`` from -1 to 1, the ``n`` polynomials there ``(n, n)``, and what makes coefficients ``(n, n)`` of values."""
+    points = np.asarray(np.polynomial.chebyshev.chebpts1(count))
+    there = np.polynomial.chebyshev.chebvander(points, count - 1)
+    return points, there, there.T * np.where(np.arange(count), 2.0, 1.0)[:, None] / count
+
+
 def scaled_norm(M: Array) -> Array:
     """A bound of the spectral radius of all matrices with entries of sizes ``M (n, n, T)``, ``(T,)``.
 

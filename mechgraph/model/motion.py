@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import FREEDOM_NAME, SERIES, TABLE, Described, between
+from mechgraph.maths.linear import chebyshev
 from mechgraph.maths.se3 import Array
 from mechgraph.memo import dataclass
 from mechgraph.pairs.cam_laws import RISES, SCCA, Segment
@@ -114,9 +115,7 @@ def _panels(function: Callable[[Array], Array], low: float, high: float) -> list
 
     The rounding in the values is 8 eps (|f| + |t f'| / 4), the second term from that in t.
     """
-    nodes = np.asarray(np.polynomial.chebyshev.chebpts1(CHEBYSHEV_POINTS))
-    transform = np.polynomial.chebyshev.chebvander(nodes, CHEBYSHEV_POINTS - 1).T * (2.0 / CHEBYSHEV_POINTS)
-    transform[0] /= 2.0
+    nodes, _, to_series = chebyshev(CHEBYSHEV_POINTS)
     done: list[_Panel] = []
     ends = [(low, high)]
     # part of the range of a callable below which it counts as not smooth
@@ -130,7 +129,7 @@ def _panels(function: Callable[[Array], Array], low: float, high: float) -> list
         steep = np.abs(times).max(1) * np.abs(np.diff(values) / np.diff(times)).max(1)
         rounding = CHEBYSHEV_NOISE * (np.abs(values).max(1) + steep / 4.0)
         halves: list[tuple[float, float]] = []
-        for (a, b), coefficients, floor in zip(some, values @ transform.T, rounding, strict=True):
+        for (a, b), coefficients, floor in zip(some, values @ to_series.T, rounding, strict=True):
             significant = np.flatnonzero(np.abs(coefficients) > floor)
             length = int(significant[-1]) + 1 if significant.size else 1
             if length <= CHEBYSHEV_POINTS - 4:

@@ -48,6 +48,7 @@ from mechgraph.kinematics.motion_path import DriverPath
 from mechgraph.kinematics.solver import closure_rank, closure_solver
 from mechgraph.kinematics.state import Configuration, FactoredClosure, user_poses
 from mechgraph.kinematics.system import System
+from mechgraph.maths.linear import chebyshev
 from mechgraph.maths.newton import Interpolation, Nodes, Paths
 from mechgraph.maths.se3 import Array, Index, cross, rotate
 from mechgraph.maths.singular_point import WINDOW, Crossing, leapt, passed
@@ -774,8 +775,6 @@ def _same(system: System, variants: Any) -> System:
 
 
 _ORDERS = np.arange(POINTS + 1, dtype=float)
-_NODES = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
-_VALUES = np.polynomial.chebyshev.chebvander(_NODES, POINTS - 1)
-_TO_SERIES = _VALUES.T * np.where(_ORDERS[:-1], 2.0, 1.0)[:, None] / POINTS
+_NODES, _VALUES, _TO_SERIES = chebyshev(POINTS)
 _GAUSS = np.polynomial.legendre.leggauss(4)
 _IN_STEP = np.concatenate([[0.0, 0.5, 1.0], 0.25 + 0.25 * _GAUSS[0], 0.75 + 0.25 * _GAUSS[0]])

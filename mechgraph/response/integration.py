@@ -28,6 +28,7 @@ import scipy
 
 from mechgraph.errors import DeclarationError, MechgraphWarning, counted
 from mechgraph.kernel.tables import pointer
+from mechgraph.maths.linear import chebyshev
 from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import RESPONSE
 from mechgraph.memo import dataclass
@@ -43,9 +44,7 @@ POINTS_OF_STEP = 16
 OF_ALL = 2000
 """Places at which is looked from the beginning of a motion to its end: a pulse that takes a longer part of it is seen."""
 
-_AT = np.cos(np.pi * (np.arange(POINTS_OF_STEP) + 0.5) / POINTS_OF_STEP)
-_SERIES = np.polynomial.chebyshev.chebvander(_AT, POINTS_OF_STEP - 1) * (2.0 / POINTS_OF_STEP)
-_SERIES[:, 0] *= 0.5
+_AT, _, _TO_SERIES = chebyshev(POINTS_OF_STEP)
 
 
 def overlooked(along: Callable[[Array], Array], begin: float, end: float, apart: float, allowed: Array) -> bool:
@@ -58,7 +57,9 @@ def overlooked(along: Callable[[Array], Array], begin: float, end: float, apart:
     # fewest places between them at which is looked
     places = np.linspace(-1.0, 1.0, max(64, int(np.ceil(h / apart))) + 1)
     found = along(begin + 0.5 * h * (1.0 + np.concatenate([_AT, places])))
-    smooth = (found[:, :POINTS_OF_STEP] @ _SERIES) @ np.polynomial.chebyshev.chebvander(places, POINTS_OF_STEP - 1).T
+    smooth = (found[:, :POINTS_OF_STEP] @ _TO_SERIES.T) @ np.polynomial.chebyshev.chebvander(
+        places, POINTS_OF_STEP - 1
+    ).T
     missed = h * np.abs(found[:, POINTS_OF_STEP:] - smooth).max(axis=1)
     # change of a rate, against the tolerance of a step, up to which a difference is left to the error estimate of the step
     return not bool((missed <= 100.0 * allowed).all())
