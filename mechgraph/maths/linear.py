@@ -115,7 +115,7 @@ def scattered_sum(values: Array, index: Index, count: int) -> Array:
 def chebyshev(count: int) -> tuple[Array, Array, Array]:
     """Chebyshev points ``(n,)`` from -1 to 1, the ``n`` polynomials there ``(n, n)``, and what makes coefficients ``(n, n)`` of values."""
     points = np.asarray(np.polynomial.chebyshev.chebpts1(count))
-    there = np.polynomial.chebyshev.chebvander(points, count - 1)
+    there = np.asarray(np.polynomial.chebyshev.chebvander(points, count - 1), dtype=float)
     return points, there, there.T * np.where(np.arange(count), 2.0, 1.0)[:, None] / count
 
 
