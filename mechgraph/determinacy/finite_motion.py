@@ -138,21 +138,19 @@ class _Closed:
                 yield x, self.change(x)
 
     def regular(self, v: Array) -> float:
-        """Length of the first step after which the rows that are independent here close all loops; 0 where there is none.
+        """Length of the first step after which the rows that are independent here close; 0 where this leaves loops open, or none does.
 
         Then the rank is constant nearby: the other rows depend on them not only here. Where it is not, they stay open by the square
-        of the step (a change point) or a higher power (shaky), far above the closure error.
+        of the step (a change point) or a higher power (shaky), far above the closure error; of high powers a shorter step shows nothing.
         """
         rows = self.closure.reduced
         already = rows.open_part(Configuration(self.system, self.x[:, None]).residual[:, 0])
         limit = 10 * max(CLOSURE_GOAL, rows.rounding, already)
         for h in TRIAL_STEPS:
             closed = _corrected(self.system, self._stepped(v, h), rows)
-            if (
-                closed is not None
-                and rows.open_part(Configuration(self.system, closed[:, None]).residual[:, 0]) <= limit
-            ):
-                return h
+            if closed is not None:
+                stays = rows.open_part(Configuration(self.system, closed[:, None]).residual[:, 0]) <= limit
+                return h if stays else 0.0
         return 0.0
 
     def proved(self, rng: np.random.Generator) -> tuple[Array, float]:
@@ -276,8 +274,10 @@ def _near_by(start: _Closed, rng: np.random.Generator) -> FiniteMotion:
 
 
 def _corrected(system: System, x: Array, rows: ReducedRows) -> Array | None:
-    """The loops closed from ``x`` in the kept rows of a nearby position alone; None where that does not converge quickly."""
-    before, goal = np.inf, max(CLOSURE_GOAL, rows.rounding)
+    """The loops closed from ``x`` in the kept rows of a nearby position alone, or as far as they close; None where that is slow from the
+    first correction on.
+    """
+    before, goal, gained = np.inf, max(CLOSURE_GOAL, rows.rounding), False
     # corrections with the equations of the position left
     slow = 0.2  # part of the closure error that such a correction may leave
     for _ in range(12):
@@ -286,8 +286,9 @@ def _corrected(system: System, x: Array, rows: ReducedRows) -> Array | None:
         if error <= goal or (error < 10 * goal and error > slow * before):
             return x
         if error > slow * before:
-            return None
-        before = error
+            # curvature slows all corrections alike; what the first ones gain and a later one does not is open
+            return x if gained and error > 0.5 * before else None
+        before, gained = error, before < np.inf
         x = system.advance(x[:, None], rows.correction(residual)[:, None])[:, 0]
     return None
 

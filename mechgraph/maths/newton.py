@@ -255,8 +255,8 @@ def closest_zeros(
         before, step = np.linalg.norm(point.residual, axis=0), least(point)
         biggest = np.abs(step).max(axis=0, initial=0.0)
         moves = np.flatnonzero(np.isfinite(biggest) & (biggest > 0))
-        at, before = at[moves], before[moves]
-        step = step[:, moves] * np.minimum(1.0, LONGEST / biggest[moves])
+        at, before, biggest = at[moves], before[moves], biggest[moves]
+        step = step[:, moves] * np.minimum(1.0, LONGEST / biggest)
         left, begin = np.arange(at.size), x[:, at]
         for _ in range(6):
             if not left.size:
@@ -264,7 +264,9 @@ def closest_zeros(
             trial = advance(begin[:, left], step[:, left])
             r = evaluate(trial).residual
             x[:, at[left]], size[at[left]] = trial, np.abs(r).max(axis=0, initial=0.0)
-            worse = ~((np.linalg.norm(r, axis=0) < before[left]) | (size[at[left]] <= tolerance))
+            gains = (np.linalg.norm(r, axis=0) < before[left]) | (size[at[left]] <= tolerance)
+            # short steps are taken whole: in a narrow bent valley a step gains nothing until the next one has corrected it
+            worse = ~gains & (biggest[left] > 0.1 * LONGEST)
             left = left[worse]
             step[:, left] *= 0.5
         gained = at[size[at] < 0.999 * best_size[at]]
