@@ -199,6 +199,19 @@ def test_an_ill_conditioned_assembly_is_not_double(longer: float) -> None:
     assert sorted(mode.start["O1.Rz"] for mode in modes) == pytest.approx([-np.pi / 2, np.pi / 2], abs=1e-5)
 
 
+def test_bounds_grow_by_what_a_rounded_inverse_is_off() -> None:
+    """With a factor r in all bounds they are ``eta = r e / (1 - r o)`` and ``beta K eta = c r^3 / (1 - r o)^2``: both tell the same o > 0."""
+    r, told = np.array([2.0, 2e11, 4e11]), []
+    for factor in r:
+        asked = mg.Tolerances(modes={"bound_rounding": factor})
+        sure = mg.assemblies(mg.load("four-bar"), {"A": 0.5}, tolerances=asked).certificates[0]
+        told.append((factor / sure.error, np.sqrt(factor**3 / sure.product)))
+    by_error, by_product = np.array(told).T / np.array(told)[0][:, None]
+    assert by_error[2] < 0.9
+    np.testing.assert_allclose(by_error, 1 - (1 - by_error[1]) * r / r[1], rtol=1e-3)
+    np.testing.assert_allclose(by_product, by_error, rtol=1e-3)
+
+
 def test_every_regular_assembly_of_7r_is_certified_and_goes_on_in_solve() -> None:
     m = mg.load("7r")
     modes = mg.assemblies(m, {"O1": 0.3})

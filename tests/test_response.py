@@ -537,3 +537,15 @@ def test_the_rate_of_a_slide_is_in_the_declared_unit_of_length():
     m = mg.Mechanism("cart", [mg.Link("frame"), mg.Link("cart", mass=1.0, center=(0, 0, 0)), arm], pairs)
     r = mg.respond(m, [0.0, 0.1], rates={"P": 0.5, "R": 0.2})
     assert [r[name].velocity[0, 0] for name in "PR"] == pytest.approx([0.5, 0.2], rel=1e-12)
+
+
+@pytest.mark.parametrize("prescribed", [True, False])
+def test_rates_that_are_left_open_are_the_least_ones(prescribed):
+    """Wheels with ``A + B = C``, C at 2 rad/s: A and B at 1 rad/s each, and without loads they stay so."""
+    links = [mg.Link("frame"), *(mg.Link(n, 1.0, (0, 0, 0), np.eye(3)) for n in "abc")]
+    pairs = [mg.Pair(n.upper(), "R", "frame", n, point=(0, 0, 0), axis=Z) for n in "abc"]
+    m = mg.Mechanism("sum", links, pairs, couplings=[mg.Coupling({"A": 1.0, "B": 1.0, "C": -1.0}, name="g")])
+    how = {"motions": {"C": lambda t: (2 * t, 2 + 0 * t, 0 * t)}} if prescribed else {"rates": {"C": 2.0}}
+    r = mg.respond(m, [0.0, 1.0], **how)
+    np.testing.assert_allclose([r[n].velocity[:, 0] for n in "AB"], 1.0, rtol=1e-9)
+    np.testing.assert_allclose(r["A"].position[[0, -1], 0], [0.0, 1.0], atol=1e-9)

@@ -248,6 +248,8 @@ class FrictionProblem:
         are zero along it stay so, the least friction, no force locked in.
         """
         here, P, A = self.here, len(self.here.system.m.pairs), place.A
+        if not stress.shape[2]:
+            return np.zeros(here.T, dtype=bool)
         reading = np.einsum("dct,cst->dst", A, stress[:, place.reads])
         along = np.einsum("dst,dct,ct->st", reading, A, forces[:, place.reads])
         if not place.between_teeth(P):
