@@ -58,20 +58,25 @@ from mechgraph.pairs.pair_type import PairType
 
 @dataclass(frozen=True)
 class RodPoints:
-    """Rods between links ``a, b (n,)``, from points ``at_a`` to ``at_b (3, n, B)`` in their frames, and squares ``l^2 (n, B)``."""
+    """Rods between links ``a, b (n,)``, from points ``at_a`` to ``at_b (3, n, B)`` in their frames, and squares ``l^2 (n, B)``.
+
+    ``on_rod (2, 3, n, B)`` are their ends on the rods, where these are known.
+    """
 
     a: Index
     b: Index
     at_a: Array
     at_b: Array
     squares: Array
+    on_rod: Array | None = None
 
 
 class RodRows(Rows):
     """``(d^2 - l^2) / 2`` of every rod, polynomial in the poses; ``way (n, F)``: the freedoms between both links, with signs.
 
-    They are rows of positions alone. Its rate is the relative twist of the links on the line of ``d`` through ``p_b``:
-    ``phi' = W . (V_b - V_a)``, ``W = (p_b x d, d)``.
+    They are rows of positions alone. Where the end b has moved by ``e`` more than the end a from where it is on the rod, they are
+    ``e . (2 d - e) / 2``: of long rods no digits are lost that way. Their rate is the relative twist of the links on the line of ``d``
+    through ``p_b``: ``phi' = W . (V_b - V_a)``, ``W = (p_b x d, d)``.
     """
 
     def __init__(self, points: RodPoints, way: Reals, first: int) -> None:
@@ -82,9 +87,12 @@ class RodRows(Rows):
         """``phi (n, T)`` and ``W (6, n, T)``."""
         k = self.points
         A, B = here.poses.take(k.a, axis=2), here.poses.take(k.b, axis=2)
-        p = rotate(B[:, :3], k.at_b) + B[:, 3]
-        d = p - rotate(A[:, :3], k.at_a) - A[:, 3]
-        return 0.5 * ((d * d).sum(axis=0) - k.squares), np.concatenate([cross(p, d), d])
+        p, a = rotate(B[:, :3], k.at_b) + B[:, 3], rotate(A[:, :3], k.at_a) + A[:, 3]
+        d, W = p - a, np.concatenate([cross(p, p - a), p - a])
+        if k.on_rod is None:
+            return 0.5 * ((d * d).sum(axis=0) - k.squares), W
+        e = (p - k.on_rod[1]) - (a - k.on_rod[0])
+        return 0.5 * (e * (2.0 * d - e)).sum(axis=0), W
 
     def residual(self, here: Evaluated) -> Reals:
         """``phi (n, T)``."""
@@ -150,7 +158,8 @@ class RodSystem(System):
         k, out = self.points, super().cases(which)
         if k.squares.shape[1] == 1:
             return out
-        points = replace(k, at_a=k.at_a[..., which], at_b=k.at_b[..., which], squares=k.squares[..., which])
+        on_rod = None if k.on_rod is None else k.on_rod[..., which]
+        points = RodPoints(k.a, k.b, k.at_a[..., which], k.at_b[..., which], k.squares[..., which], on_rod)
         return cast("RodSystem", out).with_points(points)
 
     def with_parameters(self, par: Parameters) -> RodSystem:

@@ -266,17 +266,18 @@ def motions_of(of: TaskClass, member: ClassMember, x: Array) -> Array:
 
     They are the same for mechanisms that do the same, as Roberts' cognates.
     """
-    rows, out = of.at(member, x), list[Array]()
+    first, rows, out = of.at(of.start, of.x[:, None]), of.at(member, x), list[Array]()
     F = of.problem.system.n_freedoms
+    n = rows.residual.shape[1] // (1 + len(of.problem.rates))
     for i, given in enumerate(of.given):
         columns = of.columns[given & (of.columns < F)]
-        J = rows.by_coordinates[i][: rows.residual.shape[1] // (1 + len(of.problem.rates)), :F].transpose(2, 0, 1)
-        sigma, V = np.linalg.svd(J)[1:]
-        rank = int((sigma > MODES.generic * sigma[:, :1]).sum(axis=1).max(initial=0))
-        ways = V[:, rank:, columns].conj().swapaxes(1, 2)
+        J = [v.by_coordinates[i][:n, :F].transpose(2, 0, 1) for v in (first, rows)]
+        rank = np.linalg.matrix_rank(J[0][0], MODES.generic)
+        ways = np.linalg.svd(np.concatenate(J))[2][:, rank:, columns].conj().swapaxes(1, 2)
         onto = ways @ np.linalg.pinv(ways, rcond=MODES.generic)
-        if np.abs(onto - np.eye(len(columns))).max(initial=0.0) > MODES.span:
-            out.append(onto.reshape(x.shape[1], -1).T)
+        # rows of which the numbers asked can go anywhere tell nothing, as a random mechanism says
+        if np.abs(onto[0] - np.eye(len(columns))).max(initial=0.0) > MODES.span:
+            out.append(onto[1:].reshape(x.shape[1], len(columns) ** 2).T)
     return np.concatenate(out) if out else np.zeros((0, x.shape[1]))
 
 
@@ -286,17 +287,20 @@ def same_motions(motions: Array, i: int) -> Mask:
     return np.abs(motions - motions[:, [i]]).max(axis=0) < MODES.real_singular if len(motions) else np.arange(n) == i
 
 
-def placed(of: TaskClass, member: ClassMember, z: Array, rng: np.random.Generator) -> tuple[Array, Mask]:
-    """States ``(nx, n)`` of unknowns ``z (u, n)``, which may be rounded, at a task that they do, from random positions; which close."""
+def placed(of: TaskClass, member: ClassMember, z: Array, rng: np.random.Generator, near: Array) -> tuple[Array, Mask]:
+    """States ``(nx, n)`` of unknowns ``z (u, n)``, which may be rounded, at a task that they do, from the positions ``near (nx, n)`` and
+    then from random ones; which close.
+    """
     p, s, n = of.problem, of.problem.system, z.shape[1]
     numbers = p.numbers.with_values(p.places, z)
     X, open_ = np.zeros((of.R, of.nx, n), dtype=complex), np.ones((of.R, n), dtype=bool)
-    # random positions, and Gauss-Newton steps from them
-    for _ in range(16):
+    # positions, and Gauss-Newton steps from them
+    for trial_of in range(16):
         some = rng.normal(size=(s.n_freedoms, of.R * n, 2)) @ [1.0, 0.5j]
         states = s.advance(np.repeat(p.at_rest[:, None].astype(complex), of.R * n, axis=1), some)
         trial = np.zeros_like(X)
         trial[:, : of.states] = np.moveaxis(states.reshape(of.states, of.R, n), 0, 1)
+        trial = trial if trial_of else near[of.head :].reshape(X.shape)
         x = np.concatenate([z, numbers.norms.reshape(-1, n)[: of.W], np.where(open_[:, None], trial, X).reshape(-1, n)])
         for _ in range(12):
             rows = of.at(member, x)

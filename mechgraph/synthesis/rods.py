@@ -109,8 +109,8 @@ class RodProblem(RowProblem):
             for ends in zip(*self.rods, strict=True)
         )
         a, b = (np.array([end.body for end in ends], dtype=np.intp) for ends in zip(*self.rods, strict=True))
-        squares = ((far[0] - near[0]) ** 2).sum(axis=1)
-        return RodPoints(a, b, near[1].swapaxes(0, 1), far[1].swapaxes(0, 1), squares)
+        on_rod, on_body = (np.stack([near[at], far[at]]).swapaxes(1, 2) for at in (0, 1))
+        return RodPoints(a, b, on_body[0], on_body[1], ((on_rod[1] - on_rod[0]) ** 2).sum(axis=0), on_rod)
 
     def system_with(self, numbers: RowNumbers) -> System:
         """See there."""

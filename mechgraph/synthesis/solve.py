@@ -26,7 +26,7 @@ from mechgraph.files import cache_folder, whole_file
 from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
 from mechgraph.modes.family import Array
-from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, follow, polished
+from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, Mask, follow, polished
 from mechgraph.modes.start_sets import (
     MISSED,
     MISSED_AGAIN,
@@ -38,8 +38,8 @@ from mechgraph.modes.start_sets import (
     tame,
     trace_test,
 )
-from mechgraph.modes.targets import TrackRun, run_tracks
-from mechgraph.synthesis.classes import ClassMember, TaskClass
+from mechgraph.modes.targets import run_tracks
+from mechgraph.synthesis.classes import ClassMember, TaskClass, TaskLeg
 from mechgraph.synthesis.labelling import TaskLabelling, by_motions, motions_of, placed, symmetries
 from mechgraph.variants.numbers import MARKER
 
@@ -279,6 +279,12 @@ class TaskEnds:
     lost: int
     runs: int
 
+    def join(self, of: TaskClass, goal: ClassMember, there: Array, tracks: int) -> None:
+        """Put regular ends ``(nx, n)`` of some of all ``tracks`` to those that are known."""
+        new = distinct(of.fingerprints(goal, there), of.fingerprints(goal, self.x))
+        self.x = np.concatenate([self.x, there[:, new]], axis=1)
+        self.lost = max(tracks - self.x.shape[1] - self.singular.shape[1] - self.infinite, 0)
+
 
 def ends(
     of: TaskClass, start: TaskStart, goals: ClassMember, rng: np.random.Generator, progress: Progress
@@ -304,27 +310,52 @@ def ends(
             which = np.repeat(np.arange(len(some)), x.shape[1])
             if not which.size:
                 continue
-            here = run_tracks(of.leg(begin, goals.taken(some), which), np.tile(x, len(some)), care)
+            here = follow(of.leg(begin, goals.taken(some), which), np.tile(x, len(some)), care)
             for j, place in enumerate(some.tolist()):
-                goal = goals.taken(np.array([place]))
-                _account(of, goal, every[place], here.taken(np.flatnonzero(which == j)), N - x.shape[1])
+                mine = which == j
+                leg = of.leg(begin, goals.taken(np.array([place])))
+                _account(leg, every[place], x, here.x[:, mine], here.arrived[mine], N, care)
         left = left[[every[i].lost > 0 for i in left]]
         if not left.size:
             break
     return every
 
 
-def _account(of: TaskClass, goal: ClassMember, known: TaskEnds, run: TrackRun, lost_before: int) -> None:
-    """Put the ends of a run to those that are known."""
-    N, regular = lost_before + len(run.regular), run.x[:, run.regular]
-    new = distinct(of.fingerprints(goal, regular), of.fingerprints(goal, known.x))
-    known.x = np.concatenate([known.x, regular[:, new]], axis=1)
+def _account(leg: TaskLeg, known: TaskEnds, x: Array, there: Array, arrived: Mask, N: int, care: Care) -> None:
+    """Put the ends ``there`` of a run of tracks from ``x`` to those that are known, and look for those that are missing.
+
+    Tracks that failed, as they pass by infinity or where solutions meet, or of which two came to one end, are followed again, with finer
+    steps and then on ways bent through complex tasks: any solution to which these lead is one.
+    """
+    of, goal = leg.equations, leg.end
+    regular = np.flatnonzero(arrived)
+    known.join(of, goal, there[:, regular], N)
+    known.runs += 1
+    prints = of.fingerprints(goal, there[:, regular])
+    twice = np.delete(prints, distinct(prints), axis=1)
+    met = [
+        np.abs(prints - one[:, None]).max(axis=0) <= MODES.one_assembly * max(1.0, np.abs(one).max()) for one in twice.T
+    ]
+    again = np.union1d(np.flatnonzero(~arrived), regular[np.any(met, axis=0)] if met else regular[:0])
+    # how far ways are bent, at most .25 of that in the middle: the least that goes round what is near changes the fewest ends
+    for bend in (0.0, 0.01, -0.01, 0.03, -0.03, 0.003, -0.003):
+        if not known.lost:
+            return
+        tracked = follow(leg, x[:, again], care if bend else care.finer, partial(_bent, bend), again)
+        known.join(of, goal, tracked.x[:, tracked.arrived], N)
+    if not known.lost or arrived.all():
+        return
+    run = run_tracks(leg, x[:, ~arrived], care)
     singular, infinite = run.x[:, run.singular], int(run.infinite.sum())
     # the run counts in which most is known
-    if not known.runs or singular.shape[1] + infinite > known.singular.shape[1] + known.infinite:
+    if known.runs == 1 or singular.shape[1] + infinite > known.singular.shape[1] + known.infinite:
         known.singular, known.infinite = singular, infinite
-    known.runs += 1
-    known.lost = max(N - known.x.shape[1] - known.singular.shape[1] - known.infinite, 0)
+    known.join(of, goal, run.x[:, run.regular], N)
+
+
+def _bent(bend: float, s: Array) -> tuple[Array, Array]:
+    """A way through complex ``t``, see ``modes.homotopy.Way``."""
+    return s + 1j * bend * s * (1.0 - s), 1.0 + 1j * bend * (1.0 - 2.0 * s)
 
 
 def start_of(of: TaskClass, rng: np.random.Generator, cache: bool, progress: Progress) -> TaskStart:
@@ -355,7 +386,8 @@ def unfolded(of: TaskClass, start: TaskStart, goal: ClassMember, found: TaskEnds
     swapped = [found.x[: of.u, real][np.argsort(one.places)] for one in symmetries(of.whole)]
     if not swapped or not len(real):
         return found.x
-    x, closed = placed(of, goal, np.concatenate(swapped, axis=1), rng)
+    near = np.tile(found.x[:, real], len(swapped))
+    x, closed = placed(of, goal, np.concatenate(swapped, axis=1), rng, near)
     return np.concatenate([found.x, x[:, closed]], axis=1)
 
 
