@@ -63,6 +63,24 @@ def test_a_misfit_locks_in_springs_in_series() -> None:
     assert np.allclose(s.misfit_sensitivity["B.Fz"]["A.Fz"], -locked / 1e-4, rtol=1e-11)
 
 
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+def test_a_coupling_bears_what_a_spring_beside_it_locks_in(engine: str) -> None:
+    """Two blocks at equal heights by a rigid coupling ``A - B = 0`` and by a foot of stiffness k that is e too long: it bears k e."""
+    k, e, weight = 1e5, 2e-3, 50.0
+    links = [mg.Link("frame"), mg.Link("a"), mg.Link("b")]
+    foot = mg.Pair("foot", "Sp", "a", "b", point=(0, 0, 0), axis=(0, 1, 0), stiffness={"Fz": k}, misfit={"Fz": e})
+    slides = [mg.Pair(n, "P", "frame", n.lower(), point=(0, 0, 0), axis=(0, 1, 0)) for n in "AB"]
+    same = mg.Coupling({"A": 1.0, "B": -1.0}, name="same")
+    down = mg.Wrench("b", force=(0, -weight, 0), point=(0, 0, 0))
+    m = mg.Mechanism("blocks", links, [*slides, foot], ["A"], [down], couplings=[same])
+    s = mg.solve(m, {"A": [0.0, 0.3]}, redundant="elastic", engine=engine)
+    pressed = s["foot"].components["Fz"]
+    assert np.allclose(np.abs(pressed), k * e)
+    assert np.allclose(s["A"].effort[:, 0], weight)
+    # b is in balance: what the coupling gives it, the foot and its load
+    assert np.allclose(-s.coupling("same").effort + pressed, weight)
+
+
 def test_a_component_of_no_stiffness_carries_nothing() -> None:
     s = mg.solve(door((2e6, 0.0)), {"A": [0.2]}, redundant="elastic")
     assert s["A"].components["Fz"][0] == pytest.approx(WEIGHT, rel=1e-11)

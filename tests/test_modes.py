@@ -200,7 +200,7 @@ def test_an_ill_conditioned_assembly_is_not_double(longer: float) -> None:
 
 
 def test_bounds_grow_by_what_a_rounded_inverse_is_off() -> None:
-    """With a factor r in all bounds they are ``eta = r e / (1 - r o)`` and ``beta K eta = c r^3 / (1 - r o)^2``: both tell the same o > 0."""
+    """With a factor r in all bounds ``eta = r e / (1 - r o)``, ``beta K eta = c r^3 / (1 - r o)^2``: both tell the same o > 0."""
     r, told = np.array([2.0, 2e11, 4e11]), []
     for factor in r:
         asked = mg.Tolerances(modes={"bound_rounding": factor})

@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 
 import mechgraph as mg
+from mechgraph.kinematics.assembly import scaled_system
+from mechgraph.kinematics.prescribed import with_pairs_at
+from mechgraph.kinematics.state import Configuration
 from mechgraph.response.resting import with_contacts
 
 X, Y, Z = np.eye(3)
@@ -103,7 +106,9 @@ def test_a_body_rests_on_its_stop_until_it_is_lifted():
 def test_one_of_two_bodies_is_lifted_and_the_other_goes_on_resting():
     """Each on a slide of its own; a force of 4 t lifts the one at t = g / 4."""
     lift = mg.Wrench("one", force=lambda pose, twist, t: np.stack([0 * t, 4 * t, 0 * t], axis=-1), point=(0, 0, 0))
-    pairs = [mg.Pair(n, "P", "frame", link, point=(x, 0, 0), axis=Y) for n, link, x in (("A", "one", 0), ("B", "two", 1))]
+    pairs = [
+        mg.Pair(n, "P", "frame", link, point=(x, 0, 0), axis=Y) for n, link, x in (("A", "one", 0), ("B", "two", 1))
+    ]
     links = [mg.Link("frame"), body("one"), body("two", center=(1, 0, 0))]
     m = mg.Mechanism("two slides", links, pairs, loads=[mg.Gravity((0, -G, 0)), lift])
     r = mg.respond(m, [0.0, 2.0, 4.0], stops=[mg.Stop(n, lower=0.0) for n in "AB"])
@@ -113,8 +118,8 @@ def test_one_of_two_bodies_is_lifted_and_the_other_goes_on_resting():
 
 
 def test_of_two_feet_the_one_that_a_load_beyond_it_presses_stays_down():
-    """Feet at -l and l of a bar of mass m and inertia I > m l d, a load F at d > l: held at -l alone the far foot would go through its stop;
-    held at l the force there is F (1/m + l d / I) / (1/m + l^2 / I).
+    """Feet at -l and l of a bar of mass m and inertia I > m l d, a load F at d > l: held at -l alone the far foot would go through its
+    stop; held at l the force there is F (1/m + l d / I) / (1/m + l^2 / I).
     """
     m, inertia, F, l, d = 2.0, 20.0, 3.0, 1.0, 1.5
     bar = mg.Link("bar", m, (0, 0, 0), inertia * np.eye(3), points={"left": (-l, 0, 0), "right": (l, 0, 0)})
@@ -140,8 +145,12 @@ def test_the_coordinates_of_a_point_with_a_stop_begin_where_it_is(size):
     ]
     m = mg.Mechanism("rod", [mg.Link("frame"), rod, body("end")], pairs, start={"A": 0.7})
     made, _ = with_contacts(m, [mg.Stop("rod.tip.Tx", lower=-9 * size)], 1e-9)
-    found = [made.start[f"rod.tip.T{x}"] for x in "xyz"]
-    np.testing.assert_allclose(found, 2 * size * np.array([np.cos(0.7), np.sin(0.7), 0.0]), rtol=1e-12, atol=1e-9)
+    system = scaled_system(m, np.array([0.7, 0.0]))
+    closed = Configuration(system, system.state_of(np.array([[0.7], [0.0]])))
+    # as a stop sees it, and as a solution does, which has lengths over L
+    for whole in (made, with_pairs_at(m, made.pairs[2:], (), closed)):
+        found = [whole.start[f"rod.tip.T{x}"] for x in "xyz"]
+        np.testing.assert_allclose(found, 2 * size * np.array([np.cos(0.7), np.sin(0.7), 0.0]), rtol=1e-12, atol=1e-9)
 
 
 def test_beside_a_sled_that_comes_to_rest_a_body_is_lifted_from_its_stop_once():
