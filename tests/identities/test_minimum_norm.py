@@ -150,16 +150,16 @@ def test_a_gear_between_cranks_that_turn_alike_anyway_shares_by_the_least_reacti
 
 
 @pytest.mark.parametrize("engine", ["dense", "sparse"])
-@pytest.mark.parametrize("M", [-3.0, 3.0])
-def test_wheels_between_cranks_that_turn_alike_anyway_bear_on_the_flank_that_spares_the_bearings(M, engine):
-    """Cranks of 1 m with wheels of radius 1/2 and an idler between them; the rod has F = tau - M, teeth 2 tau across the line of centers
-    and 2 |tau| tan(alpha) along it: F^2 + (F + 2 |tau| tan(alpha))^2 + 12 tau^2 is least at M (1 + q) / (13 + q^2), with the sign s of
-    tau in q = 1 + 2 s tan(alpha).
+@pytest.mark.parametrize(("h", "M"), [(1.0, -3.0), (1.0, 3.0), (4.0, -3.0)])
+def test_wheels_between_cranks_that_turn_alike_anyway_bear_on_the_flank_that_spares_the_bearings(h, M, engine):
+    """Cranks of length h with wheels of radius 1/2 and an idler between them; the rod has F = (tau - M) / h, teeth 2 tau across the line
+    of centers and 2 |tau| tan(alpha) along it: F^2 + (F + 2 |tau| tan(alpha))^2 + 12 tau^2 is least at M (p + q) / h / (p^2 + q^2 + 12),
+    p = 1 / h, q = p + 2 s tan(alpha), if that has the sign s; of long cranks on neither flank, so that teeth bear nothing.
     """
     ends = [
         ("A", "frame", "a", (0, 0, 0)),
-        ("B", "a", "c", (0, 1, 0)),
-        ("C", "c", "b", (2, 1, 0)),
+        ("B", "a", "c", (0, h, 0)),
+        ("C", "c", "b", (2, h, 0)),
         ("D", "frame", "b", (2, 0, 0)),
         ("I", "frame", "idler", (1, 0, 0)),
     ]
@@ -168,9 +168,11 @@ def test_wheels_between_cranks_that_turn_alike_anyway_bear_on_the_flank_that_spa
     loads = [mg.Wrench("b", moment=(0, 0, -M))]
     m = mg.Mechanism("cranks", None, pairs, ["A"], loads, couplings=gears)
     s = mg.solve(m, {"A": [0.0]}, redundant="minimum_norm", engine=engine)
-    q = 1 + 2 * np.sign(M) * np.tan(alpha)
-    tau = M * (1 + q) / (13 + q * q)
-    along = tau - M + 2 * abs(tau) * np.tan(alpha)
-    np.testing.assert_allclose(s["C"].force, [[tau - M, 0.0, 0.0]], rtol=1e-6, atol=1e-9)
-    np.testing.assert_allclose(s["D"].force, [[-along, 2 * tau, 0.0]], rtol=1e-6, atol=1e-9)
-    np.testing.assert_allclose(s["A"].force, [[along, 2 * tau, 0.0]], rtol=1e-6, atol=1e-9)
+    p, q = 1 / h, 1 / h + 2 * np.sign(M) * np.tan(alpha)
+    tau = M * p * (p + q) / (p * p + q * q + 12)
+    tau = tau if tau * M > 0 else 0.0
+    along = p * (tau - M) + 2 * abs(tau) * np.tan(alpha)
+    np.testing.assert_allclose(s["C"].force, [[p * (tau - M), 0.0, 0.0]], rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(s["D"].force, [[-along, 2 * tau, 0.0]], rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(s["A"].force, [[along, 2 * tau, 0.0]], rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(s["I"].force, [[0.0, -4 * tau, 0.0]], rtol=1e-6, atol=1e-6)
