@@ -471,7 +471,9 @@ class LoopSystem(ReducedRows):
         rows = np.broadcast_to(w * np.arange(n) + np.arange(w)[:, None, None], blocks.shape)
         cols = np.broadcast_to(w * np.arange(n) + np.arange(w)[None, :, None], blocks.shape)
         loops = scipy.sparse.csr_array((blocks.ravel(), (rows.ravel(), cols.ravel())), shape=(w * n, w * n))
-        return scipy.sparse.csr_array(scipy.sparse.block_diag([loops, scipy.sparse.eye_array(self.rows.further)]))
+        return scipy.sparse.csr_array(
+            scipy.sparse.block_diag([loops, self.unit * scipy.sparse.eye_array(self.rows.further)])
+        )
 
     def _columns(self, y: Array) -> Array:
         """Freedoms ``(F, ...)`` of solutions ``y (size, ...)``, zero in fixed columns."""
