@@ -10,6 +10,10 @@ import pytest
 
 import mechgraph as mg
 from mechgraph import show
+from mechgraph.kinematics.assembly import scaled_system
+from mechgraph.kinematics.prescribed import with_pairs_at
+from mechgraph.kinematics.state import Configuration
+from mechgraph.response.resting import with_contacts
 
 Z = (0.0, 0.0, 1.0)
 
@@ -171,3 +175,21 @@ def test_the_path_of_a_response_is_drawn_through_what_lies_between_its_outputs()
     (path,) = drawn["trace of arm.hook"].get_segments()
     np.testing.assert_allclose(np.linalg.norm(path, axis=1), 5.0, atol=1e-9)
     assert len(path) > 400
+
+
+@pytest.mark.parametrize("size", [1.0, 1000.0])
+def test_the_coordinates_of_a_point_with_a_stop_begin_where_it_is(size):
+    """A pendulum of 2 and a point on it, turned by 0.7, whatever the unit."""
+    rod = mg.Link("rod", 1.0, (size, 0, 0), size**2 * np.eye(3), points={"tip": (2 * size, 0, 0)})
+    pairs = [
+        mg.Pair("A", "R", "frame", "rod", point=(0, 0, 0), axis=Z),
+        mg.Pair("B", "R", "rod", "end", point=(size, size, 0), axis=Z),
+    ]
+    m = mg.Mechanism("rod", [mg.Link("frame"), rod, mg.Link("end")], pairs, start={"A": 0.7})
+    made, _ = with_contacts(m, [mg.Stop("rod.tip.Tx", lower=-9 * size)], 1e-9)
+    system = scaled_system(m, np.zeros(2))
+    closed = Configuration(system, system.state_of(np.array([[0.7], [0.0]])))
+    # as a stop sees it, and as a solution does, which has lengths over L
+    for whole in (made, with_pairs_at(m, made.pairs[2:], (), closed)):
+        found = [whole.start[f"rod.tip.T{x}"] for x in "xyz"]
+        np.testing.assert_allclose(found, 2 * size * np.array([np.cos(0.7), np.sin(0.7), 0.0]), rtol=1e-12, atol=1e-9)

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mechgraph.maths import se3
+from mechgraph.maths.newton import closest_zeros
 
 VECTORS = st.lists(st.floats(-1, 1), min_size=3, max_size=3).map(np.array).filter(lambda v: np.linalg.norm(v) > 1e-3)
 RATES = st.lists(st.floats(-2, 2), min_size=3, max_size=3).map(np.array)
@@ -260,3 +261,20 @@ def test_null_space_is_orthonormal_and_has_the_right_dimension(m, n, rank, seed)
     assert N.shape == (n, n - rank)
     np.testing.assert_allclose(N.T @ N, np.eye(n - rank), atol=1e-12)
     np.testing.assert_allclose(A @ N, 0, atol=1e-10)
+
+
+def test_a_narrow_bent_valley_leads_to_its_zero() -> None:
+    """``y = x^2, x / 10^6 = 1 / 10^6``: a whole step leaves the valley by the square of the way, a part of it gains as little."""
+
+    class At:
+        def __init__(self, x: np.ndarray) -> None:
+            self.x, self.residual = x, np.stack([x[1] - x[0] ** 2, 1e-6 * (x[0] - 1.0)])
+
+        def newton(self) -> np.ndarray:
+            dx = 1.0 - self.x[0]
+            return np.stack([dx, 2.0 * self.x[0] * dx - self.residual[0]])
+
+    begin = np.array([[0.98, 1.02, 1.0], [0.98**2, 1.02**2, 1.2]])
+    found, left = closest_zeros(At, At.newton, np.add, begin, 1e-13)
+    assert np.abs(found - 1.0).max() < 1e-7
+    assert left.max() <= 1e-13

@@ -5,7 +5,6 @@ import pytest
 from attack import conditions, differences, integer_mechanism, solved, without_numbers
 
 import mechgraph as mg
-from mechgraph.maths.newton import closest_zeros
 
 pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 """Weights move passive freedoms; ``test_passive_loads`` looks at what is said of it."""
@@ -121,23 +120,6 @@ def test_one_trial_step_proves_no_motion(seed: int, finite: int) -> None:
     """
     m = integer_mechanism(seed)
     assert [mg.check(m, engine=engine).finite_mobility for engine in ("dense", "sparse")] == [finite, finite]
-
-
-def test_a_narrow_bent_valley_leads_to_its_zero() -> None:
-    """``y = x^2, x / 10^6 = 1 / 10^6``: a whole step leaves the valley by the square of the way, a part of it gains as little."""
-
-    class At:
-        def __init__(self, x: np.ndarray) -> None:
-            self.x, self.residual = x, np.stack([x[1] - x[0] ** 2, 1e-6 * (x[0] - 1.0)])
-
-        def newton(self) -> np.ndarray:
-            dx = 1.0 - self.x[0]
-            return np.stack([dx, 2.0 * self.x[0] * dx - self.residual[0]])
-
-    begin = np.array([[0.98, 1.02, 1.0], [0.98**2, 1.02**2, 1.2]])
-    found, left = closest_zeros(At, At.newton, np.add, begin, 1e-13)
-    assert np.abs(found - 1.0).max() < 1e-7
-    assert left.max() <= 1e-13
 
 
 def test_a_trial_step_does_not_cross_to_another_branch() -> None:

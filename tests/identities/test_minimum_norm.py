@@ -158,7 +158,8 @@ def test_wheels_between_cranks_that_turn_alike_anyway_bear_on_the_flank_that_spa
 ):
     """Cranks of length h with wheels of radius 1/2 and an idler between them; the rod has F = (tau - M) / h, teeth 2 tau across the line
     of centers and 2 |tau| tan(alpha) along it: F^2 + (F + 2 |tau| tan(alpha))^2 + 12 tau^2 is least at M (p + q) / h / (p^2 + q^2 + 12),
-    p = 1 / h, q = p + 2 s tan(alpha), if that has the sign s; of long cranks on neither flank, so that teeth bear nothing. Also with more self-stresses than probes.
+    p = 1 / h, q = p + 2 s tan(alpha), if that has the sign s; of long cranks on neither flank, so that teeth bear nothing. Also where
+    there are more self-stresses than the sparse engine has at hand.
     """
     monkeypatch.setattr(importlib.import_module("mechgraph.kinematics.solver"), "PROBES", probes)
     ends = [
