@@ -283,20 +283,24 @@ class TaskEnds:
         """Put regular ends ``(nx, n)`` of some of all ``tracks`` to those that are known."""
         new = distinct(of.fingerprints(goal, there), of.fingerprints(goal, self.x))
         self.x = np.concatenate([self.x, there[:, new]], axis=1)
-        self.lost = max(tracks - self.x.shape[1] - self.singular.shape[1] - self.infinite, 0)
+        # what another run or way finds was wrongly told at infinity or singular
+        left = max(tracks - self.x.shape[1], 0)
+        self.singular = self.singular[:, :left]
+        self.infinite = min(self.infinite, left - self.singular.shape[1])
+        self.lost = left - self.singular.shape[1] - self.infinite
 
 
 def ends(
     of: TaskClass, start: TaskStart, goals: ClassMember, rng: np.random.Generator, progress: Progress
 ) -> list[TaskEnds]:
-    """Tracks of all solutions of a start set to tasks; of sets that are not large further runs make up for tracks that are lost, by way of
-    random tasks.
+    """Tracks of all solutions of a start set to tasks; further runs by way of random tasks make up for tracks that are lost, and one looks
+    again for those that seem singular or at infinity: a track that passes by infinity before its end is easily mistaken for one.
     """
     n, N = goals.drive.shape[-1], start.x.shape[1]
     of = by_motions(of) if start.each > 1 else of
     every, left = [TaskEnds(start.x[:, :0], start.x[:, :0], 0, N, 0) for _ in range(n)], np.arange(n)
     # runs of all tracks, at most
-    for run in range(4 if N < TRACKS_TOGETHER else 1):
+    for run in range(4 if N < TRACKS_TOGETHER else 2):
         if progress is not None:
             progress(f"{counted(N, 'track')} to {counted(len(left), 'task')}, run {run + 1}")
         care = Care() if run < 2 else Care().finer
@@ -315,7 +319,7 @@ def ends(
                 mine = which == j
                 leg = of.leg(begin, goals.taken(np.array([place])))
                 _account(leg, every[place], x, here.x[:, mine], here.arrived[mine], N, care)
-        left = left[[every[i].lost > 0 for i in left]]
+        left = left[[every[i].lost > 0 or (not run and every[i].x.shape[1] < N) for i in left]]
         if not left.size:
             break
     return every
@@ -378,17 +382,24 @@ def start_of(of: TaskClass, rng: np.random.Generator, cache: bool, progress: Pro
     return made
 
 
-def unfolded(of: TaskClass, start: TaskStart, goal: ClassMember, found: TaskEnds, rng: np.random.Generator) -> Array:
-    """Solutions ``(nx, n)`` of a task with exchanges of those that may be real: where they move in real directions."""
+def unfolded(
+    of: TaskClass, start: TaskStart, goal: ClassMember, found: TaskEnds, rng: np.random.Generator
+) -> tuple[Array, int]:
+    """Solutions ``(nx, n)`` of a task with exchanges of those that may be real, where they move in real directions; and of how many real
+    ones an exchange did not close.
+    """
     if start.each == 1:
-        return found.x
-    real = np.flatnonzero(np.abs(motions_of(of, goal, found.x).imag).max(axis=0, initial=0.0) < MODES.real_singular)
-    swapped = [found.x[: of.u, real][np.argsort(one.places)] for one in symmetries(of.whole)]
-    if not swapped or not len(real):
-        return found.x
-    near = np.tile(found.x[:, real], len(swapped))
-    x, closed = placed(of, goal, np.concatenate(swapped, axis=1), rng, near)
-    return np.concatenate([found.x, x[:, closed]], axis=1)
+        return found.x, 0
+    may = np.abs(motions_of(of, goal, found.x).imag).max(axis=0, initial=0.0) < MODES.real_singular
+    swapped = [found.x[: of.u, may][np.argsort(one.places)] for one in symmetries(of.whole)]
+    if not swapped or not may.any():
+        return found.x, 0
+    z = np.concatenate(swapped, axis=1)
+    x, closed = placed(of, goal, z, rng, np.tile(found.x[:, may], len(swapped)))
+    open_ = z[:, ~closed]
+    size = np.maximum(1.0, np.abs(open_).max(axis=0, initial=1.0))
+    missing = int((np.abs(open_.imag).max(axis=0, initial=0.0) < MODES.real_singular * size).sum())
+    return np.concatenate([found.x, x[:, closed]], axis=1), missing
 
 
 # --- real solutions ------------------------------------------------------------------------------------------------------

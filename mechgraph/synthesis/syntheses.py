@@ -158,15 +158,16 @@ class Synthesis:
     def _answer(self, start: TaskStart, apart: int, goal: ClassMember, found: TaskEnds, i: int) -> Syntheses:
         """The answer to the task numbered ``i``; ``apart``: how many solutions of the start set no symmetry makes of others."""
         p, of = self.problem, self.of.full
-        every = unfolded(self.of, start, goal, found, self.rng)
+        every, missing = unfolded(self.of, start, goal, found, self.rng)
         x, error, which = real_states(self.of, goal, every)
         # rounding of rows grows with lengths, of those of rods with their squares
         power = 1 if self.of.problem is p else 2
         fits = error <= CLOSED_TO * np.maximum(1.0, np.abs(x[: self.of.u]).max(axis=0, initial=0.0)) ** power
         told = [*start.evidence, self._tracks(start, found)]
         listed = 1 + len(self.symmetries)
-        partly = start.each > listed
-        told += [f"Of {start.each} mechanisms each that do the same {listed} are listed."] * partly
+        partly = start.each > listed or missing > 0
+        told += [f"Of {start.each} mechanisms each that do the same {listed} are listed."] * (start.each > listed)
+        told += [f"Of {missing} of these an exchange did not close, which is left out."] * (missing > 0)
         condition, motions = self._conditions(goal, x[:, fits]), motions_of(self.of, goal, x[:, fits].astype(complex))
         goal, x = self.of.lifted(goal, x[:, fits])
         x, error = self._upright(goal, x)
