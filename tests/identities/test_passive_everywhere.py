@@ -421,3 +421,19 @@ def test_full_row_rank_needs_no_motion() -> None:
     g = report.geometry
     assert g is not None
     assert finite_motion(g.system, g.x, g.freedoms.closure).mobility == 1
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse", "compiled"])
+def test_a_bush_on_an_inclined_pin_turns_back_as_the_crank_turns_whatever_the_number_of_turns(engine: str) -> None:
+    """At rest it does not spin about its pin, fixed in the crank at an angle b to its axis: the hinge turns by ``-cos(b) q``."""
+    b = np.deg2rad(50)
+    u, m = np.array([0.6 * np.sin(b), 0.8 * np.sin(b), np.cos(b)]), mg.load("rssr")
+    at = m.pair("B").point
+    hinge = mg.Pair("H", "R", "crank", "bush", point=tuple(at - 0.05 * u), axis=tuple(u))
+    ball = mg.Pair("B", "S", "bush", "coupler", point=at)
+    m = mg.Mechanism(
+        "bush", [*m.links, mg.Link("bush")], [m.pair("A"), hinge, ball, m.pair("C"), m.pair("D")], drives=["A"]
+    )
+    for q in (np.array([0.3, 9.0]), np.linspace(0, 200, 9), np.array([0.0, 48.8, -40.0])):
+        s = mg.kinematics(m, {"A": q}, engine=engine)
+        np.testing.assert_allclose(s["H"].position[:, 0], -np.cos(b) * q, atol=1e-8)
