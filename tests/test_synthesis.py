@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from ladder import LADDER, PUBLISHED, by_markers, dyad, four_bar, geared_five_bar, slider_crank, spatial, turned
+from scipy.optimize import brentq
 
 import mechgraph as mg
 
@@ -342,6 +343,60 @@ def test_where_no_solution_is_real_none_is_returned_and_all_are_counted() -> Non
     assert (len(s), s.total, s.poses.shape) == (0, 3, (0, 5, 4, 4, 4))
     assert len(s.complex) + s.infinite + sum(one.count for one in s.degenerate) == 3
     assert "0 mechanisms, of 3 solutions" in str(s)
+
+
+DEGENERATE = {
+    "parallel poses": ([[0, 0, 0], [1, 0, 0], [2, 1, 0], [1, 2, 0]], ["A.point.y", "B.point"], None),
+    "rows alike": ([[0, 0, 0], [1, 0.5, 0.4], [1, 0.5, 0.4]], ["B.point"], "Rows 1 and 2 ask the same."),
+    "a row like the first": ([[0, 0, 0], [0, 0, 0], [1, 0.5, 0.4]], ["B.point"], "Rows 0 and 1 ask the same."),
+}
+
+
+@pytest.mark.parametrize("name", DEGENERATE)
+def test_tracks_of_degenerate_tasks_end_at_infinity_or_among_solutions_without_end(name: str) -> None:
+    """Translations that lie on no circle have no crank; for two poses the pin of a crank may lie on a line."""
+    poses, unknown, told = DEGENERATE[name]
+    s = mg.synthesize(dyad(), mg.poses("body", poses), unknown)
+    assert (len(s), len(s.complex)) == (0, 0)
+    if told is None:
+        assert (s.infinite, s.degenerate) == (s.total, ())
+    else:
+        assert [(one.kind, one.count) for one in s.degenerate] == [("continuum", s.total)]
+        assert told in s.evidence
+
+
+def test_two_solutions_that_meet_are_told_as_double() -> None:
+    """Where two of the three center points of four poses on a line meet, the discriminant of their cubic is zero."""
+    poses = np.array([[0, 0, 0], [1.0, 0.4, 0.3], [1.6, 1.1, 0.9], [1.2, 2.0, 1.7]])
+
+    def cubic(x: float) -> Any:
+        def determinant(y: float) -> float:
+            A, turn = x + 1j * y, np.exp(-1j * poses[1:, 2])
+            d = poses[1:, :2] @ [1, 1j] - A
+            w = turn * d + A
+            return float(np.linalg.det(np.column_stack([2 * w.real, 2 * w.imag, abs(d) ** 2 - abs(A) ** 2])))
+
+        at = np.array([-2.0, -1.0, 1.0, 2.0])
+        return np.polyfit(at, [determinant(y) for y in at], 3)
+
+    def discriminant(x: float) -> float:
+        a, b, c, d = cubic(x)
+        return float(18 * a * b * c * d - 4 * b**3 * d + b**2 * c**2 - 4 * a * c**3 - 27 * a**2 * d**2)
+
+    x = brentq(discriminant, 1.1, 1.2, xtol=1e-15)
+    single = max(np.roots(cubic(x)).tolist(), key=lambda y: abs(y - 1.16))
+    m = dyad()
+    m = m.replace(pairs=[m.pair("A").replace(point=(x, 0)), m.pair("B")])
+    s = mg.synthesize(m, mg.poses("body", poses), ["A.point.y", "B.point"])
+    assert [(one.kind, one.count) for one in s.degenerate] == [("double", 2)]
+    assert s.field("A.point.y") == pytest.approx([single], abs=1e-9)
+
+
+def test_masses_and_loads_stay_with_a_warning() -> None:
+    m = dyad().replace(links=[mg.Link("frame"), mg.Link("crank", mass=2, center=(0.5, 0)), mg.Link("body")])
+    with pytest.warns(mg.MechgraphWarning, match="masses and mass centers of crank stay as declared"):
+        (one,) = mg.synthesize(m, mg.poses("body", [[0, 0, 0], [1, 0.5, 0.4], [2, 0.4, 1.1]]), ["B.point"])
+    assert one.link("crank") == m.link("crank")
 
 
 def test_a_link_that_begins_elsewhere_than_at_the_identity_comes_back_by_markers() -> None:

@@ -139,8 +139,8 @@ class TrackRun:
         return TrackRun(self.x[:, at], self.regular[at], self.singular[at], self.infinite[at])
 
 
-def run_tracks(leg: Followed, x: Array, care: Care) -> TrackRun:
-    """Tracks to the end of a leg, those too that do not close quadratically there."""
+def run_tracks(leg: Followed, x: Array, care: Care, radius: float = MODES.radius) -> TrackRun:
+    """Tracks to the end of a leg, those too that do not close quadratically there, which are led round it."""
     tracked = follow(leg, x, care)
     out = TrackRun(
         tracked.x, tracked.arrived.copy(), np.zeros(x.shape[1], dtype=bool), np.zeros(x.shape[1], dtype=bool)
@@ -148,25 +148,25 @@ def run_tracks(leg: Followed, x: Array, care: Care) -> TrackRun:
     # part of the way up to which a track must have come for its end to be looked for
     doubtful = np.flatnonzero(~tracked.arrived & (tracked.s > 0.7))
     if doubtful.size:
-        _endgame(leg, x[:, doubtful], doubtful, care, out)
+        _endgame(leg, x[:, doubtful], doubtful, care, radius, out)
     return out
 
 
-def _endgame(leg: Followed, x: Array, tracks: Index, care: Care, out: TrackRun) -> None:
+def _endgame(leg: Followed, x: Array, tracks: Index, care: Care, radius: float, out: TrackRun) -> None:
     """Tracks from their starts to a distance from the end, and round it until they are back."""
     eq = leg.equations
     near = follow(
         leg,
         x,
         care,
-        lambda s: (s * (1.0 - MODES.radius), np.full(s.shape, 1.0 - MODES.radius)),
+        lambda s: (s * (1.0 - radius), np.full(s.shape, 1.0 - radius)),
         tracks=tracks,
         polish=False,
     )
     kept = np.flatnonzero(near.arrived)
     tracks, x = tracks[kept], near.x[:, kept]
     begin, total = x.copy(), np.zeros_like(x)
-    first = leg.prints(begin, np.full(len(kept), 1.0 - MODES.radius), tracks)
+    first = leg.prints(begin, np.full(len(kept), 1.0 - radius), tracks)
     alive = np.arange(len(kept))
     # turns after which a track must be back
     for turn in range(1, 7):
@@ -174,12 +174,12 @@ def _endgame(leg: Followed, x: Array, tracks: Index, care: Care, out: TrackRun) 
             if not alive.size:
                 return
             total[:, alive] += x[:, alive]
-            tracked = follow(leg, x[:, alive], care, _arc(k), tracks=tracks[alive], polish=False)
+            tracked = follow(leg, x[:, alive], care, _arc(k, radius), tracks=tracks[alive], polish=False)
             x[:, alive] = tracked.x
             alive = alive[tracked.arrived]
         if not alive.size:
             return
-        now = leg.prints(x[:, alive], np.full(len(alive), 1.0 - MODES.radius), tracks[alive])
+        now = leg.prints(x[:, alive], np.full(len(alive), 1.0 - radius), tracks[alive])
         gap = np.abs(now - first[:, alive]).max(axis=0) / np.maximum(1.0, np.abs(now).max(axis=0))
         # difference up to which a track is back
         back = alive[gap < 1e-5]
@@ -197,11 +197,11 @@ def _endgame(leg: Followed, x: Array, tracks: Index, care: Care, out: TrackRun) 
     out.infinite[tracks[alive[eq.far(x[:, alive], 2.0)]]] = True
 
 
-def _arc(k: int) -> Callable[[Array], tuple[Array, Array]]:
+def _arc(k: int, radius: float) -> Callable[[Array], tuple[Array, Array]]:
     """The part ``k`` of the circle round the end."""
 
     def way(s: Array) -> tuple[Array, Array]:
-        turn = MODES.radius * np.exp(2j * np.pi * (k + s) / ARCS)
+        turn = radius * np.exp(2j * np.pi * (k + s) / ARCS)
         return 1.0 - turn, -2j * np.pi / ARCS * turn
 
     return way

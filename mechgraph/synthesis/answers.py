@@ -39,7 +39,7 @@ class ComplexSyntheses:
 class Degenerate:
     """Solutions of the equations that are no mechanisms of their own, and that ``total`` does not count."""
 
-    kind: Annotated[str, "double, open, coincident or reversed"]
+    kind: Annotated[str, "double, continuum, open, coincident or reversed"]
     count: int
     text: str
 
@@ -123,7 +123,7 @@ class Syntheses(Shown, Sequence[Mechanism]):
     copies : tuple
         For each mechanism the numbers of those that symmetries make of it, itself too.
     degenerate : tuple
-        Solutions that are no mechanisms of their own: ``kind``, ``count``, ``text``.
+        Solutions that are no mechanisms of their own: ``kind`` (double, continuum, open, coincident, reversed), ``count``, ``text``.
     infinite : int
         How many went to infinity here.
     completeness : {"proved", "tested", "searched"}

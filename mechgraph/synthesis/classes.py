@@ -11,7 +11,7 @@ A step of Newton's method eliminates row by row: with ``J_i dq_i + B_i dz = b_i`
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from copy import copy
 from functools import cached_property
 
@@ -658,11 +658,11 @@ class Arrow:
         """The matrix of the unknowns ``(T, u, u)``, all else eliminated."""
         return self._factored[1]
 
-    def solve(self, right: Array) -> Array:
-        """Increments ``(head + R F, T)`` for a right side ``(R, n, T)``; NaN where singular."""
+    def solve(self, right: Array, by: Callable[[Array, Array], Array] = solved) -> Array:
+        """Increments ``(head + R F, T)`` for a right side ``(R, n, T)``; NaN where singular, unless ``by`` knows more."""
         of, (parts, S) = self.of, self._factored
         T, b = self.rows.T, [self._mixed(block, right[:, :, None]) for block in of.blocks]
-        dz = solved(S, np.concatenate([_beneath(N @ own, T) for (N, _, _), own in zip(parts, b, strict=True)], axis=1))
+        dz = by(S, np.concatenate([_beneath(N @ own, T) for (N, _, _), own in zip(parts, b, strict=True)], axis=1))
         dq = np.zeros((of.R, of.F, T), dtype=complex)
         for block, (_, back, B), own in zip(of.blocks, parts, b, strict=True):
             dq[block.rows] = (back @ (own - B @ dz))[..., 0].swapaxes(1, 2)

@@ -38,7 +38,7 @@ from mechgraph.modes.start_sets import (
     tame,
     trace_test,
 )
-from mechgraph.modes.targets import run_tracks
+from mechgraph.modes.targets import FAR_APART, TrackRun, run_tracks
 from mechgraph.synthesis.classes import ClassMember, TaskClass, TaskLeg
 from mechgraph.synthesis.labelling import TaskLabelling, by_motions, motions_of, placed, symmetries
 from mechgraph.variants.numbers import MARKER
@@ -299,8 +299,8 @@ def ends(
     n, N = goals.drive.shape[-1], start.x.shape[1]
     of = by_motions(of) if start.each > 1 else of
     every, left = [TaskEnds(start.x[:, :0], start.x[:, :0], 0, N, 0) for _ in range(n)], np.arange(n)
-    # runs of all tracks, at most
-    for run in range(4 if N < TRACKS_TOGETHER else 2):
+    runs = 4 if N < TRACKS_TOGETHER else 2
+    for run in range(runs):
         if progress is not None:
             progress(f"{counted(N, 'track')} to {counted(len(left), 'task')}, run {run + 1}")
         care = Care() if run < 2 else Care().finer
@@ -316,22 +316,26 @@ def ends(
                 continue
             here = follow(of.leg(begin, goals.taken(some), which), np.tile(x, len(some)), care)
             for j, place in enumerate(some.tolist()):
-                mine = which == j
+                mine, trust = which == j, 2 if run == runs - 1 else min(run, 1)
                 leg = of.leg(begin, goals.taken(np.array([place])))
-                _account(leg, every[place], x, here.x[:, mine], here.arrived[mine], N, care)
+                _account(leg, every[place], x, here.x[:, mine], here.arrived[mine], N, care, trust)
         left = left[[every[i].lost > 0 or (not run and every[i].x.shape[1] < N) for i in left]]
         if not left.size:
             break
     return every
 
 
-def _account(leg: TaskLeg, known: TaskEnds, x: Array, there: Array, arrived: Mask, N: int, care: Care) -> None:
+def _account(
+    leg: TaskLeg, known: TaskEnds, x: Array, there: Array, arrived: Mask, N: int, care: Care, trust: int
+) -> None:
     """Put the ends ``there`` of a run of tracks from ``x`` to those that are known, and look for those that are missing.
 
     Tracks that failed, as they pass by infinity or where solutions meet, or of which two came to one end, are followed again, with finer
-    steps and then on ways bent through complex tasks: any solution to which these lead is one.
+    steps and then on ways bent through complex tasks: any solution to which these lead is one. ``trust``: see ``_tell``.
     """
     of, goal = leg.equations, leg.end
+    arrived = arrived.copy()
+    arrived[arrived] = _lead(of, goal, there[:, arrived])
     regular = np.flatnonzero(arrived)
     known.join(of, goal, there[:, regular], N)
     known.runs += 1
@@ -343,23 +347,91 @@ def _account(leg: TaskLeg, known: TaskEnds, x: Array, there: Array, arrived: Mas
     again = np.union1d(np.flatnonzero(~arrived), regular[np.any(met, axis=0)] if met else regular[:0])
     # how far ways are bent, at most .25 of that in the middle: the least that goes round what is near changes the fewest ends
     for bend in (0.0, 0.01, -0.01, 0.03, -0.03, 0.003, -0.003):
-        if not known.lost:
+        if not known.lost or not again.size:
             return
         tracked = follow(leg, x[:, again], care if bend else care.finer, partial(_bent, bend), again)
-        known.join(of, goal, tracked.x[:, tracked.arrived], N)
-    if not known.lost or arrived.all():
-        return
-    run = run_tracks(leg, x[:, ~arrived], care)
-    singular, infinite = run.x[:, run.singular], int(run.infinite.sum())
-    # the run counts in which most is known
-    if known.runs == 1 or singular.shape[1] + infinite > known.singular.shape[1] + known.infinite:
-        known.singular, known.infinite = singular, infinite
-    known.join(of, goal, run.x[:, run.regular], N)
+        found = tracked.x[:, tracked.arrived]
+        known.join(of, goal, found[:, _lead(of, goal, found)], N)
+    if known.lost and not arrived.all():
+        # further runs go round ends so near that other branch points stay outside
+        _tell(of, goal, known, run_tracks(leg, x[:, ~arrived], care, MODES.radius / 10 ** (known.runs - 1)), N, trust)
 
 
 def _bent(bend: float, s: Array) -> tuple[Array, Array]:
     """A way through complex ``t``, see ``modes.homotopy.Way``."""
     return s + 1j * bend * s * (1.0 - s), 1.0 + 1j * bend * (1.0 - 2.0 * s)
+
+
+def _tell(of: TaskClass, goal: ClassMember, known: TaskEnds, run: TrackRun, N: int, trust: int) -> None:
+    """Put the ends of tracks led round them to those that are known.
+
+    A track that is bounded near its end has a solution there. What closes nowhere, or far away, was led round more than its end, or is on
+    its way to infinity: that is said of the former from ``trust`` 1 on, of the latter from 2 on.
+    """
+    x = np.concatenate([run.x[:, run.regular], run.x[:, run.singular]], axis=1)
+    leads, meet = (np.arange(x.shape[1]) < run.regular.sum()) & _lead(of, goal, x), np.zeros(x.shape[1], dtype=bool)
+    there, closed = _nearest(of, goal, x[:, ~leads])
+    meet[~leads] = closed & (_apart(of, there, x[:, ~leads]) <= FAR_APART)
+    gone = int((~closed).sum()) * (trust > 0) + int((closed & ~meet[~leads]).sum()) * (trust > 1)
+    x[:, ~leads] = there
+    # of each the run counts in which there are most
+    if meet.sum() > known.singular.shape[1]:
+        known.singular = x[:, meet]
+    known.infinite = max(int(run.infinite.sum()) + gone, known.infinite)
+    known.join(of, goal, x[:, leads], N)
+
+
+def _lead(of: TaskClass, goal: ClassMember, x: Array) -> Mask:
+    """States at which the matrix of the unknowns is not singular but for rounding."""
+    if not x.shape[1]:
+        return np.zeros(0, dtype=bool)
+    sigma = np.linalg.svd(_matrix(of, goal, x), compute_uv=False)
+    return np.asarray(sigma[:, -1] > 1e-14 * sigma[:, 0])
+
+
+def _matrix(of: TaskClass, goal: ClassMember, x: Array) -> Array:
+    """The matrices ``(n, u, u)`` of the unknowns at states; zero where it has no finite number."""
+    return _finite(of.leg(goal, goal).at(x, np.ones(x.shape[1]), np.arange(x.shape[1])).matrix)
+
+
+def _finite(A: Array) -> Array:
+    return np.nan_to_num(A, nan=0.0, posinf=0.0, neginf=0.0)
+
+
+def _least(A: Array, b: Array) -> Array:
+    return np.linalg.pinv(_finite(A), MODES.generic) @ _finite(b)
+
+
+def _nearest(of: TaskClass, goal: ClassMember, x: Array) -> tuple[Array, Mask]:
+    """Solutions near states ``(nx, n)``, singular ones too, by steps with least unknowns; which closed."""
+    if not x.shape[1]:
+        return x, np.zeros(0, dtype=bool)
+    here = of.leg(goal, goal).at(x, np.ones(x.shape[1]), np.arange(x.shape[1]))
+    with np.errstate(all="ignore"):
+        # steps by which a double root, to which each goes half of the way, is near to the root of rounding
+        for _ in range(30):
+            step = np.nan_to_num(here.solve(-here.rows.residual, _least))
+            here = here.again(of.advance(here.x, step * np.minimum(1.0, 0.5 / np.maximum(of.size(here.x, step), 0.5))))
+        return here.x, of.error(here.rows) < MODES.member_closed * np.maximum(1.0, np.abs(here.x[: of.u]).max(axis=0))
+
+
+def _apart(of: TaskClass, x: Array, other: Array) -> Array:
+    """How far apart unknowns are, against their size."""
+    return np.asarray((np.abs(x - other)[: of.u] / (1.0 + np.abs(x[: of.u]))).max(axis=0, initial=0.0))
+
+
+def endless(of: TaskClass, goal: ClassMember, x: Array) -> Mask:
+    """Which singular solutions ``x (nx, n)`` others lie beside that are as singular: steps aside do not lead back."""
+    if not x.shape[1]:
+        return np.zeros(0, dtype=bool)
+    aside = x.copy()
+    V = np.linalg.svd(_matrix(of, goal, x))[2]
+    # a step that is large against the root of rounding, and small against the size of the whole
+    aside[: of.u] += 1e-2 * V[:, -1].conj().T * (1.0 + np.abs(x[: of.u]))
+    there, closed = _nearest(of, goal, aside)
+    sigma = np.linalg.svd(_matrix(of, goal, there), compute_uv=False)
+    # a double root is come to but for 2^-30 of the step
+    return closed & (sigma[:, -1] < MODES.generic * sigma[:, 0]) & (_apart(of, there, x) > 1e-3)
 
 
 def start_of(of: TaskClass, rng: np.random.Generator, cache: bool, progress: Progress) -> TaskStart:

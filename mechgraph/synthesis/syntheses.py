@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextvars import copy_context
@@ -11,7 +12,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from mechgraph.errors import DeclarationError, counted
+from mechgraph.errors import DeclarationError, MechgraphWarning, counted
 from mechgraph.graph.chains import Chain
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Array
@@ -33,7 +34,17 @@ from mechgraph.synthesis.classes import ClassMember, NoClass, TaskClass
 from mechgraph.synthesis.fitness import Fitness, Measure, fitness, limits_of
 from mechgraph.synthesis.fits import Fit, FitPoint, Fitted, fitted
 from mechgraph.synthesis.labelling import cognates, motions_of, orbits, symmetries
-from mechgraph.synthesis.solve import Progress, TaskEnds, TaskStart, ends, kept, real_states, start_of, unfolded
+from mechgraph.synthesis.solve import (
+    Progress,
+    TaskEnds,
+    TaskStart,
+    endless,
+    ends,
+    kept,
+    real_states,
+    start_of,
+    unfolded,
+)
 from mechgraph.synthesis.structures import WHERE, structures
 from mechgraph.synthesis.system import RowNumbers, RowProblem
 from mechgraph.synthesis.tasks import FunctionTask, function, path, poses, positions
@@ -164,11 +175,17 @@ class Synthesis:
         power = 1 if self.of.problem is p else 2
         fits = error <= CLOSED_TO * np.maximum(1.0, np.abs(x[: self.of.u]).max(axis=0, initial=0.0)) ** power
         told = [*start.evidence, self._tracks(start, found)]
+        asked = np.concatenate([p.asked, *p.rates], axis=1)
+        alike = [
+            (i, j) for j in range(len(asked)) for i in range(j) if np.array_equal(asked[i], asked[j], equal_nan=True)
+        ]
+        told += [f"Rows {i} and {j} ask the same." for i, j in alike]
         listed = 1 + len(self.symmetries)
         partly = start.each > listed or missing > 0
         told += [f"Of {start.each} mechanisms each that do the same {listed} are listed."] * (start.each > listed)
         told += [f"Of {missing} of these an exchange did not close, which is left out."] * (missing > 0)
         condition, motions = self._conditions(goal, x[:, fits]), motions_of(self.of, goal, x[:, fits].astype(complex))
+        free = endless(self.of, goal, found.singular)
         goal, x = self.of.lifted(goal, x[:, fits])
         x, error = self._upright(goal, x)
         against, merged = error > CLOSED_TO, self._merged(goal, x)
@@ -184,10 +201,10 @@ class Synthesis:
         made = [self._mechanism(goal, x[:, k], values[k], i) for k in range(len(values))]
         shape = (p.tasks.rows if p.tasks else 0, len(p.m.links), 4, 4)
         degenerate = [
-            Degenerate(
-                "double",
-                found.singular.shape[1],
-                f"{counted(found.singular.shape[1], 'track')} ended where solutions meet.",
+            Degenerate(kind, n, f"{counted(n, 'track')} ended {where}.")
+            for kind, n, where in (
+                ("double", int((~free).sum()), "where solutions meet"),
+                ("continuum", int(free.sum()), "among solutions without end: conditions depend on each other here"),
             )
         ]
         degenerate += [
@@ -468,7 +485,6 @@ def synthesize(
         Keep start solutions in the user's folder.
     progress : callable, optional
         Called with a line of text now and then. Default: a terminal or notebook shows those of the first task of a kind.
-
     executor : concurrent.futures.Executor, optional
         Who follows the tracks of exact syntheses, in parts: one of processes, or of a cluster as Dask's. Results are the same on any.
 
@@ -531,6 +547,11 @@ def synthesize(
     faults += [wrong(ends, f"bounds[{name!r}]", "(least, greatest), None for no end") for name, ends in odd.items()]
     if faults:
         raise DeclarationError(where, faults)
+    changed = {end for p in m.pairs if any(name.split(".")[0] == p.name for name in unknown) for end in (p.a, p.b)}
+    heavy = [link.name for link in m.links if link.name in changed and link.mass]
+    if heavy or m.loads:
+        of = " and ".join([f"masses and mass centers of {', '.join(heavy)}"] * bool(heavy) + ["loads"] * bool(m.loads))
+        warnings.warn(f"{where}: {of} stay as declared, whatever the dimensions", MechgraphWarning, stacklevel=3)
     if fitting:
         return _fitted(
             m, tasks, unknown, fit, within, limits, goals, require, over, int(starts), int(seed), cache, progress
