@@ -444,6 +444,16 @@ def test_a_real_solution_of_large_dimensions_is_none_of_the_complex_ones() -> No
 
 
 @pytest.mark.slow
+def test_the_straight_line_of_morgan_and_wampler_has_33_four_bars_of_which_15_are_real() -> None:
+    """Problem 7 of J. Mech. Des. 112, 1990, five points on a line, as solved in the manual of PHCpack ("the design of a 4-bar mechanism")."""
+    points = [[0.50, 1.06], [-0.83, -0.27], [-0.34, 0.22], [-0.13, 0.43], [0.22, 0.78]]
+    m = four_bar(A=(0, 0), D=(1, 0), tip=(0.50, 1.06))
+    s = mg.synthesize(m, mg.path("coupler.tip", points), ["B.point", "C.point"])
+    assert (len(s), len(s.complex), s.infinite, s.total) == (15, 18, 3, 36)
+    assert (s.residual < 1e-12).all()
+
+
+@pytest.mark.slow
 def test_four_bars_through_nine_points_are_1442_times_six_over_the_complex_numbers() -> None:
     """The points of a four-bar of our own: one of those found leads its point along the same curve; all pass through the nine points."""
     own = four_bar(B=(0.2, 0.8), C=(2.1, 1.7), D=(2.3, 0.1))
