@@ -445,7 +445,7 @@ def test_a_real_solution_of_large_dimensions_is_none_of_the_complex_ones() -> No
 
 @pytest.mark.slow
 def test_the_straight_line_of_morgan_and_wampler_has_33_four_bars_of_which_15_are_real() -> None:
-    """Problem 7 of J. Mech. Des. 112, 1990, five points on a line, as solved in the manual of PHCpack ("the design of a 4-bar mechanism")."""
+    """Problem 7 of J. Mech. Des. 112, 1990, as the manual of PHCpack solves it ("the design of a 4-bar mechanism")."""
     points = [[0.50, 1.06], [-0.83, -0.27], [-0.34, 0.22], [-0.13, 0.43], [0.22, 0.78]]
     m = four_bar(A=(0, 0), D=(1, 0), tip=(0.50, 1.06))
     s = mg.synthesize(m, mg.path("coupler.tip", points), ["B.point", "C.point"])
