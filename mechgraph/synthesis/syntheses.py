@@ -176,10 +176,12 @@ class Synthesis:
         fits = error <= CLOSED_TO * np.maximum(1.0, np.abs(x[: self.of.u]).max(axis=0, initial=0.0)) ** power
         told = [*start.evidence, self._tracks(start, found)]
         asked = np.concatenate([p.asked, *p.rates], axis=1)
-        alike = [
-            (i, j) for j in range(len(asked)) for i in range(j) if np.array_equal(asked[i], asked[j], equal_nan=True)
+        told += [
+            f"Rows {i} and {j} ask the same."
+            for j in range(len(asked))
+            for i in range(j)
+            if np.array_equal(asked[i], asked[j], equal_nan=True)
         ]
-        told += [f"Rows {i} and {j} ask the same." for i, j in alike]
         listed = 1 + len(self.symmetries)
         partly = start.each > listed or missing > 0
         told += [f"Of {start.each} mechanisms each that do the same {listed} are listed."] * (start.each > listed)
