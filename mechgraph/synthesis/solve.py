@@ -330,8 +330,8 @@ def _account(
 ) -> None:
     """Put the ends ``there`` of a run of tracks from ``x`` to those that are known, and look for those that are missing.
 
-    Tracks that failed, as they pass by infinity or where solutions meet, or of which two came to one end, are followed again, with finer
-    steps and then on ways bent through complex tasks: any solution to which these lead is one. ``trust``: see ``_tell``.
+    The few tracks that failed, as they pass by infinity or where solutions meet, or of which two came to one end, are followed again, with
+    finer steps and then on ways bent through complex tasks: any solution to which these lead is one. ``trust``: see ``_tell``.
     """
     of, goal = leg.equations, leg.end
     arrived = arrived.copy()
@@ -346,7 +346,8 @@ def _account(
     ]
     again = np.union1d(np.flatnonzero(~arrived), regular[np.any(met, axis=0)] if met else regular[:0])
     # how far ways are bent, at most .25 of that in the middle: the least that goes round what is near changes the fewest ends
-    for bend in (0.0, 0.01, -0.01, 0.03, -0.03, 0.003, -0.003):
+    bends = 0.0, 0.01, -0.01, 0.03, -0.03, 0.003, -0.003
+    for bend in bends if len(bends) * again.size <= N else ():  # where that costs less than another run of all tracks
         if not known.lost or not again.size:
             return
         tracked = follow(leg, x[:, again], care if bend else care.finer, partial(_bent, bend), again)
