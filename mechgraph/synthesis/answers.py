@@ -127,7 +127,7 @@ class Syntheses(Shown, Sequence[Mechanism]):
     infinite : int
         How many went to infinity here.
     completeness : {"proved", "tested", "searched"}
-        As many as are published for such tasks; a trace test passed, and no track was lost; or neither.
+        As many as are published for such tasks, and all tracks arrived; a trace test passed, and none was lost; or neither.
     evidence : tuple of str
         The reasons, with numbers.
     condition : (n,) array

@@ -231,7 +231,8 @@ class Synthesis:
             start.total,
             tuple(one for one in degenerate if one.count),
             found.infinite,
-            "searched" if found.lost or partly else start.word,
+            # of what goes to infinity, or where solutions meet, there is no certificate
+            "searched" if found.lost or partly else "tested" if found.infinite or found.singular.size else start.word,
             tuple(told),
             condition,
             Fitnesses([cache(partial(self._fitness, m, q)) for m, q, _ in made]),
