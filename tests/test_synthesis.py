@@ -477,3 +477,16 @@ def test_four_bars_through_nine_points_are_1442_times_six_over_the_complex_numbe
         meet = A + crank * np.imag((D - A) * rocker.conj()) / np.imag(crank * rocker.conj())
         same.append(np.abs(np.real((points - meet) * along.conj())).max() < 1e-6 * size * np.abs(along).max())
     assert sum(same) in (2, 4, 6)
+
+
+def test_other_positions_of_a_given_dyad_are_no_solutions() -> None:
+    """The crank of a four-bar for three poses of its own coupler: its pivot alone is as far from the pin in all of them; the rocker, given,
+    stands on its other side in no solution.
+    """
+    m = four_bar()
+    P = mg.kinematics(m, {"A": np.array([0.0, 0.6, 1.2])}).link("coupler").pose
+    q = np.stack([P[:, 0, 3], P[:, 1, 3], np.arctan2(P[:, 1, 0], P[:, 0, 0])], axis=1)
+    s = mg.synthesize(m, mg.poses("coupler", q), ["A.point"], cache=False)
+    assert (s.total, len(s), len(s.complex), s.degenerate) == (1, 1, 0, ())
+    np.testing.assert_allclose(s.values[0], m.pair("A").point[:2], atol=1e-9)
+    assert "3 more fail some of what is asked" in " ".join(s.evidence)

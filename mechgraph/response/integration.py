@@ -160,7 +160,7 @@ def first_root(height: Callable[[Array], Array], begin: float, end: float) -> fl
         if not i:
             return begin
         begin, end = float(t[i - 1]), float(t[i])
-    return begin + (end - begin) * float(h[i - 1] / (h[i - 1] - h[i]))
+    return end if np.isnan(h[i - 1]) else begin + (end - begin) * float(h[i - 1] / (h[i - 1] - h[i]))
 
 
 def first_below(height: Callable[[Array], Array], t: Array, h: Array, slack: float) -> float | None:

@@ -51,7 +51,7 @@ class TaskStart:
     """All solutions ``x (nx, N)`` known of a task of a class, and what that they are all rests on (see ``modes.start_sets.StartSet``).
 
     ``source``: who published that there are so many, for sets that came with the package. Of a large set ``x`` has one of
-    ``each`` solutions that do the same.
+    ``each`` solutions that do the same. ``against``: how many fail some of what is asked, see ``doing_all``.
     """
 
     member: ClassMember
@@ -63,11 +63,12 @@ class TaskStart:
     trace: Trace
     source: str = ""
     each: int = 1
+    against: int = 0
 
     @property
     def total(self) -> int:
         """How many solutions there are."""
-        return self.x.shape[1] * self.each
+        return (self.x.shape[1] - self.against) * self.each
 
     @property
     def word(self) -> str:
@@ -84,10 +85,11 @@ class TaskStart:
     @property
     def evidence(self) -> tuple[str, ...]:
         """What that rests on."""
+        against = f"{self.against} more fail some of what is asked, and are left out; " if self.against else ""
         loops = (
-            f"A random complex task of the class has {counted(self.total, 'solution')}{self._each}: {counted(self.loops, 'loop')} of such "
-            f"tasks brought no further one (chance of one missed {self.chance:.1g} where all permutations are as likely), {self.lost} of "
-            f"{self.followed} tracks lost."
+            f"A random complex task of the class has {counted(self.total, 'solution')}{self._each}: {against}"
+            f"{counted(self.loops, 'loop')} of such tasks brought no further one (chance of one missed {self.chance:.1g} where all "
+            f"permutations are as likely), {self.lost} of {self.followed} tracks lost."
         )
         if self.source:
             return (f"As many as such tasks have in general: {self.total}{self._each}, {self.source}.",)
@@ -476,6 +478,17 @@ def unfolded(
 
 
 # --- real solutions ------------------------------------------------------------------------------------------------------
+
+
+def doing_all(of: TaskClass, member: ClassMember, x: Array) -> Mask:
+    """Which solutions ``x (nx, n)`` do all that is asked.
+
+    Of conditions that depend on each other in general not all are solved for: where links are given they may be met in other positions of
+    these, among which tracks may change.
+    """
+    member, whole = of.lifted(member, x.astype(complex))
+    size = np.maximum(1.0, np.abs(x[: of.u]).max(axis=0, initial=0.0))
+    return np.asarray(of.full.error(of.full.at(member, whole)) < 1e3 * MODES.member_closed * size)
 
 
 def real_states(of: TaskClass, goal: ClassMember, x: Array) -> tuple[Array, Array, Array]:

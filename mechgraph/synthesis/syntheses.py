@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextvars import copy_context
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import cache, partial
 from typing import Any, get_args
 
@@ -38,6 +38,7 @@ from mechgraph.synthesis.solve import (
     Progress,
     TaskEnds,
     TaskStart,
+    doing_all,
     endless,
     ends,
     kept,
@@ -152,6 +153,7 @@ class Synthesis:
         """For every value swept."""
         p = self.problem
         start = start_of(self.of, self.rng, self.cache, self.progress)
+        start = replace(start, against=int((~doing_all(self.of, start.member, start.x)).sum()))
         n, own = self.swept.shape[1], self.of.problem
         numbers = own.numbers.taken(np.zeros(n, dtype=np.intp))
         if self.sweep.names:
@@ -170,6 +172,7 @@ class Synthesis:
         """The answer to the task numbered ``i``; ``apart``: how many solutions of the start set no symmetry makes of others."""
         p, of = self.problem, self.of.full
         every, missing = unfolded(self.of, start, goal, found, self.rng)
+        every = every[:, doing_all(self.of, goal, every)] if start.against else every
         x, error, which = real_states(self.of, goal, every)
         # rounding of rows grows with lengths, of those of rods with their squares
         power = 1 if self.of.problem is p else 2
