@@ -81,3 +81,20 @@ def test_points_that_are_meant_to_coincide_are_no_mixed_lengths():
 
 def test_an_equilibrium_of_links_without_mass():
     assert mg.equilibrium(loaded(guided(3.0))).start["A.Rz"] == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("engine", ["dense", "sparse"])
+@pytest.mark.parametrize("length", [6e8, 1e9])
+def test_what_one_engine_would_call_singular_both_refuse(length: float, engine: str) -> None:
+    """A crank of 1 and a frame of 1.5 between bars so long: 'out of reach' and 'beyond a dead point' were said, both false."""
+    C = (1.25, np.sqrt(length**2 - 0.25**2))
+    at = {
+        "A": ("frame", "crank", (0, 0)),
+        "B": ("crank", "rod", (1, 0)),
+        "C": ("rod", "bar", C),
+        "D": ("frame", "bar", (1.5, 0)),
+    }
+    pairs = [mg.Pair(name, "R", a, b, point=point) for name, (a, b, point) in at.items()]
+    m = mg.Mechanism("long", pairs=pairs, drives=["A"], planar=True)
+    with pytest.raises(mg.DeclarationError, match="lengths are too far apart: A and B are 1 apart"):
+        mg.solve(m, {"A": 0.3}, engine=engine)

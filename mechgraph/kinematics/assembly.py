@@ -70,8 +70,10 @@ def _fault(here: Configuration) -> str:
     near = np.flatnonzero((part < too_near) & (part > no_distance))
     if not near.size:
         return ""
-    # above this part of the distance the largest singular value that counted as zero comes of it: directions make it smaller
-    lost = near[closure_rank(here).dropped > np.maximum(0.01 * part[near], no_distance)]
+    rank = closure_rank(here)
+    told = rank.margin if rank.margin < too_near else rank.dropped  # the least that counted, where engines may differ on it
+    # above this part of the distance a singular value that counted as zero, or nearly so, comes of it: directions make it smaller
+    lost = near[told > np.maximum(0.01 * part[near], no_distance)]
     if not lost.size:
         return ""
     i, names = int(lost[np.argmin(part[lost])]), [p.name for p in s.m.pairs]
