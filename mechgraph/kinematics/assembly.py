@@ -71,8 +71,9 @@ def _fault(here: Configuration) -> str:
     if not near.size:
         return ""
     rank = closure_rank(here)
-    told = rank.margin if rank.margin < too_near else rank.dropped  # the least that counted, where engines may differ on it
-    # above this part of the distance a singular value that counted as zero, or nearly so, comes of it: directions make it smaller
+    # the least singular value that counted where engines may differ on it, else the largest that did not; above this part of the
+    # distance it comes of it: directions make it smaller
+    told = rank.margin if rank.margin < too_near else rank.dropped
     lost = near[told > np.maximum(0.01 * part[near], no_distance)]
     if not lost.size:
         return ""

@@ -487,7 +487,8 @@ def doing_all(of: TaskClass, member: ClassMember, x: Array) -> Mask:
     these, among which tracks may change.
     """
     member, whole = of.lifted(member, x.astype(complex))
-    size = np.maximum(1.0, np.abs(x[: of.u]).max(axis=0, initial=0.0))
+    # places of links on long rods lose digits by the square of the length
+    size = np.maximum(1.0, np.abs(x[: of.u]).max(axis=0, initial=0.0)) ** (1 if of.problem is of.whole else 2)
     return np.asarray(of.full.error(of.full.at(member, whole)) < 1e3 * MODES.member_closed * size)
 
 
