@@ -487,9 +487,9 @@ def doing_all(of: TaskClass, member: ClassMember, x: Array) -> Mask:
     these, among which tracks may change.
     """
     member, whole = of.lifted(member, x.astype(complex))
-    # places of links on long rods lose digits by the square of the length
+    # places of links on rods lose digits, of long ones by the square of the length; another position misses by a length or an angle
     size = np.maximum(1.0, np.abs(x[: of.u]).max(axis=0, initial=0.0)) ** (1 if of.problem is of.whole else 2)
-    return np.asarray(of.full.error(of.full.at(member, whole)) < 1e3 * MODES.member_closed * size)
+    return np.asarray(of.full.error(of.full.at(member, whole)) < 1e6 * MODES.member_closed * size)
 
 
 def real_states(of: TaskClass, goal: ClassMember, x: Array) -> tuple[Array, Array, Array]:
