@@ -1849,8 +1849,8 @@ static void coordinates(const Model *m, Work *w, const double *x, double *out) {
       w->begun[f] = 1.0;
     }
     if (w->begun[f] == 0.0) continue;
-    const double one_way = dot(v, axis, 3), turn = 8.0 * atan(1.0);
-    *angle = one_way + turn * floor((*angle - one_way) / turn + 0.5);
+    const double about = dot(v, axis, 3), turn = 8.0 * atan(1.0);
+    *angle = about + turn * floor((*angle - about) / turn + 0.5);
     if (clear || fabs(*angle) > 1.0) FOR(i, 3) out[c + i] = *angle * axis[i];
   }
 }

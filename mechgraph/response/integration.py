@@ -152,15 +152,11 @@ def with_turns(height: Callable[[Array], Array], t: Array, h: Array) -> tuple[Ar
 
 def first_root(height: Callable[[Array], Array], begin: float, end: float) -> float:
     """The time between two at which a height of opposite signs there is zero."""
-    # part of a step to which the time of an event is found, also where a height jumps; many times at once cost about as much as one
-    for _ in range(8):
-        t = np.linspace(begin, end, 33)
-        h = height(t)
-        i = int(np.argmax(np.sign(h) == np.sign(h[-1])))
-        if not i:
-            return begin
-        begin, end = float(t[i - 1]), float(t[i])
-    return end if np.isnan(h[i - 1]) else begin + (end - begin) * float(h[i - 1] / (h[i - 1] - h[i]))
+    # part of a step to which the time of an event is found
+    root = scipy.optimize.brentq(
+        lambda t: float(height(np.array([t]))[0]), begin, end, xtol=1e-12 * (end - begin), rtol=1e-15
+    )
+    return float(root)
 
 
 def first_below(height: Callable[[Array], Array], t: Array, h: Array, slack: float) -> float | None:

@@ -295,12 +295,13 @@ def placed(of: TaskClass, member: ClassMember, z: Array, rng: np.random.Generato
     numbers = p.numbers.with_values(p.places, z)
     X, open_ = np.zeros((of.R, of.nx, n), dtype=complex), np.ones((of.R, n), dtype=bool)
     # positions, and Gauss-Newton steps from them
-    for trial_of in range(16):
-        some = rng.normal(size=(s.n_freedoms, of.R * n, 2)) @ [1.0, 0.5j]
-        states = s.advance(np.repeat(p.at_rest[:, None].astype(complex), of.R * n, axis=1), some)
-        trial = np.zeros_like(X)
-        trial[:, : of.states] = np.moveaxis(states.reshape(of.states, of.R, n), 0, 1)
-        trial = trial if trial_of else near[of.head :].reshape(X.shape)
+    for attempt in range(16):
+        trial = near[of.head :].reshape(X.shape)
+        if attempt:
+            some = rng.normal(size=(s.n_freedoms, of.R * n, 2)) @ [1.0, 0.5j]
+            states = s.advance(np.repeat(p.at_rest[:, None].astype(complex), of.R * n, axis=1), some)
+            trial = np.zeros_like(X)
+            trial[:, : of.states] = np.moveaxis(states.reshape(of.states, of.R, n), 0, 1)
         x = np.concatenate([z, numbers.norms.reshape(-1, n)[: of.W], np.where(open_[:, None], trial, X).reshape(-1, n)])
         for _ in range(12):
             rows = of.at(member, x)

@@ -8,6 +8,7 @@ from concurrent.futures import Executor
 from contextvars import copy_context
 from dataclasses import fields, replace
 from functools import cache, partial
+from itertools import combinations
 from typing import Any, get_args
 
 import numpy as np
@@ -180,15 +181,14 @@ class Synthesis:
         told = [*start.evidence, self._tracks(start, found)]
         asked = np.concatenate([p.asked, *p.rates], axis=1)
         told += [
-            f"Rows {i} and {j} ask the same."
-            for j in range(len(asked))
-            for i in range(j)
-            if np.array_equal(asked[i], asked[j], equal_nan=True)
+            f"Rows {one} and {other} ask the same."
+            for one, other in combinations(range(len(asked)), 2)
+            if np.array_equal(asked[one], asked[other], equal_nan=True)
         ]
         listed = 1 + len(self.symmetries)
         partly = start.each > listed or missing > 0
         told += [f"Of {start.each} mechanisms each that do the same {listed} are listed."] * (start.each > listed)
-        told += [f"Of {missing} of these an exchange did not close, which is left out."] * (missing > 0)
+        told += [f"{counted(missing, 'exchange')} of these did not close: left out."] * (missing > 0)
         condition, motions = self._conditions(goal, x[:, fits]), motions_of(self.of, goal, x[:, fits].astype(complex))
         free = endless(self.of, goal, found.singular)
         goal, x = self.of.lifted(goal, x[:, fits])
