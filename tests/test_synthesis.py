@@ -130,6 +130,29 @@ def test_faults_of_tasks_and_unknowns_are_told_together() -> None:
         mg.synthesize(heavy, mg.function("A", "D", [[0, 0], [1, 1]]), ["coupler.mass"])
 
 
+def test_what_is_not_finite_is_told_with_its_place() -> None:
+    X = turned(3, 1.0)
+    X[1, 0, 3] = np.inf
+    balls = spatial("S-S", ("S", (0, 0, 0), None), ("S", (1, 0.3, 0.1), None))
+    rows = [{}, {"coupler": (1, np.inf, 0)}, {"coupler.tip": "no"}, {"A": np.inf}]
+    pairs = mg.function("A", "D", [[0, 0], [0.3, 0.2]])
+    asked: list[tuple[mg.Mechanism, Any, dict[str, Any], list[str]]] = [
+        (four_bar(), mg.path("coupler.tip", [[1.5, 1.2], [np.inf, 1]]), {}, ["inf at row 1, column 0"]),
+        (four_bar(), mg.path("coupler.tip", [[1.5, 1.2], [1, 1]], at={"A": [0, -np.inf]}), {}, ["-inf at row 1"]),
+        (balls, mg.poses("body", X), {}, ["inf at row 1, entry (0, 3)"]),
+        (four_bar(), mg.positions(rows), {}, ["row 1: poses of 'coupler': inf at column 1", "got ['no']", "row 3: at['A']: inf;"]),
+        (four_bar(), pairs, {"sweep": {"B.point.y": [1, np.nan]}}, ["one list of finite values each"]),
+        (four_bar(), pairs, {"bounds": {"B.point.x": (2, 1)}}, ["bounds['B.point.x'] = (2, 1): expected (least, greatest)"]),
+        (four_bar(), pairs, {"conditions": {"size": (np.nan, 1)}}, ["conditions['size'] = (nan, 1)"]),
+    ]  # fmt: skip
+    for m, task, options, told in asked:
+        with pytest.raises(mg.DeclarationError) as caught:
+            mg.synthesize(m, task, ["P.point" if m is balls else "B.point.x"], **options)
+        assert len(caught.value.faults) == len(told)
+        for fault, words in zip(caught.value.faults, told, strict=True):
+            assert words in fault
+
+
 def test_what_is_not_served_is_refused_by_name() -> None:
     pairs = [[0, 0], [0.3, 0.2], [0.6, 0.5]]
     with pytest.raises(mg.DeclarationError, match=r"output D.Rz turns; of angles times an unknown factor"):
@@ -365,6 +388,15 @@ def test_tracks_of_degenerate_tasks_end_at_infinity_or_among_solutions_without_e
         assert told in s.evidence
 
 
+def test_known_numbers_that_lead_out_of_the_kind_of_the_declared_mechanism_leave_conditions_open() -> None:
+    """Only axes that meet in the center of its turns lead a body so: none of the others does, over the complex numbers either."""
+    m, task, unknown, total = LADDER["spherical R-R, 5 orientations"]()
+    met, beside = mg.synthesize(m, task, unknown, sweep={"P.point.x": [0, 0.3]})
+    assert (len(met) + len(met.complex), met.degenerate) == (total, ())
+    assert (len(beside), len(beside.complex)) == (0, 0)
+    assert [(one.kind, one.count) for one in beside.degenerate] == [("open", total)]
+
+
 def test_two_solutions_that_meet_are_told_as_double() -> None:
     """Where two of the three center points of four poses on a line meet, the discriminant of their cubic is zero."""
     poses = np.array([[0, 0, 0], [1.0, 0.4, 0.3], [1.6, 1.1, 0.9], [1.2, 2.0, 1.7]])
@@ -451,6 +483,37 @@ def test_the_straight_line_of_morgan_and_wampler_has_33_four_bars_of_which_15_ar
     s = mg.synthesize(m, mg.path("coupler.tip", points), ["B.point", "C.point"])
     assert (len(s), len(s.complex), s.infinite, s.total) == (15, 18, 3, 36)
     assert (s.residual < 1e-12).all()
+
+
+@pytest.mark.slow
+def test_the_four_bars_of_wampler_through_five_points_are_those_printed() -> None:
+    """Wampler, Isotropic coordinates, circularity and Bezout numbers, ASME DETC 1996, with all solutions by PHCpack (fbrfive12): points
+    from each pivot, and both pins of the coupler from its point, as complex numbers.
+    """
+    from_A = [
+        -0.804578095092 + 0.455949484254j, -0.341202796998 + 0.40458818397j, -0.717258427816 + 0.0375980833196j,
+        -0.719882934354 - 0.0724833258428j, -0.858127587882 + 0.449623745342j,
+    ]  # fmt: skip
+    from_D = -0.173708513787 + 0.481007429713j
+    printed = [
+        (0.537811114799385 - 1.06123913869852j, -0.0805270444664818 - 0.354549318016547j),
+        (0.0532080766199881 - 0.590752167855135j, 1.77071366419852 + 0.744464235315417j),
+        (-0.291350510980996 - 0.629899792895949j, 0.6226202826918 - 0.158754316407521j),
+        (-0.055895892925174 - 0.612044754158336j, 0.565894334350677 - 0.169263337603636j),
+        (0.581836051092208 - 2.07715961140398j, -0.18457885571409 - 0.413983005870054j),
+        (1.20647775640219 + 0.0936345200908908j, 0.324771126859958 - 0.214184209895579j),
+        (1.13337718332122 + 0.0538858402503799j, 0.199684727516523 - 0.233955256169607j),
+        (0.465117817920137 - 0.469040702576342j, -0.129838210760656 - 0.347552123056515j),
+        (1.72266423393785 + 0.381388671167225j, 0.418469706943876 - 0.198044030061399j),
+        (0.530483425771761 - 0.109904193402917j, 0.191379614513801 - 0.251854814844587j),
+    ]
+    points, D = np.column_stack([np.real(from_A), np.imag(from_A)]), from_A[0] - from_D
+    m = four_bar(A=(0, 0), D=(D.real, D.imag), tip=tuple(points[0]))
+    s = mg.synthesize(m, mg.path("coupler.tip", points), ["B.point", "C.point"])
+    assert (len(s), len(s.complex), s.infinite, s.total) == (10, 26, 0, 36)
+    found = s.values.reshape(10, 2, 2) @ [1, 1j] - from_A[0]
+    for pins in printed:
+        assert np.abs(found - pins).max(axis=1).min() < 1e-9
 
 
 @pytest.mark.slow

@@ -521,7 +521,7 @@ class SynthesisSetup(Described):
         for name, ends in (("bounds", True), ("conditions", True), ("sweep", False), ("over", False)):
             value = getattr(self, name)
             if value is None or isinstance(value, Mapping):
-                read = _two_ends if ends else plain
+                read = two_ends if ends else plain
                 object.__setattr__(self, name, MappingProxyType({k: read(v) for k, v in (value or {}).items()}))
 
     __reduce__ = remade
@@ -540,7 +540,7 @@ class SynthesisSetup(Described):
             value = getattr(self, name)
             pairs = value.items() if isinstance(value, Mapping) else ()
             found += [] if isinstance(value, Mapping) else [wrong(value, name, "a mapping name -> (least, greatest)")]
-            found += [wrong(v, f"{name}[{k!r}]", "(least, greatest)") for k, v in pairs if not _is_interval(v)]
+            found += [wrong(v, f"{name}[{k!r}]", "(least, greatest)") for k, v in pairs if not is_interval(v)]
         if self.fit is not None and (not isinstance(self.fit, str) or self.fit not in get_args(FitName)):
             found.append(wrong(self.fit, "fit", " or ".join(map(repr, get_args(FitName)))))
         if not isinstance(self.unknown, tuple) or not all(isinstance(name, str) for name in self.unknown):
@@ -555,14 +555,15 @@ class SynthesisSetup(Described):
         return [f"synthesis: {fault}" for fault in found]
 
 
-def _two_ends(value: Any) -> Any:
+def two_ends(value: Any) -> Any:
     """Least and greatest value, infinite where there is none."""
-    if not isinstance(value, list | tuple) or len(value) != 2:
+    if not isinstance(value, list | tuple | np.ndarray) or np.shape(value) != (2,):
         return value
     ends = zip(value, (-np.inf, np.inf), strict=True)
     return tuple(end if given is None else plain(given) for given, end in ends)
 
 
-def _is_interval(value: Any) -> bool:
+def is_interval(value: Any) -> bool:
+    """Whether a value is two ends, as ``two_ends`` reads them, the lower one first."""
     fits = isinstance(value, tuple) and len(value) == 2
     return fits and all(is_numeric(v, ()) or v in (-np.inf, np.inf) for v in value) and value[0] <= value[1]

@@ -32,6 +32,7 @@ from mechgraph.maths.tolerances import MODES
 from mechgraph.maths.tracker import End
 from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.setups import is_interval, two_ends
 from mechgraph.modes.assemblies import Question
 from mechgraph.modes.branches import in_order
 from mechgraph.quantities import wrong
@@ -339,13 +340,14 @@ def limits_of(
     if not isinstance(conditions, Mapping | None):
         faults.append(wrong(conditions, "conditions", "a mapping quantity -> (least, greatest)"))
     for what, ends in items:
+        if not is_interval(two_ends(ends)):
+            faults.append(wrong(ends, f"conditions[{what!r}]", "(least, greatest), None for no end"))
+            continue
+        least, most = (None if np.isinf(end) else end for end in two_ends(ends))
         try:
-            least, most = (None if end is None or np.isinf(end) else float(end) for end in ends)
             out.append((getattr(what, "__name__", str(what)), Measure(m, what, over), least, most))
         except DeclarationError as error:
             faults += error.faults
-        except (TypeError, ValueError):
-            faults.append(wrong(ends, f"conditions[{what!r}]", "(least, greatest), None for no end"))
     return out
 
 

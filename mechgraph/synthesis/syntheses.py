@@ -19,7 +19,7 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import MODES
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.setups import DefectName, FitName, SynthesisSetup
+from mechgraph.model.setups import DefectName, FitName, SynthesisSetup, is_interval, two_ends
 from mechgraph.modes.homotopy import ELSEWHERE, Mask
 from mechgraph.quantities import Count, door, items_of, real_array, wrong
 from mechgraph.quantities import Index as Seed
@@ -92,10 +92,10 @@ class Synthesis:
             f"sweep {name!r}: is no component of a point, an axis or a second direction" for name in self.sweep.others
         ]
         read = [real_array(v) for v in sweep.values()]
-        columns = [np.atleast_1d(v) for v in read if v is not None and v.ndim < 2]
+        columns = [np.atleast_1d(v) for v in read if v is not None and v.ndim < 2 and np.isfinite(v).all()]
         if len({len(c) for c in columns}) > 1 or len(columns) != len(self.sweep.names):
             faults.append(
-                "sweep: expected single numbers by name, with one list of values each, all of the same length"
+                "sweep: expected single numbers by name, with one list of finite values each, all of the same length"
             )
         if faults:
             raise DeclarationError(p.name, faults)
@@ -173,11 +173,13 @@ class Synthesis:
         """The answer to the task numbered ``i``; ``apart``: how many solutions of the start set no symmetry makes of others."""
         p, of = self.problem, self.of.full
         every, missing = unfolded(self.of, start, goal, found, self.rng)
-        every = every[:, doing_all(self.of, goal, every)] if start.against else every
+        does = doing_all(self.of, goal, every)
+        every, failing = every[:, does], max(int((~does).sum()) - start.against, 0)
         x, error, which = real_states(self.of, goal, every)
         # rounding of rows grows with lengths, of those of rods with their squares
         power = 1 if self.of.problem is p else 2
-        fits = error <= CLOSED_TO * np.maximum(1.0, np.abs(x[: self.of.u]).max(axis=0, initial=0.0)) ** power
+        closed_to = CLOSED_TO * np.maximum(1.0, np.abs(x[: self.of.u]).max(axis=0, initial=0.0)) ** power
+        fits = error <= closed_to
         told = [*start.evidence, self._tracks(start, found)]
         asked = np.concatenate([p.asked, *p.rates], axis=1)
         told += [
@@ -192,9 +194,10 @@ class Synthesis:
         condition, motions = self._conditions(goal, x[:, fits]), motions_of(self.of, goal, x[:, fits].astype(complex))
         free = endless(self.of, goal, found.singular)
         goal, x = self.of.lifted(goal, x[:, fits])
+        done = of.error(of.at(goal, x.astype(complex))) <= closed_to[fits]
         x, error = self._upright(goal, x)
-        against, merged = error > CLOSED_TO, self._merged(goal, x)
-        left = ~merged & ~against
+        against, merged = done & (error > closed_to[fits]), done & self._merged(goal, x)
+        left = done & ~merged & ~against
         x, error, condition, motions = x[:, left], error[left], condition[left], motions[:, left]
         others = np.delete(every[: of.u], which, axis=1)
         values = p.outside(x[: of.u]).T
@@ -205,19 +208,28 @@ class Synthesis:
         copies = {k: mine for mine in alike for k in mine}
         made = [self._mechanism(goal, x[:, k], values[k], i) for k in range(len(values))]
         shape = (p.tasks.rows if p.tasks else 0, len(p.m.links), 4, 4)
+        # what follows from what is solved for, where known numbers are such as are declared
+        missed = failing + (~fits).sum() + (~done).sum()
         degenerate = [
-            Degenerate(kind, n, f"{counted(n, 'track')} ended {where}.")
-            for kind, n, where in (
-                ("double", int((~free).sum()), "where solutions meet"),
-                ("continuum", int(free.sum()), "among solutions without end: conditions depend on each other here"),
-            )
-        ]
-        degenerate += [
-            Degenerate(kind, int(these.sum()), f"In {counted(int(these.sum()), 'solution')} {what}.")
-            for kind, these, what in (
-                ("open", ~fits, "what follows from the other conditions is not met"),
-                ("coincident", merged & ~against, "elements of a link coincide"),
-                ("reversed", against, "an axis that is sought points against the motion that is asked about it"),
+            Degenerate(kind, int(n), what.format(counted(int(n), "solution" if "In {}" in what else "track")))
+            for kind, n, what in (
+                ("double", (~free).sum(), "{} ended where solutions meet."),
+                (
+                    "continuum",
+                    free.sum(),
+                    "{} ended among solutions without end: conditions depend on each other here.",
+                ),
+                (
+                    "open",
+                    missed,
+                    "In {} conditions are not met that follow from the others where numbers are as declared.",
+                ),
+                ("coincident", (merged & ~against).sum(), "In {} elements of a link coincide."),
+                (
+                    "reversed",
+                    against.sum(),
+                    "In {} an axis that is sought points against the motion that is asked about it.",
+                ),
             )
         ]
         names = (*p.unknowns.names, *self.sweep.names)
@@ -273,7 +285,7 @@ class Synthesis:
             rates = states[of.states :] * np.tile(sign, (len(of.problem.rates), 1))
             states = np.concatenate([closed, rates])
             turned[of.u : of.head] = np.abs(x[of.u : of.head])
-            turned[of.head :] = states.reshape(of.nx, of.R, n).swapaxes(0, 1).reshape(-1, n)
+            turned[of.head :] = states.reshape(of.nx, of.R, n).swapaxes(0, 1).reshape(of.R * of.nx, n)
         return turned, of.error(of.at(goal, turned.astype(complex)))
 
     def _merged(self, goal: ClassMember, x: Array) -> Mask:
@@ -549,7 +561,7 @@ def synthesize(
         faults.append(wrong(fit, "fit", " or ".join(map(repr, get_args(FitName)))))
     if fitting and sweep:
         faults.append("sweep: expected for exact syntheses alone; give the numbers values in the mechanism")
-    odd = {name: ends for name, ends in within.items() if np.shape(ends) != (2,)}
+    odd = {name: ends for name, ends in within.items() if not is_interval(two_ends(ends))}
     faults += [wrong(ends, f"bounds[{name!r}]", "(least, greatest), None for no end") for name, ends in odd.items()]
     if faults:
         raise DeclarationError(where, faults)
@@ -642,9 +654,9 @@ def _fitted(
     progress: Progress,
 ) -> Syntheses:
     """What comes nearest to what is asked, or meets it and is best in something else."""
-    exact = subset_values(RowProblem(m, tasks, unknown), tasks, starts, seed, cache) if fit else ()
     of = FittedSynthesis(m, tasks, unknown, bounds, over)
     _refuse_other_names(of.problem, bounds)
+    exact = subset_values(RowProblem(m, tasks, unknown), tasks, starts, seed, cache) if fit else ()
     goal = of.measured(*goals[0]) if goals else None
     limited = [
         (of.measured(measure, none=1e3 if least is None else -1e3, most=least is None), least, most)

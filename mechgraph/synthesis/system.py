@@ -92,7 +92,7 @@ class RowNumbers:
         B, out = z.shape[1], []
         for v in self.vectors:
             out.append(np.array(np.broadcast_to(v, (*v.shape[:-1], B)), dtype=np.result_type(v, z)))
-        factors = z[np.array([own[0].array == "factor" for own in places], dtype=bool)]
+        factors = z[np.array([any(p.array == "factor" for p in own) for own in places], dtype=bool)]
         for value, own in zip(z, places, strict=True):
             for p in (p for p in own if p.array in MARKER):
                 out[MARKER.index(p.array)][p.side, p.component, p.pair] = value

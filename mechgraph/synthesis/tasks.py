@@ -24,10 +24,20 @@ def _series(value: Any, shapes: Sequence[tuple[int, ...]], what: str, faults: li
     """An array ``(n, *shape)`` of numbers, one of the shapes; None, with a fault, where it is none."""
     read = real_array(value)
     out = np.zeros(0) if read is None else read
-    if out.ndim and len(out) and any(out.shape[1:] == shape for shape in shapes) and not np.isinf(out).any():
+    if not (out.ndim and len(out) and any(out.shape[1:] == shape for shape in shapes)):
+        wanted = " or ".join(str(("n", *shape)).replace("'", "") for shape in shapes)
+        got = f"shape {out.shape}" if read is not None else shown(value)
+        faults.append(f"{what}: expected numbers of shape {wanted}, got {got}")
+    elif endless := np.argwhere(np.isinf(out)).tolist():
+        row, *rest = endless[0]
+        # of positions, row by row, the row is told by these
+        at = [f"row {row}"] * (len(out) > 1) + [
+            f"column {rest[0]}" if len(rest) == 1 else f"entry {tuple(rest)}"
+        ] * bool(rest)
+        where = f" at {', '.join(at)}" if at else ""
+        faults.append(f"{what}: {out[tuple(endless[0])]}{where}; expected finite numbers, NaN where nothing is asked")
+    else:
         return out
-    wanted = " or ".join(str(("n", *shape)).replace("'", "") for shape in shapes)
-    faults.append(f"{what}: expected numbers of shape {wanted}, got shape {out.shape}")
     return None
 
 
@@ -278,11 +288,11 @@ class PositionTask(RatedTask):
             faults.append(f"row {i}: {name!r} is no name")
             return {}
         found = None if m.freedom_fault(name, single=True) is None else target_of(m, name)
-        if isinstance(found, Target) and not found.part:
-            kind = PathTask if found.point else PoseTask
-            return kind(name, [value]).named(m, faults)
         here: list[str] = []
-        out = _timed(m, {name: [value]}, 1, here)
+        if isinstance(found, Target) and not found.part:
+            out = (PathTask if found.point else PoseTask)(name, [value]).named(m, here)
+        else:
+            out = _timed(m, {name: [value]}, 1, here)
         faults += [f"row {i}: {fault.removeprefix('at: ')}" for fault in here]
         return out
 
