@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from ladder import LADDER, dyad, four_bar, spatial, turned
+from scipy.spatial.transform import Rotation
 
 import mechgraph as mg
 
@@ -99,6 +100,71 @@ def test_a_four_bar_is_found_again_from_its_velocities_and_accelerations() -> No
         found = mg.synthesize(declared, task, sought)
         assert (found.total, found.completeness) == (total, "tested")
         assert np.abs(found.values - (0.4, 0.9, 1.9, 1.6)[: len(found.unknown)]).max(axis=1).min() < 1e-9
+
+
+def beside(x: Any, h: float, *rates: Any) -> list[Any]:
+    """Rows beside ``x`` whose differences tend to these derivatives as ``h`` does to zero; the row itself where that is zero."""
+    at = (0.0,) if not h else (0.0, h) if len(rates) == 1 else (-h, 0.0, h)
+    return [np.asarray(x) + sum(np.asarray(d) * t**k / k for k, d in enumerate(rates, 1)) for t in at]
+
+
+def rated_function(m: mg.Mechanism, h: float, orders: int) -> Any:
+    first, last = m.pairs[0].name, m.pairs[-1].name
+    out = mg.kinematics(m, {first: mg.Motion(np.array([0.0, 0.3]), np.ones(2), np.zeros(2))})[last]
+    x, slope, bend = (float(v[1, 0]) for v in (out.position, out.velocity, out.acceleration))
+    rows = [[0, 0], *beside([0.3, x], h, *[[1.0, slope], [0.0, bend]][:orders])]
+    rates = {} if h else {"rates": [NAN, slope], "accelerations": [NAN, bend] if orders == 2 else None}
+    return mg.function(first, last, rows, **rates)
+
+
+def rated_path(m: mg.Mechanism, h: float, orders: int) -> Any:
+    tip = motion(m, [0.0, 0.3]).link("coupler").at("tip")
+    x, v, a = (values[:, :2] for values in (tip.position, tip.velocity, tip.acceleration))
+    none = [NAN, NAN]
+    rates = {} if h else {"velocities": [none, v[1]], "accelerations": [none, a[1]] if orders == 2 else None}
+    return mg.path("coupler.tip", [x[0], *beside(x[1], h, *[v[1], a[1]][:orders])], **rates)
+
+
+def rated_poses(n: int, shift: float, h: float) -> Any:
+    """The second of n poses with a twist, or another one a screw displacement of ``h`` times it away."""
+    X, V = turned(n, shift), np.full((n, 6), NAN)
+    V[1] = np.array([0.4, 0.3, -0.9, 0.1, -1.0, -0.5]) * np.repeat([1.0, shift], 3)
+    if not h:
+        return mg.poses("body", X, twists=V)
+    moved = np.eye(4)
+    moved[:3, :3], moved[:3, 3] = Rotation.from_rotvec(h * V[1, :3]).as_matrix(), h * V[1, 3:]
+    return mg.poses("body", [*X, moved @ X[1]])
+
+
+SPHERICAL = LADDER["spherical R-R, 5 orientations"]()[0]
+RSSR = LADDER["RSSR function, 7 pairs"]()[0]
+LIMITS: dict[str, tuple[mg.Mechanism, Any, list[str], int]] = {
+    "spherical, a twist": (SPHERICAL, lambda h: rated_poses(2, 0.0, h), ["O.axis"], 1),
+    "balls, a twist": (BALLS, lambda h: rated_poses(3, 1.0, h), ["P.point"], 1),
+    "RSSR function, a rate": (RSSR, lambda h: rated_function(RSSR, h, 1), ["P.point.x", "Q.point.z"], 2),
+    "four-bar function, an acceleration": (
+        four_bar(), lambda h: rated_function(four_bar(), h, 2), ["B.point.x", "C.point.x", "C.point.y"], 3,
+    ),
+    "four-bar path, a velocity": (four_bar(), lambda h: rated_path(four_bar(), h, 1), ["B.point.x", "C.point.y"], 4),
+    "four-bar path, an acceleration": (
+        four_bar(), lambda h: rated_path(four_bar(), h, 2), ["B.point.x", "C.point.x", "C.point.y"], 0,
+    ),
+}  # fmt: skip
+"""A mechanism; what is asked, of rates or of rows that lie ``h`` apart; numbers sought; solutions over C."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LIMITS)
+def test_what_is_asked_of_rates_is_the_limit_of_rows_that_come_together(name: str) -> None:
+    m, task, unknown, total = LIMITS[name]
+    s = mg.synthesize(m, task(0.0), unknown)
+    assert (s.total, len(s) > 0) == (total, True)
+    apart = []
+    for h in (1e-3, 1e-4):
+        near = mg.synthesize(m, task(h), unknown)
+        apart.append([np.abs(near.values - values).max(axis=1).min() for values in s.values])
+    assert (np.divide(*apart[::-1]) < 0.2).all()
+    assert np.max(apart[1]) < 0.02
 
 
 def test_what_is_wrong_with_rates_is_told() -> None:
