@@ -7,7 +7,11 @@ import pytest
 from mechanisms import FourBarFormula
 
 import mechgraph as mg
-from mechgraph.synthesis.fitness import Fitness, fitness
+from mechgraph.synthesis.fitness import Fitness, fitnesses
+
+
+def fitness(m: mg.Mechanism, q: np.ndarray, *of: str) -> Fitness:
+    return fitnesses([m], q[None], *of)[0]
 
 
 def rows_of(m: mg.Mechanism, starts: list[dict[str, float]]) -> np.ndarray:

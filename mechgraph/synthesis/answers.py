@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
-from functools import partial
+from functools import cache, partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -45,7 +45,7 @@ class Degenerate:
 
 
 class Fitnesses(Sequence[Fitness]):
-    """Fitness of mechanisms, each found when first asked for."""
+    """Fitness of mechanisms, found when first asked for."""
 
     def __init__(self, makers: Sequence[Callable[[], Fitness]]) -> None:
         self._makers = tuple(makers)
@@ -57,12 +57,14 @@ class Fitnesses(Sequence[Fitness]):
         return tuple(make() for make in self._makers[i]) if isinstance(i, slice) else self._makers[i]()
 
     @classmethod
-    def of(cls, found: tuple[Fitness, ...]) -> Fitnesses:
-        """Those that are known."""
-        return cls([partial(found.__getitem__, i) for i in range(len(found))])
+    def at_once(cls, find: Callable[[], Sequence[Fitness]], count: int) -> Fitnesses:
+        """Those that are found together."""
+        found = cache(find)
+        return cls([partial(lambda k: found()[k], i) for i in range(count)])
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Fitnesses.of, (tuple(self),)  # found before they go elsewhere
+        found = tuple(self)  # before they go elsewhere
+        return Fitnesses, ([partial(found.__getitem__, i) for i in range(len(found))],)
 
 
 @dataclass(frozen=True)

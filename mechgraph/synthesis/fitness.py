@@ -1,41 +1,44 @@
 """Whether a mechanism can run through the positions that it meets: defects, transmission, sizes.
 
 A position of a mechanism with one driver lies on a curve of positions, its circuit. Where the driver has to turn back the curve folds;
-between folds it is a branch, on which the driver moves the mechanism. From the first position the path follower of ``solve`` goes to the
-fold at either end. At a fold two branches meet: there ``x(s) = x_0 + a s + O(s^2)`` with the driver at ``s^2``, so that at the same value
-of the driver the other branch is at ``2 x_0 - x``, but for terms of higher order, and from there it is followed to its own other end,
-until the first position comes back. Every other position is on one of these branches, or on another circuit.
+between folds it is a branch, on which the driver moves the mechanism. The circuits of all mechanisms of one topology are followed together,
+by their length, to which a fold is a place like any other: by steps along the one motion that the closure leaves, from the first position
+both ways until these meet. A step that leads to another circuit, nearby, changes the sign of the bordered Jacobian's determinant. Every
+other position is on one of the branches, or on another circuit.
 
 Sources: Chase and Mirth, Circuits and branches of single-degree-of-freedom planar linkages, J. Mech. Des. 115, 1993; Filemon, Useful ranges
-of centerpoint curves, Mech. Mach. Theory 7, 1972.
+of centerpoint curves, Mech. Mach. Theory 7, 1972; Allgower and Georg, Introduction to Numerical Continuation Methods, 2003, chapter 8.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import partial
 from itertools import combinations
 from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from mechgraph.errors import DeadPointError, DeclarationError, IndeterminateError, MechgraphWarning
-from mechgraph.kinematics.motion_path import DriverPath, Positions, Request
-from mechgraph.kinematics.reach import follow
-from mechgraph.kinematics.solver import closure_solver, engine_for
-from mechgraph.kinematics.state import CLOSED, Configuration, close
+from mechgraph.determinacy.mobility import free_motion
+from mechgraph.errors import DeclarationError, MechgraphWarning
+from mechgraph.kinematics.assembly import closed_start
+from mechgraph.kinematics.motion_path import FARTHEST
+from mechgraph.kinematics.reach import BEYOND_END, beyond
+from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.system import System
 from mechgraph.kinetostatics import kinematics, solve, transmission
-from mechgraph.maths.se3 import Array, Index
-from mechgraph.maths.tolerances import MODES
-from mechgraph.maths.tracker import End
+from mechgraph.maths.newton import cubic
+from mechgraph.maths.se3 import Array, Index, Mask, cross
+from mechgraph.maths.tolerances import MODES, MOTIONS
 from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.setups import is_interval, two_ends
-from mechgraph.modes.assemblies import Question
 from mechgraph.modes.branches import in_order
+from mechgraph.modes.family import Family
 from mechgraph.quantities import wrong
+from mechgraph.variants.numbers import side_by_side
 from mechgraph.variants.work import Output, named_outputs, quantity
 
 Defect = Literal["branch", "circuit", "order", "full_turn"]
@@ -91,206 +94,416 @@ class Fitness:
         return tuple(name for name in wanted if getattr(self, name) is not (name == "full_turn"))
 
 
-@dataclass(frozen=True)
-class _Run:
-    """A branch followed one way: driver values ``(n,)`` and states ``(nx, n)`` met, how it ended, and the node there and one before."""
+@dataclass
+class _Nodes:
+    """States ``x (nx, T)`` of mechanisms ``case (T,)`` at places along their circuits, and what is known there.
 
-    values: Array
+    ``t (F, T)``: the motion, of unit size; ``N (F, k, T)`` all motions, ``U (m, l, T)`` rows that no motion meets, and ``J (m, F, T)``.
+    """
+
+    case: Index
+    place: Array
     x: Array
-    end: End
-    last: Array
-    before: Array
+    t: Array
+    N: Array
+    U: Array
+    J: Array
+
+    def taken(self, which: Any) -> _Nodes:
+        """Some of them."""
+        return _Nodes(*(v[..., which] for v in vars(self).values()))
+
+    def put(self, which: Index, new: _Nodes) -> None:
+        """Put others in the places of some."""
+        for mine, other in zip(vars(self).values(), vars(new).values(), strict=True):
+            mine[..., which] = other
+
+    def leads_to(self, other: _Nodes) -> Mask:
+        """Whether the bordered Jacobian ``[[J, U], [N^T, 0]]``, with the borders from here, has a determinant of one sign here and there.
+
+        It changes where a step leads from one of two circuits that nearly meet straight on to the other, and where they meet.
+        """
+        m, F, T = self.J.shape
+        B = np.zeros((2, m + self.N.shape[1], F + self.U.shape[1], T))
+        B[:, :m, :F], B[:, :m, F:], B[:, m:, :F] = (self.J, other.J), self.U, self.N.swapaxes(0, 1)
+        return np.asarray(np.linalg.slogdet(np.moveaxis(B, -1, 1))[0].prod(axis=0) > 0)
+
+    @staticmethod
+    def joined(parts: Iterable[_Nodes]) -> _Nodes:
+        """All of them, one circuit after the other, in the order of their places."""
+        columns = zip(*(vars(part).values() for part in parts), strict=True)
+        out = _Nodes(*(np.concatenate(column, axis=-1) for column in columns))
+        return out.taken(np.lexsort((out.place, out.case)))
 
 
-class Circuit:
-    """The circuit of the first of the closed states ``x (nx, n)`` of a question with one driver, and where on it the others are.
+class _Circuits:
+    """The circuits of mechanisms of one topology, cases of a ``system``, each through the first of its states ``x (nx, V, n)``.
 
     Attributes
     ----------
-    places : for every state the number of its branch and the driver value there (internal units, turns counted from the first), or None.
-    turns : turns of the driver after which the branch of the first one comes back, 0 where it does not.
+    branch, value (V, n) : the number of the branch of every state, 0 that of the first one, and the driver value there (internal units,
+        turns counted from the first); NaN for states of other circuits.
+    turns (V,) : turns of the driver after which the branch of the first one comes back, 0 where it does not.
     """
 
-    def __init__(self, question: Question, x: Array) -> None:
-        self.q, self.s, self.x = question, question.system, x
-        self.row = int(self.s.single_rows[question.columns[0]])
-        self.goals = x[self.row]
-        self.period = float(self.s.periods[question.columns[0]])
-        self.prints = self._prints(x)
-        self.places: list[tuple[int, float] | None] = [None] * x.shape[1]
-        self.turns = 0
-        solver = closure_solver(engine_for(self.s.n_rows, 1, "auto"), question.columns, question.freedoms.hold)
-        self._path = DriverPath(self.s, solver, self.s.cases)
-        self._walk()
+    def __init__(self, system: System, family: Family, column: int, rank: int, x: Array) -> None:
+        self.s, self.family, self.x, self.column, self.rank = system, family, x, column, rank
+        self.V, self.n = x.shape[1:]
+        self.row, self.period = int(system.single_rows[column]), float(system.periods[column])
+        self.settled = np.flatnonzero(np.abs(family.idle).max(axis=1, initial=0.0) < MODES.span)
+        self.back = np.flatnonzero((system.single_rows >= 0) & np.isfinite(family.periods))
+        self.turns, self.closes = np.zeros(self.V, dtype=np.intp), np.zeros(self.V, dtype=bool)
+        points = self.here(x[:, :, 0], np.arange(self.V)).pair_points
+        self.size = np.sqrt(((points - points.mean(axis=1, keepdims=True)) ** 2).sum(axis=0).mean(axis=0))
+        self.nodes = self._joined(self._followed())
+        self._number()
+        self._place()
 
-    def _prints(self, x: Array) -> Array:
-        return self.q.family.prints(Configuration(self.s, x))
+    def here(self, x: Array, case: Index) -> Configuration:
+        """Mechanisms at states ``(nx, T)``."""
+        return Configuration(self.s.cases(case), x)
 
-    def _same(self, prints: Array, x: Array) -> Index:
-        """Which of the states ``(nx, n)`` are where something with these prints is."""
-        apart = np.abs(self._prints(x) - prints[:, None]).max(axis=0, initial=0.0)
-        return np.flatnonzero(apart < MODES.arrives * max(1.0, float(np.abs(prints).max(initial=0.0))))
+    def at(self, x: Array, case: Index) -> tuple[Array, _Nodes]:
+        """Least Newton steps ``(F, T)`` at states, and what is known there."""
+        here, r = self.here(x, case), self.rank
+        J = here.J
+        with np.errstate(all="ignore"):
+            U, sigma, V = np.linalg.svd(np.nan_to_num(J).transpose(2, 0, 1))
+            step = -np.einsum("trf,tmr,mt->ft", V[:, :r], U[:, :, :r] / sigma[:, None, :r], here.residual)
+        N = V[:, r:].swapaxes(1, 2)
+        if N.shape[2] > 1:
+            # passive motions come last: what they do not change moves in one way
+            N = N @ np.linalg.svd(N[:, self.settled])[2].swapaxes(1, 2)
+        N, U = N.transpose(1, 2, 0), U[:, :, r:].transpose(1, 2, 0)
+        return step, _Nodes(case, np.zeros(len(case)), x, N[:, 0].copy(), N.copy(), U.copy(), J)
 
-    def _walk(self) -> None:
-        """Branch by branch, until all states are found or the first one comes back."""
-        first = self.x[:, 0]
-        ends = [self._run(first, 1.0, 0)]
-        if not self.turns:
-            ends.append(self._run(first, -1.0, 0))
-        # branches of a circuit, at most
-        branch, most = 0, 64
-        for sense, end in zip((-1.0, 1.0), ends, strict=False):
-            run: _Run | None = end
-            while run is not None and None in self.places and branch < most:
-                begin = self._behind(run)
-                if begin is None:
-                    break
-                branch += 1
-                run = self._run(begin, sense, branch, abs(float(run.last[self.row] - begin[self.row])))
-                sense = -sense
-                if self._same(self.prints[:, 0], run.x).size:
-                    return
+    def closed(self, x: Array, case: Index, goal: Array | None = None) -> tuple[_Nodes, Array]:
+        """Nodes near states ``(nx, T)``, where the driver has the values of a ``goal (T,)``, and the last Newton steps."""
+        # Newton steps, of which each doubles the digits
+        for _ in range(4):
+            step, node = self.at(x, case)
+            if goal is not None:
+                rate = node.t[self.column]
+                left = (goal - x[self.row] - step[self.column]) / np.where(rate == 0, 1.0, rate)
+                step = step + node.t * np.clip(left, -0.1, 0.1)
+            x = self.s.advance(x, step)
+        node.x = x
+        return node, np.abs(step).max(axis=0)
 
-    def _run(self, x: Array, sense: float, branch: int, fold: float = 0.0) -> _Run:
-        """The branch of a state followed to its end, and back to the ``fold`` so far behind it; states on it get their places."""
-        begin, stroke = float(x[self.row]), MODES.slide_stroke
-        turning = np.isfinite(self.period)
-        # turns of the driver after which a branch may come back: one, or at most these
-        for turns in (1, 8) if turning else (1,):
-            if turning:
-                reach = turns * self.period
-                whole = np.arange(turns + 1) * self.period
-                ahead = np.mod(sense * (self.goals - begin), self.period)
-                ways = np.concatenate([(ahead[:, None] + whole[:-1]).ravel(), whole[1:]])
-            else:
-                reach = max(0.0, float((sense * (self.goals - begin)).max())) + stroke
-                ways = sense * (self.goals - begin)
-            back = sense * (self.goals - begin)
-            back -= np.ceil(back / self.period) * self.period if turning else 0.0
-            ways = np.append(ways[(ways >= 0) & (ways <= reach)], back[(back < 0) & (back > -fold)])
-            ways = np.unique(np.append(ways, reach))
-            run = self._followed(x, begin + sense * ways)
-            gone = sense * (run.values[self._same(self._prints(x[:, None])[:, 0], run.x)] - begin)
-            # of a turn: what comes back does so after one or several
-            again = gone[gone > 0.5 * self.period]
-            if run.end is not End.REACHED or again.size:
+    def _followed(self) -> list[_Nodes]:
+        """Nodes along all circuits, by steps both ways until these meet or end; places count them."""
+        s, lengths = self.s, self.s.single_rows[self.s.is_length]
+        case, sense = np.repeat(np.arange(self.V), 2), np.tile([1.0, -1.0], self.V)
+        _, last = self.at(self.x[:, case, 0], case)
+        rate = np.abs(last.t[self.column])
+        self.dead = (rate <= MOTIONS.dependent * np.abs(last.t).max(axis=0))[::2]
+        last.t *= sense * np.where(last.t[self.column] < 0, -1.0, 1.0)
+        goals, turns = self.x[self.row], np.isfinite(self.period)
+        # turns of the driver after which a branch may come back, at most; else what lies so far beyond is not asked for
+        far = 8 * self.period if turns else MODES.slide_stroke
+        low, high = (ends(goals[:, :1] if turns else goals, axis=1)[case] for ends in (np.min, np.max))
+        h, wide, going, out = np.full(2 * self.V, 0.1), np.zeros(2 * self.V), ~self.dead[case], list[_Nodes]()
+        before, closing = last.taken(np.arange(2 * self.V)), np.zeros(self.V, dtype=bool)
+        out.append(last.taken(np.arange(0, 2 * self.V, 2)))
+        # steps after which a circuit is left open
+        for _ in range(3000):
+            self._meet(last, h, going, closing)
+            at = np.flatnonzero(going)
+            if not at.size:
                 break
-        if again.size and not branch:
-            self.turns = round(float(again[0]) / self.period)
-        for i in range(self.x.shape[1]):
-            if self.places[i] is None and (at := self._same(self.prints[:, i], run.x)).size:
-                self.places[i] = branch, float(run.values[at[0]])
-        return run
+            # what is no longer than this is no gap between circuits: they meet there, and are passed straight on
+            leap, here = h[at] < 1e-6, last.taken(at)
+            ahead = np.where(leap, 1e-3, h[at])
+            dq = here.t * ahead
+            known = np.flatnonzero(wide[at] > 0)
+            some = before.taken(at[known])
+            y = s.difference(some.x, here.x[:, known])
+            dq[:, known] = cubic(y, here.t[:, known], s.tangent(y, some.t), -wide[at[known]], ahead[known])
+            x = s.advance(here.x, dq)
+            one, _ = self.at(x, here.case)
+            two, new = self.at(s.advance(x, one), here.case)
+            new.x, new.place = s.advance(new.x, two), here.place + sense[at]
+            turn = (new.t * here.t).sum(axis=0)
+            new.t *= np.where(turn < 0, -1.0, 1.0)
+            size = np.abs(one).max(axis=0)
+            good = (size <= np.where(leap, 1e-5, 0.06)) & (np.abs(two).max(axis=0) <= 0.1 * size + 1e-9)
+            good &= (np.abs(turn) > 0.8) & np.isfinite(new.x).all(axis=0) & (leap | here.leads_to(new))
+            longest = 0.7 * np.maximum(1.0, np.abs(new.x[lengths]).max(axis=0, initial=0.0))
+            grown = ahead * np.clip((0.02 / np.maximum(size, 1e-12)) ** 0.25, 0.5, 2.0)
+            h[at] = np.where(good, np.minimum(grown, longest), 0.4 * ahead)
+            going[at[leap & ~good]] = False
+            on, new, here = at[good], new.taken(good), here.taken(good)
+            wide[on] = self._arc(here, new)
+            before.put(on, here)
+            last.put(on, new)
+            out.append(new)
+            gone = np.maximum(low - last.x[self.row], last.x[self.row] - high) > far
+            gone |= np.abs(last.x[lengths]).max(axis=0, initial=0.0) > FARTHEST
+            going &= ~gone & (beyond(s, last.x) <= BEYOND_END).all(axis=0)
+        return out
 
-    def _followed(self, x: Array, values: Array) -> _Run:
-        found: Positions = follow(self._path, [Request(x, 0, values[None], np.arange(len(values)))], len(values))
-        nodes = found.nodes_of(int(found.track[-1]))
-        order = np.argsort(nodes.place, kind="stable")
-        gone = np.abs(nodes.drive[0, order[-1]] - nodes.drive[0, order])
-        # driver value (radians, or lengths over L) next to a fold at which the branches that meet there are well apart, and still alike
-        before = order[int(np.argmin(np.abs(np.log(np.maximum(gone, 1e-12) / 1e-4))))]
-        return _Run(
-            values[found.moved],
-            found.x[:, found.moved],
-            found.tracks.end[int(found.track[-1])],
-            nodes.x[:, order[-1]],
-            nodes.x[:, before],
+    def _meet(self, last: _Nodes, h: Array, going: Mask, closing: Mask) -> None:
+        """See which of both ways come together, and let the first one end at the other."""
+        p, m = last.taken(slice(0, None, 2)), last.taken(slice(1, None, 2))
+        y = self.s.difference(m.x, p.x)
+        y[self.back] -= self.s.rounds(self.back, y[self.back])
+        # of what no passive motion changes: the way between both, and how far it leads on along each of unit size
+        y, (a, b) = y[self.settled], ((n.t[self.settled]) for n in (p, m))
+        size = np.sqrt(np.sqrt((a * a).sum(axis=0) * (b * b).sum(axis=0)))
+        y, a, b = y / size, a / size, b / size
+        d, ahead, behind = np.sqrt((y * y).sum(axis=0)), (a * y).sum(axis=0), (b * y).sum(axis=0)
+        done = closing & going[::2] & (ahead <= 0)
+        self.closes |= done
+        if np.isfinite(self.period):
+            self.turns[done] = np.abs(np.round((p.x - m.x)[self.row, done] / self.period))
+        going[::2][done] = False
+        near = going[::2] & going[1::2] & (ahead > 0) & (behind < 0) & (d < h[::2] + h[1::2])
+        met = near & ((a * b).sum(axis=0) < -0.8) & (ahead > 0.9 * d)
+        met[met] = p.taken(met).leads_to(m.taken(met))
+        going[1::2][met], closing[met] = False, True
+        # a little more than what is left
+        h[::2][closing] = np.minimum(h[::2], d + 2e-6)[closing]
+        apart = near & ~met
+        for way in (h[::2], h[1::2]):
+            way[apart] = np.minimum(way, np.maximum(d / 3.0, 1e-5))[apart]
+
+    def _arc(self, a: _Nodes, b: _Nodes) -> Array:
+        """Lengths of the arcs between nodes."""
+        y = self.s.difference(b.x, a.x)
+        half = 0.5 * np.arccos(np.clip((a.t * b.t).sum(axis=0), -1.0, 1.0))
+        return np.asarray(np.sqrt((y * y).sum(axis=0)) / np.sinc(half / np.pi))
+
+    def _between(self, a: _Nodes, b: _Nodes, part: Array) -> Array:
+        """States at parts of the arcs between nodes."""
+        y, w = self.s.difference(b.x, a.x), self._arc(a, b)
+        return self.s.advance(a.x, cubic(y, a.t, self.s.tangent(y, b.t), w, part * w))
+
+    def _joined(self, parts: list[_Nodes]) -> _Nodes:
+        """All nodes in their order, with others at folds, between which the driver rises or falls."""
+        nodes = _Nodes.joined(parts)
+        nodes.t[:, nodes.place < 0] *= -1.0
+        # times that nodes are put where the rate of the driver vanishes, or is least
+        for _ in range(8):
+            a, b = self._steps(nodes)
+            w, (ra, rb) = self._arc(a, b), (n.t[self.column] for n in (a, b))
+            rise = (b.x - a.x)[self.row] / np.where(w > 0, w, 1.0)
+            B, C = 2.0 * (3.0 * rise - 2.0 * ra - rb), 3.0 * (ra + rb - 2.0 * rise)
+            fold = (ra * rb < 0) & (np.minimum(np.abs(ra), np.abs(rb)) > 1e-9)
+            least = np.clip(-0.5 * B / np.where(C == 0, 1.0, C), 0.0, 1.0)
+            lowest = (ra + least * (B + least * C)) * np.sign(ra)
+            dips = (ra * rb > 0) & (lowest < 0.25 * np.minimum(np.abs(ra), np.abs(rb))) & (np.abs(least - 0.5) < 0.45)
+            some = np.flatnonzero(fold | dips)
+            if not some.size:
+                break
+            ra, B, C, a, b = ra[some], B[some], C[some], a.taken(some), b.taken(some)
+            bottom = -0.5 * (B + np.copysign(np.sqrt(np.maximum(B * B - 4.0 * C * ra, 0.0)), B))
+            one = ra / np.where(bottom == 0, 1.0, bottom)
+            other = bottom / np.where(C == 0, 1.0, C)
+            part = np.where(fold[some], np.where((one >= 0) & (one <= 1), one, other), least[some])
+            more, _ = self.closed(self._between(a, b, part), a.case)
+            more.t *= np.where((more.t * (a.t + b.t)).sum(axis=0) < 0, -1.0, 1.0)
+            more.place = a.place + part * (b.place - a.place)
+            nodes = _Nodes.joined([nodes, more])
+        return nodes
+
+    @staticmethod
+    def _steps(nodes: _Nodes) -> tuple[_Nodes, _Nodes]:
+        """Neighbors on the same circuit."""
+        left = np.flatnonzero(nodes.case[1:] == nodes.case[:-1])
+        return nodes.taken(left), nodes.taken(left + 1)
+
+    def _number(self) -> None:
+        """Number the branches of all steps between nodes."""
+        self.a, self.b = a, b = self._steps(self.nodes)
+        self.rises = np.sign((b.x - a.x)[self.row])
+        turned = (a.case[1:] == a.case[:-1]) & (self.rises[1:] != self.rises[:-1])
+        number = np.append(0, np.cumsum(turned))[: len(a.case)]
+        first, folds = np.zeros(self.V, dtype=np.intp), np.zeros(self.V, dtype=np.intp)
+        np.add.at(folds, a.case[1:][turned], 1)
+        for place in (b.place, a.place):
+            at = np.flatnonzero(place == 0)
+            first[a.case[at]] = number[at]
+        number = number - first[a.case]
+        self.turns[folds > 0] = 0
+        self.of_branch = np.where(
+            self.closes[a.case] & (folds[a.case] > 0), number % np.maximum(folds[a.case], 1), number
         )
 
-    def _behind(self, run: _Run) -> Array | None:
-        """A state on the other branch that meets a run at the fold where it ended; None where there is no such fold."""
-        if run.end is not End.FOLD:
-            return None
-        s, gone = self.s, self.s.difference(run.last[:, None], run.before[:, None])
-        guess = s.advance(run.last[:, None], gone)[:, 0]
-        guess[self.row] = run.before[self.row]
-        x, error = close(s, guess, self.q.columns)
-        apart = np.abs(s.difference(x[:, None], run.before[:, None])).max()
-        return x if error <= CLOSED and apart > np.abs(gone).max() else None
+    def _place(self) -> None:
+        """Find the states on their circuits."""
+        case, goal = np.repeat(np.arange(self.V), self.n), self.x.reshape(len(self.x), -1)
+        self.branch, self.value = np.full((2, self.V, self.n), np.nan)
+        self.branch[:, 0], self.value[:, 0] = 0.0, self.x[self.row, :, 0]
+        step, k, value = self._steps_at(case, goal[self.row])
+        order = np.argsort(-np.abs(self.of_branch[step]), kind="stable")
+        step, k, value = step[order], k[order], value[order]
+        x, good = self.states(step, value)
+        here, there = (self.family.prints(self.here(y, case[k])) for y in (goal[:, k], x))
+        near = np.abs(there - here).max(axis=0, initial=0.0)
+        good &= near < MODES.arrives * np.maximum(1.0, np.abs(here).max(axis=0, initial=0.0))
+        # of several the one of the lowest number, which comes last
+        self.branch.ravel()[k[good]], self.value.ravel()[k[good]] = self.of_branch[step[good]], value[good]
 
-    @cached_property
-    def defects(self) -> tuple[bool, bool, bool]:
-        """Defects of branch, circuit and order."""
-        met = [place for place in self.places if place is not None]
-        branch, circuit = any(number for number, _ in met), len(met) < len(self.places)
-        return branch or circuit, circuit, not (branch or circuit) and self.ordered is None
+    def _steps_at(self, case: Index, value: Array) -> tuple[Index, Index, Array]:
+        """On which steps drivers of mechanisms have some values, but for whole turns; the number of each, and its value there."""
+        count = np.bincount(self.a.case, minlength=self.V)
+        k = np.repeat(np.arange(len(case)), count[case])
+        step = np.arange(len(k)) + np.repeat(
+            (np.cumsum(count) - count)[case] - np.cumsum(count[case]) + count[case], count[case]
+        )
+        # rounding of values of the driver (radians, or lengths over L)
+        slip, value = 1e-9, value[k]
+        low, high = np.sort([self.a.x[self.row, step], self.b.x[self.row, step]], axis=0)
+        if np.isfinite(self.period):
+            value = value + self.period * np.ceil((low - slip - value) / self.period)
+        on = (value >= low - slip) & (value <= high + slip)
+        return step[on], k[on], value[on]
 
-    @cached_property
-    def ordered(self) -> Array | None:
-        """Driver values at which the states are passed one after the other; None where the driver has to turn back."""
-        values = np.array([place[1] for place in self.places if place is not None and not place[0]])
-        return in_order(values, self.turns * self.period if self.turns else np.inf)
+    def states(self, step: Index, value: Array) -> tuple[Array, Mask]:
+        """States on steps between nodes where the driver has some values, and whether they were met there."""
+        a, b = self.a.taken(step), self.b.taken(step)
+        y, w = (b.x - a.x)[self.row], self._arc(a, b)
+        ra, rb, begin = a.t[self.column], b.t[self.column], a.x[self.row]
+        part = _root(lambda u: begin + cubic(y, ra, rb, w, u * w) - value, len(step))
+        node, last = self.closed(self._between(a, b, part), a.case, value)
+        forward = np.where((node.t * (a.t + b.t)).sum(axis=0) < 0, -1.0, 1.0) * node.t[self.column]
+        return node.x, (last < 1e-8) & (forward * self.rises[step] > -1e-6)
 
-    @property
-    def groups(self) -> list[Index]:
-        """States that lie on one branch of the circuit, together; each of another circuit alone."""
-        number = [(-1 - i) if place is None else place[0] for i, place in enumerate(self.places)]
-        return [np.flatnonzero(np.array(number) == k) for k in dict.fromkeys(number)]
+    def along(self, case: Index, value: Array) -> tuple[Array, Mask]:
+        """States on the branches of the first states where the driver has some values."""
+        step, k, at = self._steps_at(case, value)
+        turns = (at - value[k]) / self.period
+        first = (
+            np.where(self.turns[case[k]] > 0, np.round(turns) % np.maximum(self.turns[case[k]], 1), np.round(turns))
+            == 0
+        )
+        on = np.flatnonzero((self.of_branch[step] == 0) & first)
+        every, one = np.unique(k[on], return_index=True)
+        x, met = np.repeat(self.x[:, case, 0], 1, axis=1), np.zeros(len(case), dtype=bool)
+        x[:, every], met[every] = self.states(step[on[one]], at[on[one]])
+        return x, met
 
 
-def fitness(
-    m: Mechanism, q: Array, driver: str | None = None, output: str | None = None, error: float = 0.0
-) -> Fitness:
-    """Fitness of a mechanism that meets positions with coordinates ``q (n, F)``; its start is the first.
+def _root(value: Callable[[Array], Array], n: int) -> Array:
+    """Where values change their signs between 0 and 1, by bisection to rounding."""
+    low, high = np.zeros(n), np.ones(n)
+    rises = value(high) >= value(low)
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        below = (value(middle) < 0) == rises
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return np.asarray(0.5 * (low + high))
+
+
+def fitnesses(
+    mechanisms: Sequence[Mechanism],
+    q: Array,
+    driver: str | None = None,
+    output: str | None = None,
+    errors: Sequence[float] = (),
+) -> list[Fitness]:
+    """Fitness of mechanisms of one topology that meet positions with coordinates ``q (V, n, F)``; the start of each is its first.
 
     ``driver`` and ``output`` are freedoms; without a driver nothing is said of defects and transmission, without an output that freedom at
     the frame counts that is moved worst.
     """
-    size, ratio = sizes(m)
-    unknown = Fitness(None, None, None, None, np.nan, np.nan, size, ratio, error)
-    if driver is None:
-        return unknown
+    each = zip(mechanisms, errors or [0.0] * len(mechanisms), strict=True)
+    out = [Fitness(None, None, None, None, np.nan, np.nan, *sizes(m), error) for m, error in each]
+    if driver is None or not out:
+        return out
+    m, V = mechanisms[0], len(out)
     driver = m.full_name(driver)
-    place = m.freedom_names().index(driver)
-    m = m.replace(drives=[driver], start=dict(zip(m.freedom_names(), q[0].tolist(), strict=True)))
-    try:
-        question = Question(m, {driver: float(q[0, place])})
-        circuit = Circuit(question, question.system.state_of(q.T))
-        at, between = _transmitted(m, q, driver, output, circuit, float(question.unit[0]))
-    except DeadPointError:
-        return replace(unknown, branch=True)
-    except IndeterminateError:
-        return unknown
-    full_turn = bool(circuit.turns) if m.turns(driver) else False
-    return Fitness(*circuit.defects, full_turn, at, between, size, ratio, error)
+    outputs = [m.full_name(output)] if output else frame_outputs(m, driver)
+    base = closed_start(m.replace(drives=[driver], start=dict(zip(m.freedom_names(), q[0, 0].tolist(), strict=True))))
+    s, par = base.system, base.system.par
+    columns = s.columns_of([driver])
+    passive = [motion.rates for motion in free_motion(s, base.x[:, 0], columns).passive]
+    numbers = side_by_side(mechanisms).parameters(m, par.offset, par.origin, par.L)
+    # one array with all of them says how many there are
+    s = s.with_parameters(replace(numbers, mass=np.broadcast_to(numbers.mass, (len(m.links), V))))
+    x, case = s.state_of(q.reshape(-1, q.shape[2]).T), np.repeat(np.arange(V), q.shape[1])
+    rows = Configuration(s.cases(case), x)
+    sigma = np.linalg.svd(rows.J.transpose(2, 0, 1), compute_uv=False)
+    rank = int((sigma > MODES.generic * sigma[:, :1]).sum(axis=1).max())
+    if s.n_freedoms - rank - len(passive) != 1:
+        return out
+    idle = np.array(passive).reshape(-1, s.n_freedoms).T
+    of = _Circuits(s, Family(base, columns, idle), int(columns[0]), rank, x.reshape(-1, *q.shape[:2]))
+    angles = partial(_transmitted, of, mechanisms, driver, outputs)
+    at = angles(rows, case, np.arange(len(case))).reshape(q.shape[:2]).min(axis=1) if outputs else np.full(V, np.nan)
+    branch, circuit = (of.branch != 0).any(axis=1), np.isnan(of.branch).any(axis=1)
+    periods = np.where(of.turns > 0, of.turns, np.inf) * of.period
+    ways = [None if branch[v] else in_order(of.value[v], float(periods[v])) for v in range(V)]
+    good, between = np.array([v for v in range(V) if ways[v] is not None], dtype=np.intp), np.full(V, np.nan)
+    if good.size and outputs:
+        low, high = np.array([way[[0, -1]] for way in ways if way is not None]).T
+        between[good] = at[good]
+        # so many samples; the least value lies between the neighbors of the least one
+        for n in (91, 45):
+            values, own = np.linspace(low, high, n), np.tile(good, n)
+            there, met = of.along(own, values.ravel())
+            found = np.where(met, angles(of.here(there, own), own, own), np.nan).reshape(n, -1)
+            between[good] = np.minimum(between[good], found.min(axis=0))
+            near = np.argmin(np.nan_to_num(found, nan=-1.0), axis=0)
+            low, high = (values[np.clip(near + i, 0, n - 1), np.arange(good.size)] for i in (-1, 1))
+    full_turn = (of.turns > 0) & m.turns(driver)
+    for v, (one, dead, off, apart, turns) in enumerate(
+        zip(out, *(np.asarray(told).tolist() for told in (of.dead, branch, circuit, full_turn)), strict=True)
+    ):
+        known = Fitness(
+            off, apart, not off and ways[v] is None, turns, float(at[v]), float(between[v]), one.size, one.ratio
+        )
+        out[v] = replace(one, branch=True) if dead else replace(known, error=one.error)
+    return out
 
 
 def _transmitted(
-    m: Mechanism, q: Array, driver: str, output: str | None, circuit: Circuit, unit: float
-) -> tuple[float, float]:
-    """Least transmission angle at the positions and between them."""
-    names, place = m.freedom_names(), m.freedom_names().index(driver)
-    outputs = [m.full_name(output)] if output else frame_outputs(m, driver)
-
-    def least(first: Array, values: Array) -> Array:
+    of: _Circuits,
+    mechanisms: Sequence[Mechanism],
+    driver: str,
+    outputs: list[str],
+    here: Configuration,
+    case: Index,
+    run: Index,
+) -> Array:
+    """Least transmission angles to ``outputs`` at states ``(T,)``, as ``kinetostatics.transmission`` defines them; NaN where a driver
+    holds nothing. States of a ``run`` lie on one branch.
+    """
+    m, out = mechanisms[0], np.full((len(outputs), here.T), np.nan)
+    if any(c.steps for c in m.couplings) or any(pair.type.touching for pair in m.pairs):
+        # forces act along lines of gears, and at points that move
+        names, q = m.freedom_names(), here.system.coordinates_of(here.x)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MechgraphWarning)
-            s = kinematics(
-                m.replace(start=dict(zip(names, first.tolist(), strict=True))), {driver: values}, on_reach="flag"
-            )
-            angles = [transmission(s, name).transmission_angle for name in outputs]
-        return np.asarray(np.min(angles, axis=0))
-
-    if not outputs:
-        return np.nan, np.nan
-    if circuit.defects[0] or circuit.ordered is None:
-        at = [least(q[some[0]], _values(circuit, some, q[:, place], unit)) for some in circuit.groups]
-        return float(np.concatenate(at).min()), np.nan
-    way = unit * circuit.ordered
-    way = way + q[0, place] - way[0]
-    # so many samples; the least value lies between the neighbors of the least one
-    samples = np.sort(np.concatenate([way, np.linspace(way[0], way[-1], 91)]))
-    angles = least(q[0], np.concatenate([way, samples]))
-    near = int(np.argmin(np.nan_to_num(angles[len(way) :], nan=-1.0)))
-    low, high = samples[max(near - 1, 0)], samples[min(near + 1, len(samples) - 1)]
-    between = np.append(angles, least(q[0], np.linspace(low, high, 45)))
-    return float(angles[: len(way)].min()), float(between.min())
-
-
-def _values(circuit: Circuit, some: Index, driven: Array, unit: float) -> Array:
-    """Driver values of states on one branch, counted on from that of the first of them."""
-    values = [place[1] for i in some.tolist() if (place := circuit.places[i]) is not None]
-    return unit * (np.array(values) - values[0]) + driven[some[0]] if values else driven[some]
+            for at in (np.flatnonzero(run == k) for k in dict.fromkeys(run.tolist())):
+                start = dict(zip(names, q[:, at[0]].tolist(), strict=True))
+                one = mechanisms[case[at[0]]].replace(drives=[driver], start=start)
+                held = kinematics(one, {driver: q[names.index(driver), at]}, on_reach="flag")
+                out[:, at] = [transmission(held, name).transmission_angle for name in outputs]
+        return np.asarray(out.min(axis=0))
+    s, r, free = here.system, of.rank, np.delete(np.arange(here.system.n_freedoms), of.column)
+    U, sigma, V = np.linalg.svd(here.J[:, free].transpose(2, 1, 0))
+    sigma = np.where(sigma[:, r - 1 : r] > MODES.generic * sigma[:, :1], sigma[:, :r], np.nan)
+    for i, output in enumerate(s.columns_of(outputs).tolist()):
+        # multipliers of the closure with a unit effort in the output, and self-stresses; least forces, and moments over the size
+        loaded = U[:, np.searchsorted(free, output), :r] / sigma
+        every = np.concatenate([loaded[:, None] @ V[:, :r], V[:, r:]], axis=1)
+        w, p = here.pair_wrenches(every.transpose(2, 1, 0)), here.pair_points
+        w[:3] -= cross(p[:, :, None], w[3:])
+        least = np.concatenate([w[:3] / of.size[case], w[3:]]).transpose(3, 0, 1, 2).reshape(here.T, -1, w.shape[2])
+        y = np.linalg.pinv(np.nan_to_num(least[:, :, 1:])) @ np.nan_to_num(least[:, :, :1])
+        guide = int(s.pair_of_freedom[output])
+        link = s.a[guide] if s.b[guide] == s.graph.frame else s.b[guide]
+        pairs = np.flatnonzero(((s.a == link) | (s.b == link)) & (np.arange(len(s.a)) != guide))
+        w = (w[:, :, 0] - np.einsum("cpst,ts->cpt", w[:, :, 1:], y[..., 0]))[:, pairs]
+        turn = np.broadcast_to(here.S[:3, [output]], w[:3].shape)
+        rates = np.concatenate([turn, here.S[3:, [output]] + cross(turn, p[:, pairs])])
+        does = (np.where(s.b[pairs] == link, 1.0, -1.0)[:, None] * (w * rates).sum(axis=0)).sum(axis=0)
+        w, rates = (np.linalg.norm(v.reshape(2, 3, *v.shape[1:]), axis=1) for v in (w, rates))
+        could = (w * rates).sum(axis=(0, 1))
+        # what wrenches on the output could do for a unit effort, below which nothing is transmitted
+        out[i] = np.arcsin(np.minimum(np.abs(does) / np.where(could > 1e-12, could, np.nan), 1.0))
+    return np.asarray(out.min(axis=0))
 
 
 class Measure:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextvars import copy_context
 from dataclasses import fields, replace
-from functools import cache, partial
+from functools import partial
 from itertools import combinations
 from typing import Any, get_args
 
@@ -32,7 +32,7 @@ from mechgraph.synthesis.answers import (
     joined_answers,
 )
 from mechgraph.synthesis.classes import ClassMember, NoClass, TaskClass
-from mechgraph.synthesis.fitness import Fitness, Measure, fitness, limits_of
+from mechgraph.synthesis.fitness import Fitness, Measure, fitnesses, limits_of
 from mechgraph.synthesis.fits import Fit, FitPoint, Fitted, fitted
 from mechgraph.synthesis.labelling import cognates, motions_of, orbits, symmetries
 from mechgraph.synthesis.solve import (
@@ -250,7 +250,9 @@ class Synthesis:
             "searched" if found.lost or partly else "tested" if found.infinite or found.singular.size else start.word,
             tuple(told),
             condition,
-            Fitnesses([cache(partial(self._fitness, m, q)) for m, q, _ in made]),
+            Fitnesses.at_once(
+                partial(self._fitness, [m for m, _, _ in made], np.array([q for _, q, _ in made])), len(made)
+            ),
             apart,
             (*self.symmetries, *cognates(alike, self.symmetries, motions)),
             tuple(tuple(copies[k]) for k in range(len(values))),
@@ -330,9 +332,8 @@ class Synthesis:
         begin = dict(zip(m.freedom_names(), q[0, :F].tolist(), strict=True))
         return p.first.back(m).replace(start=begin), q[:, :F], p.first.poses_of(here)
 
-    def _fitness(self, m: Mechanism, q: Array) -> Fitness:
-        driver, output = driver_of(m, self.tasks)
-        return fitness(m, q, driver, output)
+    def _fitness(self, made: list[Mechanism], q: Array) -> list[Fitness]:
+        return fitnesses(made, q, *driver_of(self.problem.m, self.tasks))
 
 
 CLOSED_TO = 1e-10
@@ -437,7 +438,7 @@ class FittedSynthesis:
             "searched",
             found.evidence,
             np.array([1.0 / self.fit.margins(here).min() for here in points]),
-            tuple(fitness(m, q, self.driver, self.output, e) for (m, q), e in zip(made, errors, strict=True)),
+            tuple(fitnesses([m for m, _ in made], np.array([q for _, q in made]), self.driver, self.output, errors)),
             driver=self.driver,
         )
 

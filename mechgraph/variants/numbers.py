@@ -597,10 +597,10 @@ def stacked(m: Mechanism, mechanisms: Sequence[Mechanism | None]) -> Variants:
     loads = tuple(_stacked_loads(group) for group in zip(*(other.loads for other in used), strict=True))
     missing = tuple(i for i, ok in enumerate(same) if not ok)
     before = [other.declared for other in used if isinstance(other, SnappedMechanism)]
-    return Variants(m, _side_by_side(used), loads, len(used), missing, _side_by_side(before) if before else None)
+    return Variants(m, side_by_side(used), loads, len(used), missing, side_by_side(before) if before else None)
 
 
-def _side_by_side(mechanisms: Sequence[Mechanism]) -> Declared:
+def side_by_side(mechanisms: Sequence[Mechanism]) -> Declared:
     """The declared numbers of mechanisms as one batch."""
     every = [declared(m) for m in mechanisms]
     return Declared(
