@@ -286,11 +286,13 @@ def follow(
     polish: bool = True,
     laps: int = 1,
     stride: int = 0,
+    enough: Callable[[Tracked], bool] | None = None,
 ) -> Tracked:
     """Tracks from states ``x (nx, V)`` at ``s = 0`` to ``s = 1``, at the end polished; ``tracks`` are their numbers on the leg.
 
     Of several ``laps`` each one follows the ways ``stride`` (else V) numbers further on from where the last one ended. There no track waits
     for others, and the last ones, which may come near to where assemblies meet, are given up where they take twice the steps of all others.
+    Where what has arrived is ``enough``, the others stay on their way.
     """
     V = x.shape[1]
     every, stride = np.arange(V) if tracks is None else tracks, stride or V
@@ -318,6 +320,8 @@ def follow(
         for mask, flag in ((ended, out.arrived), (infinite, out.infinite)):
             flag[march.who[mask]] = True
         out.x[:, march.who], out.s[march.who] = march.x, march.s[0]
+        if enough is not None and ended.any() and enough(out):
+            break
         # smallest step, as part of what is left of the way (of 1e-4 of it at least: steps are short before an end that is nearly singular)
         stuck = (march.h < 1e-7 * np.clip(1.0 - march.s[0], 1e-4, 1.0)) & (march.known >= 0)
         march.keep(~(ended | infinite | stuck))

@@ -297,14 +297,17 @@ class TaskClass:
             norms = p.numbers.with_values(p.places, z).norms.reshape(-1, T)[: of.W]
             x, free = np.concatenate([z, norms, *[states] * of.R]), of.free[i]
             at = np.array([*range(of.u), *(of.head + i * of.F + free)])
+            # Newton steps, until one of all comes to rest there
             for _ in range(40):
                 rows = of.at(goal, x)
                 k = of.counted(rows.residual.shape[1], i)
+                out[i] = np.abs(rows.residual[i][:k]).max(axis=0).min()
+                if out[i] <= MODES.real_closed:
+                    break
                 J = np.concatenate([rows.by_unknowns[i][:k], rows.by_coordinates[i][:k, free]], axis=1)
                 step = np.zeros((of.head + of.R * of.F, T))
                 step[at] = least_norm_steps(J, rows.residual[i][:k], MODES.generic).real
                 x = of.advance(of.state(rows).real, step / np.maximum(1.0, np.abs(step).max(axis=0)))
-            out[i] = np.abs(of.at(goal, x).residual[i][:k]).max(axis=0).min()
         return out
 
     def _by_condition(self, members: Sequence[ClassMember], x: Array) -> Index:

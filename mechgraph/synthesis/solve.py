@@ -23,10 +23,11 @@ import numpy as np
 
 from mechgraph.errors import MechgraphError, counted
 from mechgraph.files import cache_folder, whole_file
+from mechgraph.maths.se3 import Index
 from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
 from mechgraph.modes.family import Array
-from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, Mask, follow, polished
+from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, Mask, Tracked, follow, polished
 from mechgraph.modes.start_sets import (
     MISSED,
     MISSED_AGAIN,
@@ -316,7 +317,8 @@ def ends(
             which = np.repeat(np.arange(len(some)), x.shape[1])
             if not which.size:
                 continue
-            here = follow(of.leg(begin, goals.taken(some), which), np.tile(x, len(some)), care)
+            enough = partial(_enough, of, goals.taken(some), which, N)
+            here = follow(of.leg(begin, goals.taken(some), which), np.tile(x, len(some)), care, enough=enough)
             for j, place in enumerate(some.tolist()):
                 mine, trust = which == j, 2 if run == runs - 1 else min(run, 1)
                 leg = of.leg(begin, goals.taken(np.array([place])))
@@ -339,7 +341,8 @@ def _account(
     arrived = arrived.copy()
     arrived[arrived] = _lead(of, goal, there[:, arrived])
     regular = np.flatnonzero(arrived)
-    known.join(of, goal, there[:, regular], N)
+    # a task in real numbers has with each solution the conjugate one
+    known.join(of, goal, np.concatenate([there[:, regular], there[:, regular].conj()], axis=1), N)
     known.runs += 1
     prints = of.fingerprints(goal, there[:, regular])
     twice = np.delete(prints, distinct(prints), axis=1)
@@ -358,6 +361,19 @@ def _account(
     if known.lost and not arrived.all():
         # further runs go round ends so near that other branch points stay outside
         _tell(of, goal, known, run_tracks(leg, x[:, ~arrived], care, MODES.radius / 10 ** (known.runs - 1)), N, trust)
+
+
+def _enough(of: TaskClass, goals: ClassMember, which: Index, N: int, here: Tracked) -> bool:
+    """Whether all ``N`` solutions of each of some real tasks are among those that have arrived and the conjugate ones."""
+    for j in range(goals.drive.shape[-1]):
+        x = here.x[:, here.arrived & (which == j)]
+        if 2 * x.shape[1] < N:
+            return False
+        prints = of.fingerprints(goals.taken(np.array([j])), np.concatenate([x, x.conj()], axis=1))
+        # they are not polished yet: what is nearer is one, as a real one and its conjugate are
+        if len(distinct(prints, least=np.full(prints.shape[1], 1e-3))) < N:
+            return False
+    return True
 
 
 def _bent(bend: float, s: Array) -> tuple[Array, Array]:
