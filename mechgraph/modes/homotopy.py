@@ -32,7 +32,7 @@ Mask = NDArray[np.bool_]
 
 ENDLESS_STATE = (25.0, 1e5, 1e3)
 """Imaginary part of an angle, length over L, and quaternion from which on an assembly is on its way to infinity."""
-RATES_KEPT = 4
+RATES_KEPT = 3
 """Nodes from whose rates a step is predicted."""
 FIRST_STEP = 0.02
 """The first step of a track, as part of its way."""
@@ -392,20 +392,25 @@ class _March:
     def _ahead(self, h: Array) -> Array:
         """Increments ``(nx, T)`` of the states over steps ``h``: the polynomial through the rates of the last nodes, integrated.
 
-        (Adams and Bashforth with steps of their own; an interpolation of states would carry on what no correction touches.)
+        (Adams and Bashforth with steps of their own; an interpolation of states would carry on what no correction touches.) Beyond it terms
+        go on as the last ones do, in the ratio that fits these best: so they do where a branch point is near.
         """
         widths = [self.s[0] - s for s in self.s[1:]]
         table, out = list(self.v), h * self.v[0]
+        before = term = out
         basis = np.array([np.zeros_like(h), np.ones_like(h)])  # coefficients of tau, lowest first
         for k in range(1, RATES_KEPT):
             gap = [np.where(self.known >= k, self.s[i] - self.s[i + k], 1.0) for i in range(RATES_KEPT - k)]
             table = [(table[i] - table[i + 1]) / gap[i] for i in range(RATES_KEPT - k)]
             powers = h[None] ** np.arange(2, len(basis) + 1)[:, None] / np.arange(2, len(basis) + 1)[:, None]
-            out = out + np.where(self.known >= k, table[0] * (basis[1:] * powers).sum(axis=0), 0.0)
+            before, term = term, np.where(self.known >= k, table[0] * (basis[1:] * powers).sum(axis=0), 0.0)
+            out = out + term
             lifted = np.concatenate([basis * widths[k - 1], np.zeros_like(h)[None]])
             lifted[1:] += basis
             basis = lifted
-        return out
+        ratio = (before.conj() * term).sum(axis=0) / np.maximum((before * before.conj()).real.sum(axis=0), 1e-300)
+        ratio *= np.minimum(1.0, 0.8 / np.maximum(np.abs(ratio), 0.8))
+        return out + term * ratio / (1.0 - ratio)
 
     def again(self, which: Mask) -> Mask:
         """Begin the next lap of some tracks, with a step of length zero, which finds its rates."""

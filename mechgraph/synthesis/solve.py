@@ -371,7 +371,7 @@ def _enough(of: TaskClass, goals: ClassMember, which: Index, N: int, here: Track
             return False
         prints = of.fingerprints(goals.taken(np.array([j])), np.concatenate([x, x.conj()], axis=1))
         # they are not polished yet: what is nearer is one, as a real one and its conjugate are
-        if len(distinct(prints, least=np.full(prints.shape[1], 1e-3))) < N:
+        if len(distinct(prints, least=np.full(prints.shape[1], MODES.real_singular))) < N:
             return False
     return True
 
