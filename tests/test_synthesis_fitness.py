@@ -143,3 +143,19 @@ def test_from_a_dead_point_a_driver_leads_nowhere_and_two_drivers_leave_defects_
     found = fitness(five, np.zeros((2, len(five.freedom_names()))), "A")
     assert (found.branch, found.full_turn) == (None, None)
     assert np.isnan([found.transmission, found.transmission_between]).all()
+
+
+def test_mechanisms_of_one_topology_are_judged_together_as_each_alone() -> None:
+    made, rows = [], []
+    for seed in range(16):
+        known = FourBarFormula(np.random.default_rng(seed))
+        angles = known.angles(3).tolist()
+        if len(angles) == 3:
+            made.append(known.mechanism(angles[0], 1))
+            rows.append(rows_of(made[-1], [known.start(angle, 1) for angle in angles]))
+    together = fitnesses(made, np.array(rows), "O0", "O3")
+    for a, b in zip(together, [fitness(m, q, "O0", "O3") for m, q in zip(made[:3], rows, strict=False)], strict=False):
+        assert (a.branch, a.circuit, a.order, a.full_turn) == (b.branch, b.circuit, b.order, b.full_turn)
+        angles = [[fit.transmission, fit.transmission_between] for fit in (a, b)]
+        assert np.allclose(*angles, atol=1e-5, equal_nan=True)
+    assert {fit.full_turn for fit in together} == {fit.good for fit in together} == {True, False}
