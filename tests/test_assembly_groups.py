@@ -16,11 +16,12 @@ import mechgraph as mg
 from mechgraph.graph.chains import least_order, least_orders
 from mechgraph.kinematics.assembly import closed_start, scaled_start
 from mechgraph.kinematics.state import Configuration, close_all
+from mechgraph.maths.se3 import compose, pose_exp
 from mechgraph.maths.tolerances import ModeTolerances
 from mechgraph.modes import certificate as certificates
 from mechgraph.modes import start_sets
 from mechgraph.modes.assemblies import Question
-from mechgraph.modes.certificate import Ball, certificate, curvature, loop_rows, rows, told_apart
+from mechgraph.modes.certificate import Ball, Moved, certificate, curvature, loop_rows, rows, told_apart
 from mechgraph.modes.family import Family, Labelling
 from mechgraph.modes.homotopy import Care, Equations, Leg, Linear, follow
 from mechgraph.modes.start_sets import MISSED, TrackGroup, kept
@@ -453,17 +454,25 @@ def test_rods_of_balls_are_those_of_the_rows_of_rods(make: object) -> None:
     assert max(opened.rad.max(), turned.rad.max()) < 1e-11
 
 
-def largest_curvature(here: Configuration, rng: np.random.Generator) -> float:
+def placed(here: Configuration, moved: list[Moved], u: np.ndarray) -> Configuration:
+    """Other coordinates, and markers moved along their twists, by ``u``."""
+    s, F = here.system, here.system.n_freedoms
+    markers = [np.array(s.par.marker_a), np.array(s.par.marker_b)]
+    for (pair, side, twist), h in zip(moved, u[F:], strict=True):
+        markers[side][:, :, pair] = compose(pose_exp(h * twist[:, None]), markers[side][:, :, pair])
+    par = replace(s.par, marker_a=markers[0], marker_b=markers[1])
+    return Configuration(s.with_parameters(par) if moved else s, s.advance(here.x, u[:F, None]))
+
+
+def largest_curvature(here: Configuration, rng: np.random.Generator, moved: list[Moved] | None = None) -> float:
     """The largest second derivative along a unit direction that is found, by differences of first ones."""
-    s, h = here.system, 1e-5
-    sides = [
-        [rows(Configuration(s, s.advance(here.x, sign * h * e[:, None])))[1].mid for e in np.eye(s.n_freedoms)]
-        for sign in (1, -1)
-    ]
+    h, moved = 1e-5, moved or []
+    n = here.system.n_freedoms + len(moved)
+    sides = [[rows(placed(here, moved, sign * h * e), moved)[1].mid for e in np.eye(n)] for sign in (1, -1)]
     T = np.stack([(a - b) / (2 * h) for a, b in zip(*sides, strict=True)], axis=2)
     T, best = 0.5 * (T + T.transpose(0, 2, 1)), 0.0
     for _ in range(10):
-        u = rng.normal(size=s.n_freedoms)
+        u = rng.normal(size=n)
         for _ in range(30):
             v = np.einsum("rij,i,j->r", T, u, u)
             w, V = np.linalg.eigh(np.einsum("rij,r->ij", T, v / np.linalg.norm(v)))
@@ -482,6 +491,24 @@ def test_second_derivatives_do_not_pass_their_bound(monkeypatch: pytest.MonkeyPa
         found.append(scaled_start(ring(letters, arm * points, axes)))
     for here in found:
         assert largest_curvature(here, rng) <= curvature(here) * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("name", ["rssr", "four-bar", "rcsr-csr"])
+def test_markers_that_may_move_open_loops_as_fast_as_differences_say(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(certificates, "MODES", ModeTolerances(ball=1e-9))
+    rng, h = np.random.default_rng(1), 1e-6
+    here = scaled_start(mg.load(name))
+    moved = [Moved(k, side, twist) for k in (1, 2) for side in (0, 1) for twist in (np.eye(6)[3], np.eye(6)[4])]
+    moved.append(Moved(0, 1, np.array([0.0, 0.6, 0.8, 0.3, 0.1, -0.2])))
+    A, F = rows(here, moved)[1], here.system.n_freedoms
+    assert np.abs(A.mid[:, :F] - here.J[:, :, 0]).max() < 1e-12
+    for k in range(len(moved)):
+        u = h * np.eye(F + len(moved))[F + k]
+        opened = [rows(placed(here, moved, sign * u), moved)[0].mid for sign in (1, -1)]
+        assert (opened[0] - opened[1]) / (2 * h) == pytest.approx(A.mid[:, F + k], abs=1e-8)
+    assert largest_curvature(here, rng, moved) <= curvature(here, moved) * (1 + 1e-6)
 
 
 def test_roots_are_apart_where_their_balls_are() -> None:

@@ -33,12 +33,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from mechgraph.kinematics.state import Configuration
-from mechgraph.maths.se3 import Index, cross, rotate
+from mechgraph.maths.se3 import Index, cross, move_twist, rotate
 from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
 from mechgraph.modes.family import Array, Family
@@ -106,6 +106,14 @@ class Open(ValueError):
     """A loop has pairs for which there is no ball arithmetic."""
 
 
+class Moved(NamedTuple):
+    """A marker, of a pair on a side (0 or 1), that may move along a unit twist ``(6,)`` in the frame of its link."""
+
+    pair: int
+    side: int
+    twist: Array
+
+
 def rod_row(here: Configuration, rod: int) -> tuple[Ball, Ball]:
     """Of a rod at one position ``((p_b - p_a)^2 - l^2) / 2 (1,)`` and its derivatives by the freedoms between its bodies ``(1, n)``.
 
@@ -122,17 +130,18 @@ def rod_row(here: Configuration, rod: int) -> tuple[Ball, Ball]:
     return walk.distance(k.at_a[:, rod, 0], k.at_b[:, rod, 0], k.squares[rod, 0])
 
 
-def loop_rows(here: Configuration, loop: int) -> tuple[Ball, Ball]:
+def loop_rows(here: Configuration, loop: int, moved: Sequence[Moved] = ()) -> tuple[Ball, Ball]:
     """Of a loop at one position ``f (width,)`` by which it is open, about its middle, and its derivatives by its freedoms ``(width, n)``.
 
-    ``f = (vee (R - R^T) / 2, p)`` and ``f' = (w + vee part of w x (R - 1), v + w x p)`` for a twist ``(w, v)``.
+    ``f = (vee (R - R^T) / 2, p)`` and ``f' = (w + vee part of w x (R - 1), v + w x p)`` for a twist ``(w, v)``. Behind the freedoms stand
+    all markers that may move, zero where the loop does not pass them.
 
     Raises
     ------
     Open
         where a pair is no product of screws and rotations.
     """
-    walk = _Walk(here, here.middles[:, loop, 0])
+    walk = _Walk(here, here.middles[:, loop, 0], moved)
     for pair, sign in here.system.graph.loops[loop]:
         walk.along(pair, sign)
     f, A = walk.rows()
@@ -142,10 +151,11 @@ def loop_rows(here: Configuration, loop: int) -> tuple[Ball, Ball]:
 class _Walk:
     """Along a loop: the ``pose`` reached, and the twists of the freedoms passed, about ``middle`` in outer directions."""
 
-    def __init__(self, here: Configuration, middle: Array) -> None:
-        self.here, self.system, self.middle = here, here.system, middle
+    def __init__(self, here: Configuration, middle: Array, moved: Sequence[Moved] = ()) -> None:
+        self.here, self.system, self.middle, self.moved = here, here.system, middle, moved
         self.pose: Ball | None = None
         self.twists: list[Ball] = []
+        self.of_markers = [exact(np.zeros((6, 1)))] * len(moved)
 
     def along(self, pair: int, sign: int) -> None:
         """One pair, from its link a to b or back; its twists are kept in the order of its freedoms either way."""
@@ -158,6 +168,7 @@ class _Walk:
         if sign < 0:
             ends = ends[::-1]
             steps = [(_inverse(step), -unit) for step, unit in steps[::-1]]
+        self._mark(pair, (1 - sign) // 2, 1.0)
         self.pose, passed = self.pose @ ends[0], []
         for step, unit in steps:
             if sign > 0:
@@ -166,7 +177,14 @@ class _Walk:
             if sign < 0:
                 passed.append(self._outside(unit))
         self.pose = self.pose @ _inverse(ends[1])
+        self._mark(pair, (1 + sign) // 2, -1.0)
         self.twists += passed[::sign]
+
+    def _mark(self, pair: int, side: int, sign: float) -> None:
+        """Twists of the markers of a pair on a side, in the frame reached, which is that of their link."""
+        for k, marker in enumerate(self.moved):
+            if marker[:2] == (pair, side):
+                self.of_markers[k] = self._outside(sign * marker.twist[:, None])
 
     def _steps(self, pair: int) -> list[tuple[Ball, Array]]:
         """Motions of the factors of a pair, with unit twists ``(6, n)`` in the frame before each."""
@@ -215,7 +233,8 @@ class _Walk:
         return Ball(0.5 * f.mid, 0.5 * f.rad), d @ (S[3:] - crossed(b, S[:3]))
 
     def _columns(self) -> Ball:
-        return Ball(*(np.concatenate([getattr(t, part) for t in self.twists], axis=1) for part in ("mid", "rad")))
+        twists = [*self.twists, *self.of_markers]
+        return Ball(*(np.concatenate([getattr(t, part) for t in twists], axis=1) for part in ("mid", "rad")))
 
 
 def _stacked(*balls: Ball) -> Ball:
@@ -294,15 +313,18 @@ class Certificate:
 
 def certificate(here: Configuration, free: Index, passive: int, by_structure: bool) -> Certificate | None:
     """The certificate of a state; None where a pair is no product of screws and rotations."""
-    s = here.system
     try:
         f, A = rows(here)
     except Open:
         return None
-    A, rank = A[:, free], len(free) - passive
+    return root_near(f, A[:, free], len(free) - passive, curvature(here), by_structure, float(here.closure[0]))
+
+
+def root_near(f: Ball, A: Ball, rank: int, K: float, by_structure: bool, residual: float) -> Certificate:
+    """The certificate of rows ``f (n,)``, of which so many are independent, with derivatives ``A (n, k)`` and second ones below ``K``."""
     U, sigma, Vt = np.linalg.svd(A.mid)
-    how, residual = "structure" if by_structure else "checked", float(here.closure[0])
-    dependent, off = s.n_rows - rank, np.inf
+    how = "structure" if by_structure else "checked"
+    dependent, off = len(f.mid) - rank, np.inf
     # smallest singular value, as part of the largest, below which nothing is tried
     if not rank or sigma[rank - 1] > 1e-13 * sigma[0]:
         Y, independent = exact(np.diag(1.0 / sigma[:rank])), exact(U[:, :rank].T)
@@ -313,7 +335,7 @@ def certificate(here: Configuration, free: Index, passive: int, by_structure: bo
         return Certificate(False, np.inf, np.inf, 0.0, rank, dependent, "checked", residual)
     beta = MODES.bound_rounding / (sigma[rank - 1] * (1.0 - off)) if rank else 0.0
     eta = MODES.bound_rounding * float(np.linalg.norm((Y @ (independent @ f)).bound)) / (1.0 - off)
-    K = MODES.bound_rounding * curvature(here)
+    K = MODES.bound_rounding * K
     h = beta * K * eta
     proved = bool(h <= 0.5)
     error = float((1 - np.sqrt(1 - 2 * h)) / (beta * K)) if proved and h > 0 else float(eta)
@@ -347,14 +369,19 @@ def told_apart(family: Family, x: Array, sure: Sequence[Certificate | None]) -> 
     return out
 
 
-def rows(here: Configuration) -> tuple[Ball, Ball]:
-    """What rows leave open ``(n,)`` and their derivatives ``(n, F)``, with bounds of their rounding; those of couplings are linear."""
+def rows(here: Configuration, moved: Sequence[Moved] = ()) -> tuple[Ball, Ball]:
+    """What rows leave open ``(n,)`` and their derivatives ``(n, F)``, with bounds of their rounding; those of couplings are linear.
+
+    Behind the freedoms stand the markers that may move.
+    """
     s = here.system
-    J, size = here.J[:, :, 0], np.abs(here.J[:, :, 0])
+    J = np.pad(here.J[:, :, 0], ((0, 0), (0, len(moved))))
+    size, markers = np.abs(J), np.arange(s.n_freedoms, J.shape[1])
     largest = s.n_freedoms * (1.0 + size.sum(axis=1) * np.abs(here.x).max(initial=1.0))
     f, A = Ball(here.residual[:, 0].copy(), STORED * largest), Ball(J.copy(), STORED * size)
     for loop, (columns, _) in enumerate(s.loop_columns):
-        _put(f, A, slice(s.graph.width * loop, s.graph.width * (loop + 1)), columns, loop_rows(here, loop))
+        at = slice(s.graph.width * loop, s.graph.width * (loop + 1))
+        _put(f, A, at, np.append(columns, markers), loop_rows(here, loop, moved))
     if isinstance(s, RodSystem):
         for rod, columns in enumerate(_columns_of_rods(s)):
             row = s.graph.loop_rows + rod
@@ -375,11 +402,15 @@ def _columns_of_rods(s: RodSystem) -> list[Index]:
     return [np.concatenate([np.arange(first[k], first[k + 1]) for k, _ in way]) for way in ways]
 
 
-def curvature(here: Configuration) -> float:
+def curvature(here: Configuration, moved: Sequence[Moved] = ()) -> float:
     """A bound of the second derivatives of the rows of all loops and rods within ``MODES.ball``."""
     s, S, total = here.system, here.S[:, :, 0], 0.0
+    ends = [here.poses[:, :, (s.a, s.b)[side][pair]] for pair, side, _ in moved]
+    S = np.concatenate([S, *(move_twist(X, one.twist[:, None]) for X, one in zip(ends, moved, strict=True))], axis=1)
     for loop, (columns, _) in enumerate(s.loop_columns):
-        turn, arm, grown = _sizes(S[:, columns], here.middles[:, loop, 0])
+        passed = {pair for pair, _ in s.graph.loops[loop]}
+        markers = s.n_freedoms + np.flatnonzero([one.pair in passed for one in moved])
+        turn, arm, grown = _sizes(S[:, np.append(columns, markers)], here.middles[:, loop, 0])
         gap = MODES.ball * grown * np.sqrt((turn**2 + arm**2).sum())
         h2 = turn**2 + (grown * arm + turn * gap) ** 2
         total += 2.0 * float((turn**2).sum() * h2.sum())

@@ -17,6 +17,7 @@ from mechgraph.maths.se3 import Array
 from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.assemblies import weakest
+from mechgraph.modes.certificate import Certificate
 from mechgraph.quantities import items_of, place_among, real_array, wrong
 from mechgraph.synthesis.fitness import Fitness, keeps
 from mechgraph.synthesis.labelling import Symmetry
@@ -44,10 +45,10 @@ class Degenerate:
     text: str
 
 
-class Fitnesses(Sequence[Fitness]):
-    """Fitness of mechanisms, found when first asked for."""
+class Fitnesses(Sequence[Any]):
+    """Fitness, or certificates, of mechanisms, found when first asked for."""
 
-    def __init__(self, makers: Sequence[Callable[[], Fitness]]) -> None:
+    def __init__(self, makers: Sequence[Callable[[], Any]]) -> None:
         self._makers = tuple(makers)
 
     def __len__(self) -> int:
@@ -57,7 +58,7 @@ class Fitnesses(Sequence[Fitness]):
         return tuple(make() for make in self._makers[i]) if isinstance(i, slice) else self._makers[i]()
 
     @classmethod
-    def at_once(cls, find: Callable[[], Sequence[Fitness]], count: int) -> Fitnesses:
+    def at_once(cls, find: Callable[[], Sequence[Any]], count: int) -> Fitnesses:
         """Those that are found together."""
         found = cache(find)
         return cls([partial(lambda k: found()[k], i) for i in range(count)])
@@ -94,6 +95,7 @@ class SynthesesData:
     fitness: tuple[Fitness, ...]
     rejected: Annotated[tuple[tuple[str, ...], ...], "of every mechanism that was left out, why"]
     mechanism_of: Annotated[tuple[str, ...], "of chains: of every mechanism the one that it comes from"] = ()
+    certificates: Annotated[tuple[Certificate | None, ...], "of every mechanism, where there is one; none of fits"] = ()
 
 
 @dataclass(frozen=True, repr=False)
@@ -132,8 +134,13 @@ class Syntheses(Shown, Sequence[Mechanism]):
         As many as are published for such tasks, and all tracks arrived; a trace test passed, and none was lost; or neither.
     evidence : tuple of str
         The reasons, with numbers.
+    kinds : tuple of str
+        Of each ``"regular"``, or ``"fit"``.
     condition : (n,) array
         Condition numbers of the unknowns in the conditions.
+    certificates : sequence
+        Of each what is proved of it, found when first asked for: a mechanism that does what is asked exactly lies within ``error``, and no
+        other within ``radius`` (radians, lengths over L), see ``Certificate``. None of fits, and where rates or factors are asked.
     fitness : sequence
         Of each, see ``Fitness``; found when first asked for.
     rejected : tuple
@@ -177,6 +184,12 @@ class Syntheses(Shown, Sequence[Mechanism]):
     rejected: tuple[RejectedAnswer, ...] = ()
     sources: tuple[Mechanism, ...] = ()
     driver: str | None = None
+    certificates: Sequence[Certificate | None] = ()
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Of each ``"regular"``, or ``"fit"``."""
+        return ("fit" if self.total is None else "regular",) * len(self)
 
     @property
     def mechanism_of(self) -> tuple[Mechanism, ...]:
@@ -228,6 +241,7 @@ class Syntheses(Shown, Sequence[Mechanism]):
             mechanisms=tuple(self.mechanisms[i] for i in k),
             sources=tuple(self.sources[i] for i in k if self.sources),
             fitness=Fitnesses([partial(self.fitness.__getitem__, i) for i in k]),
+            certificates=Fitnesses([partial(self.certificates.__getitem__, i) for i in k if self.certificates]),
             **{name: getattr(self, name)[k] for name in ("values", "poses", "coordinates", "residual", "condition")},
         )
 
@@ -371,6 +385,7 @@ class Syntheses(Shown, Sequence[Mechanism]):
             tuple(self.fitness),
             tuple(one.reasons for one in self.rejected),
             tuple(m.name for m in self.sources),
+            tuple(self.certificates),
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -485,6 +500,7 @@ def joined_answers(found: Sequence[Syntheses], told: Sequence[str]) -> Syntheses
         tuple(one for s in found for one in s.rejected),
         tuple(s.mechanism for s in found for _ in s),
         found[0].driver,
+        Fitnesses([partial(s.certificates.__getitem__, k) for s in found for k in range(len(s.certificates))]),
     )
     return out._sorted
 

@@ -73,7 +73,7 @@ class TaskClass:
     """Equations of a class of tasks, as ``modes.homotopy`` follows them: states are the unknowns ``z (u,)`` and those of all rows.
 
     ``free[i]`` are the freedoms of row ``i`` of which nothing is asked; rows of equal shape are eliminated together, in ``blocks``;
-    ``conditions (R,)`` are left for the unknowns.
+    ``conditions (R,)`` are left for the unknowns; solutions are one where ``fingerprints`` are less ``apart``, against their size.
 
     Raises
     ------
@@ -81,6 +81,7 @@ class TaskClass:
     """
 
     idle = 0
+    apart = MODES.one_assembly
 
     def __init__(self, problem: RowProblem, rng: np.random.Generator) -> None:
         self.whole = problem

@@ -323,6 +323,7 @@ def placed(of: TaskClass, member: ClassMember, z: Array, rng: np.random.Generato
 def by_motions(of: TaskClass) -> TaskClass:
     """The class with solutions that do the same as one."""
     out = copy(of)
+    out.apart = MODES.real_singular
     vars(out)["fingerprints"] = partial(motions_of, of)
     return out
 

@@ -52,11 +52,12 @@ class TaskStart:
     """All solutions ``x (nx, N)`` known of a task of a class, and what that they are all rests on (see ``modes.start_sets.StartSet``).
 
     ``source``: who published that there are so many, for sets that came with the package. Of a large set ``x`` has one of
-    ``each`` solutions that do the same. ``against``: how many fail some of what is asked, see ``doing_all``.
+    ``each`` solutions that do the same; ``alike (nx, N, k)`` are these, but for exchanges of pairs, as far as they are known.
+    ``against``: how many fail some of what is asked, see ``doing_all``.
     """
 
     member: ClassMember
-    x: Array
+    alike: Array
     loops: int
     chance: float
     lost: int
@@ -65,6 +66,11 @@ class TaskStart:
     source: str = ""
     each: int = 1
     against: int = 0
+
+    @property
+    def x(self) -> Array:
+        """One of all that do the same."""
+        return self.alike[:, :, 0]
 
     @property
     def total(self) -> int:
@@ -171,13 +177,13 @@ def start_set(
     known = group.quiet, group.chance
     group.move(*tame(of, group.base, group.x, rng))
     if source and group.x.shape[1] == most:
-        return TaskStart(group.base, group.x, *known, group.lost, group.followed, NOT_PASSED, source)
+        return TaskStart(group.base, group.x[:, :, None], *known, group.lost, group.followed, NOT_PASSED, source)
     trace = trace_test(of, group.base, group.x, rng, progress, TaskPencil) if known[1] <= MISSED else NOT_PASSED
     if not trace.passed:
         group.grow(MISSED_AGAIN, rng, progress)
         known = group.quiet, group.chance
         trace = trace_test(of, group.base, group.x, rng, progress, TaskPencil) if known[1] <= MISSED_AGAIN else trace
-    return TaskStart(group.base, group.x, *known, group.lost, group.followed, trace)
+    return TaskStart(group.base, group.x[:, :, None], *known, group.lost, group.followed, trace)
 
 
 def _of_each(
@@ -190,11 +196,14 @@ def _of_each(
     followed, n = by_motions(of), 4
     tasks, told = [group.base, *of.random_members(rng, n - 1)], followed.fingerprints(group.base, group.x)
     x, prints = ([v[:, distinct(told)], *[v[:, :0]] * (n - 1)] for v in (group.x, told))
-    met = {(a, b): set[int]() for a in range(n) for b in range(n) if a != b}
+    ways = [(a, b) for a in range(n) for b in range(n) if a != b]
+    # where each one leads, and all that came to where each one is
+    to: dict[tuple[int, int], dict[int, int]] = {way: {} for way in ways}
+    came = [[v[:, [k]] for k in range(v.shape[1])] for v in x]
     lost, tracks = group.lost, group.followed
-    while (longest := max((x[a].shape[1] - len(done), a, b) for (a, b), done in met.items()))[0]:
+    while (longest := max((x[a].shape[1] - len(to[a, b]), a, b) for a, b in ways))[0]:
         left, a, b = longest
-        todo = np.setdiff1d(np.arange(x[a].shape[1]), list(met[a, b]))[:TRACKS_TOGETHER]
+        todo = np.setdiff1d(np.arange(x[a].shape[1]), list(to[a, b]))[:TRACKS_TOGETHER]
         if progress is not None:
             progress(f"{[v.shape[1] for v in x]} solutions of {n} random tasks so far, {left} tracks to the next")
         tracked = follow(of.leg(tasks[a], tasks[b]), x[a][:, todo], Care())
@@ -202,14 +211,71 @@ def _of_each(
         found = followed.fingerprints(tasks[b], there)
         new = distinct(found, prints[b])
         x[b], prints[b] = (np.concatenate(v, axis=1) for v in ((x[b], there[:, new]), (prints[b], found[:, new])))
+        came[b] += [there[:, :0]] * len(new)
         place = [int(np.abs(prints[b] - one[:, None]).max(axis=0).argmin()) for one in found.T]
-        met[a, b].update(todo.tolist())
-        met[b, a].update(place)
+        to[a, b] |= dict.fromkeys(todo.tolist(), -1) | dict(zip(todo[tracked.arrived].tolist(), place, strict=True))
+        to[b, a] |= dict(zip(place, todo[tracked.arrived].tolist(), strict=True))
+        for k, state in zip(place, there.T[:, :, None], strict=True):
+            came[b][k] = np.concatenate([came[b][k], state], axis=1)
         lost, tracks = lost + len(todo) - len(place), tracks + len(todo)
     N = [v.shape[1] for v in x]
     chance = (1.0 / (N[0] + 1) + lost / tracks) ** 3 if len(set(N)) == 1 else 1.0
-    known = (source, most // N[0]) if N[0] == max(N) and most % N[0] == 0 else ("", 1)
-    return TaskStart(group.base, x[0], 3, chance, lost, tracks, NOT_PASSED, *known)
+    if N[0] != max(N) or most % N[0]:
+        return TaskStart(group.base, x[0][:, :, None], 3, chance, lost, tracks, NOT_PASSED)
+    each = most // N[0]
+    alike = _alike(of, tasks, to, came, each // (1 + len(symmetries(of.whole))), progress)
+    return TaskStart(group.base, alike, 3, chance, lost, tracks, NOT_PASSED, source, each)
+
+
+def _alike(
+    of: TaskClass,
+    tasks: list[ClassMember],
+    to: dict[tuple[int, int], dict[int, int]],
+    came: list[list[Array]],
+    K: int,
+    progress: Progress,
+) -> Array:
+    """States ``(nx, N, K)`` that do the same as solutions of the first of some tasks, and that no exchange makes of each other.
+
+    Of ``came`` to a task from others, whatever way, what does the same leads to what does the same: to the first task, and where nothing
+    new comes there to the others. ``to``: where every solution leads; ``K`` may be fewer where tracks are lost.
+    """
+    exchanges, gone = symmetries(of.whole), {way: dict[int, int]() for way in to}
+
+    def joined(known: Array, states: Array) -> Array:
+        """What is known with those among ``states (nx, n)`` that no exchange makes of it."""
+        for x in states.T[:, :, None]:
+            z = known[: of.u]
+            z = np.concatenate([z, *(z[np.argsort(one.places)] for one in exchanges)], axis=1)
+            known = np.concatenate([known, x[:, distinct(x[: of.u], z)]], axis=1)
+        return known
+
+    known = [[joined(states[:, :1], states[:, 1:]) for states in arrived] for arrived in came]
+
+    def left(a: int, b: int) -> list[int]:
+        """Solutions of which some lead from one task to another where some are missing; one alone has come or gone."""
+        return [
+            k
+            for k, j in to[a, b].items()
+            if j >= 0 and known[a][k].shape[1] > gone[a, b].get(k, 1) and known[b][j].shape[1] < K
+        ]
+
+    while any(v.shape[1] < K for v in known[0]):
+        ways = ((a, b, left(a, b)) for a, b in sorted(to, key=lambda way: way[1] > 0))
+        a, b, some = next((way for way in ways if way[2]), (0, 0, []))
+        if not some:
+            break
+        some = some[: TRACKS_TOGETHER // K]
+        if progress is not None:
+            progress(f"{sum(v.shape[1] for v in known[0])} of {len(known[0]) * K} solutions that do the same")
+        begin = [known[a][k][:, gone[a, b].get(k, 0) :] for k in some]
+        tracked = follow(of.leg(tasks[a], tasks[b]), np.concatenate(begin, axis=1), Care())
+        of_which = np.repeat(some, [v.shape[1] for v in begin])
+        for k in some:
+            gone[a, b][k] = known[a][k].shape[1]
+            known[b][to[a, b][k]] = joined(known[b][to[a, b][k]], tracked.x[:, (of_which == k) & tracked.arrived])
+    K = min(v.shape[1] for v in known[0])
+    return np.stack([v[:, :K] for v in known[0]], axis=1)
 
 
 # --- kept in a folder ----------------------------------------------------------------------------------------------------
@@ -233,17 +299,18 @@ def _read(labelling: TaskLabelling, file: Path, prefix: str) -> TaskStart | None
             chance, last, beyond = f[prefix + "sizes"].tolist()
             source = str(f[prefix + "source"])
             vectors = {name: f[prefix + name] for name in MARKER}
-            each, stored = int(f[prefix + "each"]), f[prefix + "x"]
+            (each, K), stored = np.append(f[prefix + "each"], 1)[:2].tolist(), f[prefix + "x"]
             if not np.iscomplexobj(stored):
                 stored = stored.astype(float) @ [1.0, 1.0j]
                 stored[:, f[prefix + "exactly"]] = f[prefix + "exact"]
             member, x = labelling.taken(vectors, f[prefix + "drive"], stored)
+        alike = x.reshape(len(x), -1, K)
         # digits that were left out come back
-        of, tracks = labelling.of, np.zeros(x.shape[1], dtype=np.intp)
-        x, closed = polished(of.leg(member, member), x, 1.0, tracks)
+        of, tracks = labelling.of, np.zeros(alike.shape[1], dtype=np.intp)
+        alike[:, :, 0], closed = polished(of.leg(member, member), alike[:, :, 0], 1.0, tracks)
         trace = Trace(degree, samples, last, beyond)
-        found = TaskStart(member, x, loops, chance, lost, followed, trace, source, each)
-        here = of.at(member, x)
+        found = TaskStart(member, alike, loops, chance, lost, followed, trace, source, each)
+        here = of.at(member, found.x)
         size = np.maximum(1.0, np.abs(here.here.poses).max())
         return found if closed.all() and of.error(here).max() < MODES.member_closed * size else None
     except (OSError, ValueError, KeyError, IndexError, EOFError, RuntimeError, zipfile.BadZipFile, TypeError):
@@ -254,8 +321,13 @@ def arrays(labelling: TaskLabelling, start: TaskStart) -> dict[str, Any]:
     """A start set as arrays by name."""
     sizes = np.array([start.chance, start.trace.last, start.trace.beyond])
     counts = np.array([start.loops, start.lost, start.followed, start.trace.degree, start.trace.samples])
-    told = {"sizes": sizes, "counts": counts, "source": np.array(start.source), "each": np.array(start.each)}
-    return labelling.ordered(start.member, start.x) | told
+    told = {
+        "sizes": sizes,
+        "counts": counts,
+        "source": np.array(start.source),
+        "each": np.array([start.each, start.alike.shape[2]]),
+    }
+    return labelling.ordered(start.member, start.alike.reshape(len(start.x), -1)) | told
 
 
 def _keep(of: TaskClass, start: TaskStart) -> None:
@@ -283,9 +355,13 @@ class TaskEnds:
     runs: int
 
     def join(self, of: TaskClass, goal: ClassMember, there: Array, tracks: int) -> None:
-        """Put regular ends ``(nx, n)`` of some of all ``tracks`` to those that are known."""
-        new = distinct(of.fingerprints(goal, there), of.fingerprints(goal, self.x))
-        self.x = np.concatenate([self.x, there[:, new]], axis=1)
+        """Put regular ends ``(nx, n)`` of some of all ``tracks``, and their conjugates, to those that are known."""
+        # a task in real numbers has with each solution the conjugate one; these differ from others known by the noise of both
+        for states, apart in ((there, of.apart), (there.conj(), MODES.real_singular)):
+            if self.x.shape[1] < tracks:
+                least = np.full(states.shape[1], apart)
+                new = distinct(of.fingerprints(goal, states), of.fingerprints(goal, self.x), least)
+                self.x = np.concatenate([self.x, states[:, new]], axis=1)
         # what another run or way finds was wrongly told at infinity or singular
         left = max(tracks - self.x.shape[1], 0)
         self.singular = self.singular[:, :left]
@@ -317,7 +393,7 @@ def ends(
             which = np.repeat(np.arange(len(some)), x.shape[1])
             if not which.size:
                 continue
-            enough = partial(_enough, of, goals.taken(some), which, N)
+            enough = partial(_enough, of, goals.taken(some), which, N, [0])
             here = follow(of.leg(begin, goals.taken(some), which), np.tile(x, len(some)), care, enough=enough)
             for j, place in enumerate(some.tolist()):
                 mine, trust = which == j, 2 if run == runs - 1 else min(run, 1)
@@ -341,8 +417,7 @@ def _account(
     arrived = arrived.copy()
     arrived[arrived] = _lead(of, goal, there[:, arrived])
     regular = np.flatnonzero(arrived)
-    # a task in real numbers has with each solution the conjugate one
-    known.join(of, goal, np.concatenate([there[:, regular], there[:, regular].conj()], axis=1), N)
+    known.join(of, goal, there[:, regular], N)
     known.runs += 1
     prints = of.fingerprints(goal, there[:, regular])
     twice = np.delete(prints, distinct(prints), axis=1)
@@ -363,8 +438,15 @@ def _account(
         _tell(of, goal, known, run_tracks(leg, x[:, ~arrived], care, MODES.radius / 10 ** (known.runs - 1)), N, trust)
 
 
-def _enough(of: TaskClass, goals: ClassMember, which: Index, N: int, here: Tracked) -> bool:
-    """Whether all ``N`` solutions of each of some real tasks are among those that have arrived and the conjugate ones."""
+def _enough(of: TaskClass, goals: ClassMember, which: Index, N: int, seen: list[int], here: Tracked) -> bool:
+    """Whether all ``N`` solutions of each of some real tasks are among those that have arrived and the conjugate ones.
+
+    ``seen``: how many had arrived when that was last looked at; to look takes as long as many steps, where there are hundreds.
+    """
+    arrived = int(here.arrived.sum())
+    if 20 * arrived < 21 * seen[0]:
+        return False
+    seen[0] = arrived
     for j in range(goals.drive.shape[-1]):
         x = here.x[:, here.arrived & (which == j)]
         if 2 * x.shape[1] < N:
@@ -474,23 +556,51 @@ def start_of(of: TaskClass, rng: np.random.Generator, cache: bool, progress: Pro
 
 
 def unfolded(
-    of: TaskClass, start: TaskStart, goal: ClassMember, found: TaskEnds, rng: np.random.Generator
+    of: TaskClass, start: TaskStart, goal: ClassMember, found: TaskEnds, rng: np.random.Generator, progress: Progress
 ) -> tuple[Array, int]:
-    """Solutions ``(nx, n)`` of a task with exchanges of those that may be real, where they move in real directions; and of how many real
-    ones an exchange did not close.
+    """Solutions ``(nx, n)`` of a task with all that do the same as the real ones, and how many of these were not found.
+
+    What leads from one to another that does the same leads real ones to real ones, where its coefficients are real, and no others to these.
     """
     if start.each == 1:
         return found.x, 0
-    may = np.abs(motions_of(of, goal, found.x).imag).max(axis=0, initial=0.0) < MODES.real_singular
-    swapped = [found.x[: of.u, may][np.argsort(one.places)] for one in symmetries(of.whole)]
-    if not swapped or not may.any():
-        return found.x, 0
-    z = np.concatenate(swapped, axis=1)
-    x, closed = placed(of, goal, z, rng, np.tile(found.x[:, may], len(swapped)))
-    open_ = z[:, ~closed]
-    size = np.maximum(1.0, np.abs(open_).max(axis=0, initial=1.0))
-    missing = int((np.abs(open_.imag).max(axis=0, initial=0.0) < MODES.real_singular * size).sum())
-    return np.concatenate([found.x, x[:, closed]], axis=1), missing
+    real = _imaginary(found.x[: of.u]) < MODES.real_singular
+    x, exchanges = alike_at(of, start, goal, found.x[:, real], progress), symmetries(of.whole)
+    swapped = [x[: of.u][np.argsort(one.places)] for one in exchanges]
+    if swapped and x.size:
+        turned, closed = placed(of, goal, np.concatenate(swapped, axis=1), rng, np.tile(x, len(swapped)))
+        x = np.concatenate([x, turned[:, closed]], axis=1)
+    return np.concatenate([found.x[:, ~real], x], axis=1), int(real.sum()) * start.each - x.shape[1]
+
+
+def _imaginary(values: Array) -> Array:
+    """Imaginary parts ``(n,)`` of numbers ``(k, n)``, the largest of each column against its size."""
+    size = np.maximum(1.0, np.abs(values).max(axis=0, initial=1.0))
+    return np.asarray(np.abs(values.imag).max(axis=0, initial=0.0) / size)
+
+
+def alike_at(of: TaskClass, start: TaskStart, goal: ClassMember, x: Array, progress: Progress) -> Array:
+    """Solutions ``x (nx, n)`` of a task, or exchanges of them, with those that do the same: these lead to the start set, and what does the
+    same there leads back.
+    """
+    K, told = start.alike.shape[2], motions_of(of, start.member, start.x)
+    if progress is not None and K > 1:
+        progress(f"{counted(x.shape[1], 'solution')}, and those that do the same")
+    out, left = [x[:, :0]], x
+    for bend in (0.0, 0.1, -0.1, 0.3, -0.3) if K > 1 else ():
+        if not left.shape[1]:
+            break
+        begun = follow(of.leg(goal, start.member), left, Care(), partial(_bent, bend))
+        at = [int(np.abs(told - one[:, None]).max(axis=0).argmin()) for one in motions_of(of, start.member, begun.x).T]
+        some = start.alike[:, at].reshape(len(x), -1)
+        some, closed = polished(of.leg(start.member, start.member), some, 1.0, np.zeros(some.shape[1], dtype=np.intp))
+        there = follow(of.leg(start.member, goal), some, Care(), partial(_bent, -bend))
+        apart = np.abs(motions_of(of, goal, there.x) - np.repeat(motions_of(of, goal, left), K, axis=1)).max(axis=0)
+        same = closed & there.arrived & (apart < MODES.real_singular)
+        good = begun.arrived & same.reshape(-1, K).all(axis=1)
+        out.append(there.x[:, np.repeat(good, K)])
+        left = left[:, ~good]
+    return np.concatenate([*out, left], axis=1)
 
 
 # --- real solutions ------------------------------------------------------------------------------------------------------

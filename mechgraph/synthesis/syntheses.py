@@ -31,6 +31,7 @@ from mechgraph.synthesis.answers import (
     SynthesesOver,
     joined_answers,
 )
+from mechgraph.synthesis.certified import certificates
 from mechgraph.synthesis.classes import ClassMember, NoClass, TaskClass
 from mechgraph.synthesis.fitness import Fitness, Measure, fitnesses, limits_of
 from mechgraph.synthesis.fits import Fit, FitPoint, Fitted, fitted
@@ -172,7 +173,7 @@ class Synthesis:
     def _answer(self, start: TaskStart, apart: int, goal: ClassMember, found: TaskEnds, i: int) -> Syntheses:
         """The answer to the task numbered ``i``; ``apart``: how many solutions of the start set no symmetry makes of others."""
         p, of = self.problem, self.of.full
-        every, missing = unfolded(self.of, start, goal, found, self.rng)
+        every, missing = unfolded(self.of, start, goal, found, self.rng, self.progress)
         does = doing_all(self.of, goal, every)
         every, failing = every[:, does], max(int((~does).sum()) - start.against, 0)
         x, error, which = real_states(self.of, goal, every)
@@ -187,10 +188,8 @@ class Synthesis:
             for one, other in combinations(range(len(asked)), 2)
             if np.array_equal(asked[one], asked[other], equal_nan=True)
         ]
-        listed = 1 + len(self.symmetries)
-        partly = start.each > listed or missing > 0
-        told += [f"Of {start.each} mechanisms each that do the same {listed} are listed."] * (start.each > listed)
-        told += [f"{counted(missing, 'exchange')} of these did not close: left out."] * (missing > 0)
+        told += [f"Of {start.each} mechanisms each that do the same all real ones are listed."] * (start.each > 1)
+        told += [f"{missing} of these were not found."] * (missing > 0)
         condition, motions = self._conditions(goal, x[:, fits]), motions_of(self.of, goal, x[:, fits].astype(complex))
         free = endless(self.of, goal, found.singular)
         goal, x = self.of.lifted(goal, x[:, fits])
@@ -247,7 +246,7 @@ class Synthesis:
             tuple(one for one in degenerate if one.count),
             found.infinite,
             # of what goes to infinity, or where solutions meet, there is no certificate
-            "searched" if found.lost or partly else "tested" if found.infinite or found.singular.size else start.word,
+            "searched" if found.lost or missing else "tested" if found.infinite or found.singular.size else start.word,
             tuple(told),
             condition,
             Fitnesses.at_once(
@@ -257,6 +256,7 @@ class Synthesis:
             (*self.symmetries, *cognates(alike, self.symmetries, motions)),
             tuple(tuple(copies[k]) for k in range(len(values))),
             driver=driver_of(p.m, self.tasks)[0],
+            certificates=Fitnesses.at_once(partial(certificates, of, goal, x), len(values)),
         )
         # of a sweep nothing is said of fitness, which takes longer than the solutions, until it is asked for
         return out if self.sweep.names else out._sorted

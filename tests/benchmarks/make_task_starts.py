@@ -52,7 +52,7 @@ def shortened(of: TaskClass, start: TaskStart) -> dict[str, Any]:
     told = arrays(TaskLabelling(of), start)
     if told["x"].size < 10_000:
         return told
-    x = start.x.copy()
+    x = start.alike.reshape(len(start.x), -1).copy()
     for i, given in enumerate(of.given):
         # what is asked stands with the task
         x[of.head + i * of.nx + of.asked_rows[given]] = 0.0

@@ -1,0 +1,96 @@
+"""Certificates of solutions: balls that hold one mechanism each that does what is asked, see ``modes.certificate``.
+
+Unknown are the free coordinates of all rows and the unknown dimensions: points go along their axes, directions turn about lines across
+them. A dimension that stands in ``c`` markers counts as ``c^(1/2)`` numbers, so that no row depends on more than the length of all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mechgraph.kinematics.state import Configuration
+from mechgraph.maths.linear import rank_of, singular_values
+from mechgraph.maths.se3 import Array
+from mechgraph.maths.tolerances import MODES
+from mechgraph.modes.certificate import UP, Ball, Certificate, Moved, Open, curvature, exact, root_near, rows
+from mechgraph.synthesis.classes import ClassMember, TaskClass
+from mechgraph.synthesis.system import RowNumbers, RowProblem
+
+
+def certificates(of: TaskClass, goal: ClassMember, x: Array) -> tuple[Certificate | None, ...]:
+    """Certificates of real solutions ``x (nx, n)`` of a task with all rods in their places; None of what they do not serve: rates,
+    factors, second directions, and pairs that are no products of screws and rotations.
+
+    ``apart`` is the distance of points (over L) or unit axes of the markers that are sought.
+    """
+    first = of.at(of.start, of.x[:, None]).by_coordinates[..., 0]
+    rank = of.u + sum(
+        rank_of(singular_values(first[i][:, free]), MODES.generic) for i, free in enumerate(of.free) if len(free)
+    )
+    found = [_certificate(of, goal, one, rank) for one in x.T[:, :, None]]
+    proved = [(i, sure, at) for i, (sure, at) in enumerate(found) if sure is not None and sure.proved]
+    out = [sure for sure, _ in found]
+    for i, sure, at in proved:
+        gaps = [np.abs(at - b).max(initial=0.0) / UP - sure.error - other.error for j, other, b in proved if j != i]
+        out[i] = replace(sure, apart=float(min(gaps)) if gaps else None)
+    return tuple(out)
+
+
+def _certificate(of: TaskClass, goal: ClassMember, x: Array, rank: int) -> tuple[Certificate | None, Array]:
+    """The certificate of one solution ``(nx, 1)``, and points and axes of its markers."""
+    p, numbers = of.problem, RowNumbers(*(v.real for v in vars(of.numbers_at(goal, x)).values()))
+    told, moves = np.concatenate([np.ravel(v) for v in numbers.unit()[:2]]), _moves(p, numbers)
+    if moves is None or p.rates:
+        return None, told
+    moved, which = moves
+    system, F = p.system_with(numbers), p.system.n_freedoms
+    ways = np.zeros((len(moved), p.u))
+    ways[np.arange(len(moved)), which] = 1.0
+    ways /= np.sqrt(ways.sum(axis=0).max(initial=1.0))
+    states = of.at(goal, x.astype(complex)).x.real
+    parts, K, open_ = list[tuple[Ball, Ball, Ball]](), 0.0, 0.0
+    for i, free in enumerate(of.free):
+        here = Configuration(system, states[i])
+        try:
+            f, A = rows(here, moved)
+        except Open:
+            return None, told
+        parts.append((f, A[:, free], A[:, F:] @ exact(ways)))
+        K, open_ = np.hypot(K, curvature(here, moved)), max(open_, float(here.closure[0]))
+    n, places = len(parts[0][0].mid), np.cumsum([0, *map(len, of.free)])
+    f, A = (Ball(np.zeros(shape), np.zeros(shape)) for shape in (len(parts) * n, (len(parts) * n, places[-1] + p.u)))
+    for i, (own, by_coordinates, by_unknowns) in enumerate(parts):
+        for part in ("mid", "rad"):
+            getattr(f, part)[i * n : (i + 1) * n] = getattr(own, part)
+            rows_ = getattr(A, part)[i * n : (i + 1) * n]
+            rows_[:, places[i] : places[i + 1]] = getattr(by_coordinates, part)
+            rows_[:, places[-1] :] = getattr(by_unknowns, part)
+    return root_near(f, A, rank, float(K), False, open_), told
+
+
+def _moves(p: RowProblem, numbers: RowNumbers) -> tuple[list[Moved], list[int]] | None:
+    """How markers move with unknown dimensions, and with which; None where that is not served."""
+    out, which, turning = list[Moved](), list[int](), dict[tuple[int, int], list[tuple[int, int]]]()
+    for k, own in enumerate(p.places):
+        for place in own:
+            if place.array == "point":
+                out.append(Moved(place.pair, place.side, np.eye(6)[3 + place.component]))
+                which.append(k)
+            elif place.array == "axis":
+                turning.setdefault((place.pair, place.side), []).append((k, place.component))
+            else:
+                return None
+    point, axis, _ = numbers.unit()
+    for (pair, side), found in turning.items():
+        a, at = axis[side, :, pair, 0], point[side, :, pair, 0]
+        fixed = np.delete(a, [c for _, c in found])
+        # of one component the direction goes in a plane, of two all ways; where what is fixed is zero they are not its coordinates
+        if np.linalg.norm(fixed) < MODES.span or len(found) > 2:
+            return None
+        across = np.cross(a, np.eye(3)[found[0][1]])[None] if len(found) == 1 else np.linalg.svd(a[None])[2][1:]
+        for (k, _), w in zip(found, across / np.linalg.norm(across, axis=1)[:, None], strict=True):
+            out.append(Moved(pair, side, np.concatenate([w, np.cross(at, w)])))
+            which.append(k)
+    return out, which
