@@ -73,7 +73,8 @@ class TaskClass:
     """Equations of a class of tasks, as ``modes.homotopy`` follows them: states are the unknowns ``z (u,)`` and those of all rows.
 
     ``free[i]`` are the freedoms of row ``i`` of which nothing is asked; rows of equal shape are eliminated together, in ``blocks``;
-    ``conditions (R,)`` are left for the unknowns; solutions are one where ``fingerprints`` are less ``apart``, against their size.
+    ``conditions (R,)`` are left for the unknowns; solutions of two runs are one where ``fingerprints``
+    are less ``apart``, against their size.
 
     Raises
     ------

@@ -284,7 +284,7 @@ def motions_of(of: TaskClass, member: ClassMember, x: Array) -> Array:
 def same_motions(motions: Array, i: int) -> Mask:
     """Which solutions of ``motions (k, n)`` do the same as one of them."""
     n = motions.shape[1]
-    return np.abs(motions - motions[:, [i]]).max(axis=0) < MODES.real_singular if len(motions) else np.arange(n) == i
+    return np.abs(motions - motions[:, [i]]).max(axis=0) < MODES.most_noise if len(motions) else np.arange(n) == i
 
 
 def placed(of: TaskClass, member: ClassMember, z: Array, rng: np.random.Generator, near: Array) -> tuple[Array, Mask]:
@@ -323,7 +323,8 @@ def placed(of: TaskClass, member: ClassMember, z: Array, rng: np.random.Generato
 def by_motions(of: TaskClass) -> TaskClass:
     """The class with solutions that do the same as one."""
     out = copy(of)
-    out.apart = MODES.real_singular
+    # motions of a solution in thousands are known to 3e-5; of some tasks two in a thousand differ by less than this
+    out.apart = 10.0 * MODES.most_noise
     vars(out)["fingerprints"] = partial(motions_of, of)
     return out
 

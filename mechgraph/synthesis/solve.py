@@ -356,8 +356,9 @@ class TaskEnds:
 
     def join(self, of: TaskClass, goal: ClassMember, there: Array, tracks: int) -> None:
         """Put regular ends ``(nx, n)`` of some of all ``tracks``, and their conjugates, to those that are known."""
-        # a task in real numbers has with each solution the conjugate one; these differ from others known by the noise of both
-        for states, apart in ((there, of.apart), (there.conj(), MODES.real_singular)):
+        # a task in real numbers has with each solution the conjugate one; what is known differs from others by the noise of both
+        first = MODES.one_assembly if not self.x.size else of.apart
+        for states, apart in ((there, first), (there.conj(), 10.0 * MODES.most_noise)):
             if self.x.shape[1] < tracks:
                 least = np.full(states.shape[1], apart)
                 new = distinct(of.fingerprints(goal, states), of.fingerprints(goal, self.x), least)
@@ -596,7 +597,7 @@ def alike_at(of: TaskClass, start: TaskStart, goal: ClassMember, x: Array, progr
         some, closed = polished(of.leg(start.member, start.member), some, 1.0, np.zeros(some.shape[1], dtype=np.intp))
         there = follow(of.leg(start.member, goal), some, Care(), partial(_bent, -bend))
         apart = np.abs(motions_of(of, goal, there.x) - np.repeat(motions_of(of, goal, left), K, axis=1)).max(axis=0)
-        same = closed & there.arrived & (apart < MODES.real_singular)
+        same = closed & there.arrived & (apart < 10.0 * MODES.most_noise)
         good = begun.arrived & same.reshape(-1, K).all(axis=1)
         out.append(there.x[:, np.repeat(good, K)])
         left = left[:, ~good]
