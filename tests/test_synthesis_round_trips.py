@@ -36,7 +36,6 @@ FUNCTIONS = [
             ("R-Cp-C", "C.axis.x C.axis.y"),
             ("R-E-U-R", "B.axis.x C.point.y"),
             ("R-E-C-R", "B.axis.x C.axis.y"),
-            ("R-R-R-R-R-R-R", "C.point.x D.axis.y"),
             ("RRRRRRR 01 12 23 03 34 45 05", "B.point.x F.point.y"),
             ("RRRRRRR 01 12 23 03 24 45 05", "B.point.x F.point.y"),
         )
