@@ -177,8 +177,10 @@ class _Circuits:
         N, U = N.transpose(1, 2, 0), U[:, :, r:].transpose(1, 2, 0)
         return step, _Nodes(case, np.zeros(len(case)), x, N[:, 0].copy(), N.copy(), U.copy(), J)
 
-    def closed(self, x: Array, case: Index, goal: Array | None = None) -> tuple[_Nodes, Array]:
-        """Nodes near states ``(nx, T)``, where the driver has the values of a ``goal (T,)``, and the last Newton steps."""
+    def closed(self, x: Array, case: Index, ahead: Array, goal: Array | None = None) -> tuple[_Nodes, Array]:
+        """Nodes near states ``(nx, T)``, with motions that lead ``ahead (F, T)``, where the driver has the values of a ``goal (T,)``; and
+        the last Newton steps.
+        """
         # Newton steps, of which each doubles the digits
         for _ in range(4):
             step, node = self.at(x, case)
@@ -186,9 +188,12 @@ class _Circuits:
                 rate = node.t[self.column]
                 left = (goal - x[self.row] - step[self.column]) / np.where(rate == 0, 1.0, rate)
                 step = step + node.t * np.clip(left, -0.1, 0.1)
-            x = self.s.advance(x, step)
+            x, last = self.s.advance(x, step), np.abs(step).max(axis=0)
+            if (last < 1e-9).all():
+                break
         node.x = x
-        return node, np.abs(step).max(axis=0)
+        node.t *= np.where((node.t * ahead).sum(axis=0) < 0, -1.0, 1.0)
+        return node, last
 
     def _followed(self) -> list[_Nodes]:
         """Nodes along all circuits, by steps both ways until these meet or end; places count them."""
@@ -217,7 +222,7 @@ class _Circuits:
             dq = here.t * ahead
             known = np.flatnonzero(wide[at] > 0)
             some = before.taken(at[known])
-            y = s.difference(some.x, here.x[:, known])
+            y, _ = self._way(here.taken(known), some)
             dq[:, known] = cubic(y, here.t[:, known], s.tangent(y, some.t), -wide[at[known]], ahead[known])
             x = s.advance(here.x, dq)
             one, _ = self.at(x, here.case)
@@ -233,7 +238,7 @@ class _Circuits:
             h[at] = np.where(good, np.minimum(grown, longest), 0.4 * ahead)
             going[at[leap & ~good]] = False
             on, new, here = at[good], new.taken(good), here.taken(good)
-            wide[on] = self._arc(here, new)
+            wide[on] = self._way(here, new)[1]
             before.put(on, here)
             last.put(on, new)
             out.append(new)
@@ -267,28 +272,32 @@ class _Circuits:
         for way in (h[::2], h[1::2]):
             way[apart] = np.minimum(way, np.maximum(d / 3.0, 1e-5))[apart]
 
-    def _arc(self, a: _Nodes, b: _Nodes) -> Array:
-        """Lengths of the arcs between nodes."""
-        y = self.s.difference(b.x, a.x)
+    def _way(self, a: _Nodes, b: _Nodes) -> tuple[Array, Array]:
+        """Increments ``(F, T)`` between nodes, without passive motions, and lengths of the arcs."""
+        y, idle = self.s.difference(b.x, a.x), a.N[:, 1:]
+        y = y - np.einsum("fkt,gkt,gt->ft", idle, idle, y)
         half = 0.5 * np.arccos(np.clip((a.t * b.t).sum(axis=0), -1.0, 1.0))
-        return np.asarray(np.sqrt((y * y).sum(axis=0)) / np.sinc(half / np.pi))
+        return y, np.sqrt((y * y).sum(axis=0)) / np.sinc(half / np.pi)
 
     def _between(self, a: _Nodes, b: _Nodes, part: Array) -> Array:
         """States at parts of the arcs between nodes."""
-        y, w = self.s.difference(b.x, a.x), self._arc(a, b)
+        y, w = self._way(a, b)
         return self.s.advance(a.x, cubic(y, a.t, self.s.tangent(y, b.t), w, part * w))
 
     def _joined(self, parts: list[_Nodes]) -> _Nodes:
         """All nodes in their order, with others at folds, between which the driver rises or falls."""
         nodes = _Nodes.joined(parts)
         nodes.t[:, nodes.place < 0] *= -1.0
+        places, (nodes, _) = nodes.place, self.closed(nodes.x, nodes.case, nodes.t)
+        nodes.place = places
         # times that nodes are put where the rate of the driver vanishes, or is least
         for _ in range(8):
             a, b = self._steps(nodes)
-            w, (ra, rb) = self._arc(a, b), (n.t[self.column] for n in (a, b))
+            (_, w), (ra, rb) = self._way(a, b), (n.t[self.column] for n in (a, b))
             rise = (b.x - a.x)[self.row] / np.where(w > 0, w, 1.0)
             B, C = 2.0 * (3.0 * rise - 2.0 * ra - rb), 3.0 * (ra + rb - 2.0 * rise)
-            fold = (ra * rb < 0) & (np.minimum(np.abs(ra), np.abs(rb)) > 1e-9)
+            # a rate so small is that of a fold: the driver is off it by its square
+            fold = (ra * rb < 0) & (np.minimum(np.abs(ra), np.abs(rb)) > 1e-6)
             least = np.clip(-0.5 * B / np.where(C == 0, 1.0, C), 0.0, 1.0)
             lowest = (ra + least * (B + least * C)) * np.sign(ra)
             dips = (ra * rb > 0) & (lowest < 0.25 * np.minimum(np.abs(ra), np.abs(rb))) & (np.abs(least - 0.5) < 0.45)
@@ -300,8 +309,7 @@ class _Circuits:
             one = ra / np.where(bottom == 0, 1.0, bottom)
             other = bottom / np.where(C == 0, 1.0, C)
             part = np.where(fold[some], np.where((one >= 0) & (one <= 1), one, other), least[some])
-            more, _ = self.closed(self._between(a, b, part), a.case)
-            more.t *= np.where((more.t * (a.t + b.t)).sum(axis=0) < 0, -1.0, 1.0)
+            more, _ = self.closed(self._between(a, b, part), a.case, a.t + b.t)
             more.place = a.place + part * (b.place - a.place)
             nodes = _Nodes.joined([nodes, more])
         return nodes
@@ -362,12 +370,11 @@ class _Circuits:
     def states(self, step: Index, value: Array) -> tuple[Array, Mask]:
         """States on steps between nodes where the driver has some values, and whether they were met there."""
         a, b = self.a.taken(step), self.b.taken(step)
-        y, w = (b.x - a.x)[self.row], self._arc(a, b)
+        y, w = (b.x - a.x)[self.row], self._way(a, b)[1]
         ra, rb, begin = a.t[self.column], b.t[self.column], a.x[self.row]
         part = _root(lambda u: begin + cubic(y, ra, rb, w, u * w) - value, len(step))
-        node, last = self.closed(self._between(a, b, part), a.case, value)
-        forward = np.where((node.t * (a.t + b.t)).sum(axis=0) < 0, -1.0, 1.0) * node.t[self.column]
-        return node.x, (last < 1e-8) & (forward * self.rises[step] > -1e-6)
+        node, last = self.closed(self._between(a, b, part), a.case, a.t + b.t, value)
+        return node.x, (last < 1e-8) & (node.t[self.column] * self.rises[step] > -1e-6)
 
     def along(self, case: Index, value: Array) -> tuple[Array, Mask]:
         """States on the branches of the first states where the driver has some values."""
