@@ -410,13 +410,8 @@ class RowProblem:
 
     def system_with(self, numbers: RowNumbers) -> System:
         """The system with other markers."""
-        point, axis, second = numbers.unit()
-        n = replace(self.whole.once(declared), point=point, axis=axis, second=second)
-        zero = np.zeros((3, len(self.whole.links)))
-        par = n.parameters(self.whole, zero, zero[:, 0], 1.0)
-        old = self.system.par
-        par = replace(par, offset=old.offset, frame=old.frame, origin=old.origin, L=old.L, pitch=old.pitch)
-        return self.system.with_parameters(par)
+        X = numbers.poses
+        return self.system.with_parameters(replace(self.system.par, marker_a=X[:, :, 0], marker_b=X[:, :, 1]))
 
     @cached_property
     def asked_columns(self) -> Index:
