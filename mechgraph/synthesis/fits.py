@@ -7,6 +7,9 @@ At every row the coordinates are an implicit function of the unknown dimensions 
 are exact. What is asked of drivers is met; where nothing is, the driver of the row is an unknown of its own, so that errors are distances
 from curves, not from samples of them. Rows keep to the branch of the first one: a trial on which the determinant of ``F_q`` changes its
 sign at a row is refused, and of what is found the path follower of ``solve`` has to lead from row to row.
+
+Starts go down together, by the method of Levenberg and Marquardt on some of the rows, from which drivers are eliminated one by one: each
+acts on its own row. The best of them are followed to the end on all rows.
 """
 
 from __future__ import annotations
@@ -30,15 +33,17 @@ from mechgraph.synthesis.fitness import keeps
 from mechgraph.synthesis.system import ArrowRows, RowProblem
 from mechgraph.synthesis.tasks import FunctionTask
 
-LEAST_MARGIN = 1e-3
-"""Least margin of rows on the way (see ``Fit.margins``); an optimum has twenty times that."""
+MARGIN = 2e-2
+"""Least margin of the rows of an optimum (see ``Fit.margins``); on the way a twentieth of that will do."""
 Bounds = Mapping[str, tuple[float | None, float | None]]
 """Ends of unknowns by name."""
 
 
 @dataclass(frozen=True)
 class FitPoint:
-    """Closed rows: unknowns ``z (u,)`` and drivers ``theta (n, d)`` in internal units, states ``x (nx, n)``, and their equations."""
+    """Rows of ``T`` mechanisms: unknowns ``z (u, T)`` and drivers ``theta (n, d, T)`` in internal units, states ``x (nx, n, T)``, and their
+    equations.
+    """
 
     z: Array
     theta: Array
@@ -60,7 +65,7 @@ class Fit:
     """
 
     def __init__(self, problem: RowProblem, tasks: Any) -> None:
-        self.p, s = problem, problem.system
+        self.p, self.tasks, s = problem, tasks, problem.system
         if problem.rates:
             told = "rates (velocities, accelerations, twists) are met exactly or not at all; leave them out of a fit"
             raise DeclarationError(problem.name, [told])
@@ -85,6 +90,11 @@ class Fit:
         self.wanted, self.factor_of = problem.asked[:, kept], problem.factor_of[kept]
         self._check(x)
 
+    def of_some(self, most: int) -> Fit:
+        """The same of so many rows at most, the first among them."""
+        rows = np.unique(np.linspace(0, self.rows - 1, min(most, self.rows)).round().astype(np.intp))
+        return Fit(self.p.with_rows(rows), self.tasks)
+
     def _drivers(self, tasks: Any) -> Index:
         """Columns of freedoms with given values: inputs of functions, those with timing, then the drives."""
         m, whole = self.p.m, self.p.whole
@@ -97,8 +107,9 @@ class Fit:
 
     def _check(self, x: Array) -> None:
         """Refuse what drivers do not determine, and what cannot be fitted."""
-        faults, at = [], self._equations(self.z0, np.repeat(x, self.rows, axis=1))
-        J = at.by_coordinates[0, :, :, 0]
+        faults = []
+        numbers = self.p.numbers.with_values(self.p.places, self.z0[:, None])
+        J = self.p.equations(numbers, x.T[:, :, None]).by_coordinates[0, :, :, 0]
         left = scipy.linalg.null_space(J[:, self.free], MODES.generic)
         self.rank = len(self.free) - left.shape[1]
         loose = self.free[np.abs(left).max(axis=1, initial=0.0) > MODES.span]
@@ -121,55 +132,89 @@ class Fit:
         """The declared dimensions."""
         return self.p.inside(self.p.unknowns.declared[:, None])[:, 0]
 
-    def _equations(self, z: Array, x: Array) -> ArrowRows:
-        numbers = self.p.numbers.with_values(self.p.places, z[:, None])
-        return self.p.equations(numbers, x.T[:, :, None])
-
     # --- closing ---------------------------------------------------------------------------------------------------------
 
-    def closed(self, z: Array, theta: Array, x: Array) -> FitPoint | None:
-        """Rows closed from states near by; None where Newton's method does not come to an end there."""
-        s = self.p.system
-        x = x.copy()
-        x[s.single_rows[self.drivers]] = theta.T
-        # steps of Newton's method, the largest of them, and what may be left open
-        for _ in range(12):
-            at = self._equations(z, x)
-            left = at.residual[:, :, 0]
-            if np.abs(left).max(initial=0.0) < 1e-12:
-                return FitPoint(z, theta, x, at)
-            dq = np.zeros((s.n_freedoms, self.rows))
-            dq[self.free] = -(self._inverse(at) @ left[:, :, None])[:, :, 0].T
-            if not np.abs(dq).max() < 1.0:
-                return None
-            x = s.advance(x, dq)
-        return None
+    def point(self, z: Array, theta: Array, x: Array) -> FitPoint:
+        """Rows at states, and their equations."""
+        numbers = self.p.numbers.with_values(self.p.places, z)
+        return FitPoint(z, theta, x, self.p.equations(numbers, x.swapaxes(0, 1)))
 
-    def _inverse(self, at: ArrowRows) -> Array:
-        return np.asarray(np.linalg.pinv(at.by_coordinates[:, :, self.free, 0], 1e-9), dtype=float)
+    def taken(self, here: FitPoint, which: Index) -> FitPoint:
+        """Some of the mechanisms."""
+        return self.point(here.z[:, which], here.theta[..., which], here.x[..., which])
+
+    def mixed(self, first: Mask, one: FitPoint, other: FitPoint) -> FitPoint:
+        """Those of the one where it is the ``first (T,)``, else those of the other."""
+        parts = ((one.z, other.z), (one.theta, other.theta), (one.x, other.x))
+        return one if first.all() else self.point(*(np.where(first, a, b) for a, b in parts))
+
+    def closed(self, z: Array, theta: Array, x: Array, longest: float = 1.0) -> tuple[FitPoint, Mask]:
+        """Rows closed from states near by; at which ``(n, T)`` Newton's method comes to an end there, by steps below the ``longest``."""
+        s, x = self.p.system, x.copy()
+        x[s.single_rows[self.drivers]] = theta.swapaxes(0, 1)
+        came = np.ones(x.shape[1:], dtype=bool)
+        # steps of Newton's method, and what may be left open
+        for _ in range(12):
+            here = self.point(z, theta, x)
+            left = here.at.residual.swapaxes(1, 2)
+            going = came & ~(np.abs(left).max(axis=2, initial=0.0) < 1e-12)
+            if not going.any():
+                return here, came
+            step = -(self._inverse(here) @ left[..., None])[..., 0]
+            came &= ~going | (np.abs(step).max(axis=2, initial=0.0) < longest)
+            dq = np.zeros((s.n_freedoms, *came.shape))
+            dq[self.free] = np.where((came & going)[..., None], step, 0.0).transpose(2, 0, 1)
+            x = s.advance(x, dq)
+        return here, came & ~going
+
+    def _matrix(self, here: FitPoint) -> Array:
+        """``F_q (n, T, m, f)``."""
+        return np.moveaxis(here.at.by_coordinates[:, :, self.free], 3, 1)
+
+    def _inverse(self, here: FitPoint) -> Array:
+        J = self._matrix(here)
+        if J.shape[2] == J.shape[3] == self.rank:
+            try:
+                return np.asarray(np.linalg.inv(J))
+            except np.linalg.LinAlgError:  # one of them is singular to the last digit
+                pass
+        return np.asarray(np.linalg.pinv(J, 1e-9), dtype=float)
+
+    def by_drivers(self, here: FitPoint, inverse: Array) -> Array:
+        """``dq/dtheta (n, T, F, d)``."""
+        out = np.zeros((*inverse.shape[:2], self.p.system.n_freedoms, len(self.drivers)))
+        out[:, :, self.free] = -inverse @ np.moveaxis(here.at.by_coordinates[:, :, self.drivers], 3, 1)
+        out[:, :, self.drivers] = np.eye(len(self.drivers))
+        return out
 
     def rates(self, here: FitPoint) -> tuple[Array, Array]:
-        """``dq/dz (n, F, u)`` and ``dq/dtheta (n, F, d)``."""
-        inverse, F = self._inverse(here.at), self.p.system.n_freedoms
-        by_z, by_theta = np.zeros((self.rows, F, len(here.z))), np.zeros((self.rows, F, len(self.drivers)))
-        by_z[:, self.free] = -inverse @ here.at.by_unknowns[..., 0]
-        by_theta[:, self.free] = -inverse @ here.at.by_coordinates[:, :, self.drivers, 0]
-        by_theta[:, self.drivers] = np.eye(len(self.drivers))
-        return by_z, by_theta
+        """``dq/dz (n, T, F, u)`` and ``dq/dtheta (n, T, F, d)``."""
+        inverse = self._inverse(here)
+        by_z = np.zeros((*inverse.shape[:2], self.p.system.n_freedoms, len(here.z)))
+        by_z[:, :, self.free] = -inverse @ np.moveaxis(here.at.by_unknowns, 3, 1)
+        return by_z, self.by_drivers(here, inverse)
+
+    def stepped(self, here: FitPoint, rates: tuple[Array, Array], z: Array, theta: Array) -> tuple[FitPoint, Mask]:
+        """Rows carried to other dimensions and drivers in one step; which mechanisms ``(T,)`` come there, all rows on their branches."""
+        dz, dtheta = z - here.z, np.moveaxis(theta - here.theta, 1, 2)
+        dq = (rates[0] @ dz.T[:, :, None] + rates[1] @ dtheta[..., None])[..., 0].transpose(2, 0, 1)
+        # the longest step (radians, lengths over L) of a row that may be predicted
+        near = np.abs(dq).max(axis=(0, 1)) < 1.0
+        new, came = self.closed(z, theta, self.p.system.advance(here.x, np.where(near, dq, 0.0)))
+        whole = near & came.all(axis=0) & (self._sides(new) == self._sides(here)).all(axis=0)
+        return new, whole & (self.margins(new).min(axis=0) > MARGIN / 20)
 
     def moved(self, here: FitPoint, z: Array, theta: Array) -> tuple[FitPoint, bool]:
-        """Rows carried to other dimensions and drivers, in one step or in several; where a row would leave its branch as far as before."""
+        """Rows of one mechanism carried to other dimensions and drivers, in one step or in several; where a row would leave its branch as
+        far as before.
+        """
         at = here
         for parts in (1, 8):
             at = here
             for k in range(1, parts + 1):
-                by_z, by_theta = self.rates(at)
                 z1, theta1 = here.z + (z - here.z) * k / parts, here.theta + (theta - here.theta) * k / parts
-                dq = by_z @ (z1 - at.z) + (by_theta @ (theta1 - at.theta)[:, :, None])[:, :, 0]
-                # the longest step (radians, lengths over L) of a row that may be predicted
-                near = np.abs(dq).max() < 1.0
-                new = self.closed(z1, theta1, self.p.system.advance(at.x, dq.T)) if near else None
-                if new is None or (self._sides(new) != self._sides(at)).any() or self.margins(new).min() < LEAST_MARGIN:
+                new, came = self.stepped(at, self.rates(at), z1, theta1)
+                if not came[0]:
                     break
                 at = new
             else:
@@ -177,16 +222,33 @@ class Fit:
         return at, False
 
     def _sides(self, here: FitPoint) -> Array:
-        """Signs of the determinants of ``F_q`` at the rows, where it has one."""
-        J = here.at.by_coordinates[:, :, self.free, 0]
-        return np.asarray(np.linalg.slogdet(J)[0] if J.shape[1] == J.shape[2] else np.ones(self.rows))
+        """Signs ``(n, T)`` of the determinants of ``F_q`` at the rows, where it has one."""
+        J = self._matrix(here)
+        return np.asarray(np.linalg.slogdet(J)[0] if J.shape[2] == J.shape[3] else np.ones(J.shape[:2]))
 
     def margins(self, here: FitPoint) -> Array:
-        """How far rows ``(n,)`` are from folds, and links from having no length: least singular value of ``F_q`` over its largest."""
-        size = np.linalg.svd(here.at.by_coordinates[:, :, self.free, 0], compute_uv=False)
-        return np.asarray(size[:, self.rank - 1] / size[:, 0])
+        """How far rows ``(n, T)`` are from folds, and links from having no length: least singular value of ``F_q`` over its largest."""
+        size = np.linalg.svd(self._matrix(here), compute_uv=False)
+        return np.asarray(size[..., self.rank - 1] / size[..., 0])
 
-    # --- the path follower -----------------------------------------------------------------------------------------------
+    def margin_slopes(self, here: FitPoint, rows: Index) -> Array:
+        """Derivatives ``(r, v)`` of margins of some rows of a mechanism by its vector: central differences along tangents."""
+        by_z, by_theta = self.rates(here)
+        u, h = len(here.z), 1e-5
+        ways = np.concatenate([by_z, by_theta if self.open.any() else by_theta[..., :0]], axis=3)[rows, 0]
+        n = ways.shape[2]
+        dz = np.eye(u, n)
+        z = here.z + h * np.concatenate([dz, -dz], axis=1)
+        dq = h * np.concatenate([ways, -ways], axis=2).swapaxes(0, 1)
+        x = self.p.system.advance(np.repeat(here.x[:, rows], 2 * n, axis=2), dq)
+        m = self.margins(self.point(z, np.zeros(0), x))
+        slope, out = (m[:, :n] - m[:, n:]) / (2 * h), np.zeros((len(rows), u + int(self.open.sum())))
+        out[:, :u] = slope[:, :u]
+        for j, row in enumerate(np.nonzero(self.open)[0]):
+            out[rows == row, u + j] = slope[rows == row, u]
+        return out
+
+    # --- where rows begin ------------------------------------------------------------------------------------------------
 
     def led(self, z: Array, theta: Array, x: Array) -> tuple[Array, Mask]:
         """States ``(nx, n)`` at driver values ``(n, d)`` to which the path leads from a closed state ``x (nx,)``; which it reached."""
@@ -198,43 +260,77 @@ class Fit:
         )
         return found.x, found.moved
 
-    def begun(self, z: Array) -> FitPoint | None:
-        """The rows of a mechanism: open drivers where its path comes nearest to what is asked; None where it does not reach them all."""
-        first = self.closed(
-            z, np.repeat(self.theta[:1], self.rows, axis=0), np.repeat(self.p.at_rest[:, None], self.rows, axis=1)
-        )
-        if first is None:
-            return None
-        theta, x = self.theta.copy(), first.x[:, 0]
+    @cached_property
+    def _ways(self) -> tuple[Array, Index]:
+        """Values of the drivers ``(K, W, d)`` on ways from the first row, in short steps, and where on them rows ``(n, 2)`` are given.
+
+        One driver goes from there up and down, several go from row to row.
+        """
+        begin, given = self.theta[:1], np.flatnonzero(~self.open.any(axis=1)).tolist()
+        lines: list[list[tuple[Array, int]]] = [[(self.theta[row], row) for row in given]]
+        if len(self.drivers) == 1:
+            turn = self.p.system.periods[self.drivers[0]]
+            reach = (turn if np.isfinite(turn) else MODES.slide_stroke) * self.open.any()
+            # beyond the last row that is given the way goes on
+            stops = [(self.theta[row], row) for row in given] + [(begin[0] + sign * reach, -1) for sign in (1, -1)]
+            stops.sort(key=lambda stop: abs(stop[0][0] - begin[0, 0]))
+            lines = [[stop for stop in stops if sign * (stop[0][0] - begin[0, 0]) >= 0] for sign in (1, -1)]
+        places, ways = np.zeros((self.rows, 2), dtype=np.intp), []
+        for w, line in enumerate(lines):
+            way = [begin[0]]
+            for stop, row in line:
+                # the longest step of a driver, in radians or lengths over L
+                parts = int(np.ceil(np.abs(stop - way[-1]).max() / 0.1))
+                way += [*(way[-1] + (stop - way[-1]) * np.arange(1, parts + 1)[:, None] / max(parts, 1))]
+                if row >= 0:
+                    places[row] = len(way) - 1, w
+            ways.append(np.array(way))
+        longest = max(map(len, ways))
+        return np.stack([np.pad(way, ((0, longest - len(way)), (0, 0)), mode="edge") for way in ways], axis=1), places
+
+    def begun(self, z: Array) -> tuple[FitPoint, Mask]:
+        """The rows of mechanisms ``z (u, T)``: open drivers where their paths come nearest to what is asked; which reach all rows."""
+        (ways, places), s = self._ways, self.p.system
+        T = z.shape[1]
+
+        def values(k: int) -> Array:
+            return np.repeat(ways[k][:, :, None], T, axis=2)
+
+        rest = np.broadcast_to(self.p.at_rest[:, None, None], (len(self.p.at_rest), ways.shape[1], T))
+        here, alive = self.closed(z, values(0), rest, np.inf)
+        states, came, sides = [here.x], [alive], self._sides(here)
+        for k in range(1, len(ways)):
+            by_theta = self.by_drivers(here, self._inverse(here))
+            dq = (by_theta @ np.moveaxis(values(k) - here.theta, 1, 2)[..., None])[..., 0].transpose(2, 0, 1)
+            near = alive & (np.abs(dq).max(axis=0) < 1.0)
+            here, closed = self.closed(z, values(k), s.advance(here.x, np.where(near, dq, 0.0)))
+            alive = near & closed & (self._sides(here) == sides)
+            states.append(here.x)
+            came.append(alive)
+        x, alive = np.array(states), np.array(came)
+        theta = np.repeat(self.theta[:, :, None], T, axis=2)
+        rows = x[places[:, 0], :, places[:, 1]].transpose(1, 0, 2).copy()
+        whole = alive[places[:, 0], places[:, 1]].all(axis=0)
         if self.open.any():
-            s, begin = self.p.system, self.theta[0, 0]
-            turn = s.periods[self.drivers[0]]
-            reach = turn if np.isfinite(turn) else MODES.slide_stroke
-            # places on the way to either end at which the path is compared with what is asked
-            ways = begin + reach * np.linspace(-1.0, 1.0, 181)
-            states, came = self.led(z, ways[:, None], x)
-            ways, states = ways[came], states[:, came]
-            apart = self._coordinates(states)[:, None] - self.wanted * self._factors(z)
-            far = np.nansum(self._wrapped(apart) ** 2, axis=2)
-            nearest = ways[np.argmin(far, axis=0)]
-            theta[:, 0] = np.where(self.open[:, 0], nearest, theta[:, 0])
-        states, came = self.led(z, theta, x)
-        return self.closed(z, theta, states) if came.all() else None
+            found = np.moveaxis(x[:, s.single_rows[self.others]], 1, 3)
+            for i in np.flatnonzero(self.open[:, 0]):
+                apart = self._wrapped(found - self.wanted[i] * self._factors(z))
+                far = np.where(alive, np.nansum(apart**2, axis=3), np.inf).reshape(-1, T)
+                k, w = np.unravel_index(far.argmin(axis=0), ways.shape[:2])
+                theta[i], rows[:, i] = ways[k, w].T, x[k, :, w, np.arange(T)].T
+        new, closed = self.closed(z, theta, rows)
+        return new, np.asarray(whole & closed.all(axis=0))
 
     def safe(self, here: FitPoint) -> bool:
-        """Whether the path leads from the first row to all others."""
-        states, came = self.led(here.z, here.theta, here.x[:, 0])
+        """Whether the path of one mechanism leads from the first row to all others."""
+        states, came = self.led(here.z[:, 0], here.theta[..., 0], here.x[:, 0, 0])
         if not came.all():
             return False
-        apart = self.p.system.difference(states, here.x)
+        apart = self.p.system.difference(states, here.x[..., 0])
         settled = np.isin(np.arange(len(apart)), self.others)
         return bool(np.abs(self._wrapped(apart[settled].T)).max(initial=0.0) < MODES.arrives)
 
     # --- what is to be small ---------------------------------------------------------------------------------------------
-
-    def _coordinates(self, x: Array) -> Array:
-        """Coordinates ``(n, k)`` of what is asked."""
-        return x[self.p.system.single_rows[self.others]].T
 
     def _wrapped(self, apart: Array) -> Array:
         """Differences ``(..., k)`` without whole turns."""
@@ -249,27 +345,35 @@ class Fit:
         return np.nonzero(np.isfinite(self.wanted))  # type: ignore[return-value]
 
     def _factors(self, z: Array) -> Array:
-        """By what ``(k,)`` that which is asked is multiplied."""
+        """By what ``(T, k)`` that which is asked is multiplied."""
         scaled = self.factor_of >= 0
-        out = np.ones(len(scaled))
-        out[scaled] = z[len(z) - self.factor_of.max(initial=-1) - 1 :][self.factor_of[scaled]]
+        out = np.ones((z.shape[1], len(scaled)))
+        out[:, scaled] = z[len(z) - self.factor_of.max(initial=-1) - 1 :][self.factor_of[scaled]].T
         return out
 
+    def missed(self, here: FitPoint) -> Array:
+        """By how much each is missed ``(n, T, k)``; zero where nothing is asked."""
+        q = here.x[self.p.system.single_rows[self.others]].transpose(1, 2, 0)
+        return np.nan_to_num(self._wrapped(q - self.wanted[:, None] * self._factors(here.z)))
+
+    def missed_rates(self, rates: tuple[Array, Array]) -> tuple[Array, Array]:
+        """Its derivatives by the unknowns ``(n, T, k, u)``, and by the drivers ``(n, T, k, d)`` that are open."""
+        asked = np.isfinite(self.wanted)[:, None, :, None]
+        by_z, by_theta = (np.where(asked, v[:, :, self.others], 0.0) for v in rates)
+        for k in np.flatnonzero(self.factor_of >= 0):
+            column = by_z.shape[3] - self.factor_of.max() - 1 + self.factor_of[k]
+            by_z[:, :, k, column] -= np.nan_to_num(self.wanted[:, k, None])
+        return by_z, np.where(self.open[:, None, None], by_theta, 0.0)
+
     def residual(self, here: FitPoint) -> Array:
-        """By how much each is missed."""
-        return self._wrapped(self._coordinates(here.x) - self.wanted * self._factors(here.z))[self.asked]
+        """By how much each is missed by one mechanism ``(a,)``."""
+        return self.missed(here)[:, 0][self.asked]
 
     def jacobian(self, here: FitPoint) -> Array:
-        """Its derivatives by the unknowns and the open drivers."""
-        by_z, by_theta = self.rates(here)
-        row, k = self.asked
-        column = self.others[k]
-        out, u = [by_z[row, column].copy()], len(here.z)
-        for i in np.flatnonzero(self.factor_of[k] >= 0):
-            out[0][i, u - self.factor_of.max() - 1 + self.factor_of[k[i]]] -= self.wanted[row[i], k[i]]
-        for i, j in np.argwhere(self.open):
-            out.append(np.where(row == i, by_theta[row, column, j], 0.0)[:, None])
-        return np.concatenate(out, axis=1)
+        """Its derivatives ``(a, v)`` by the unknowns and the open drivers."""
+        by_z, by_theta = (v[:, 0][self.asked] for v in self.missed_rates(self.rates(here)))
+        i, j = np.nonzero(self.open)
+        return np.concatenate([by_z, np.where(self.asked[0][:, None] == i, by_theta[:, j], 0.0)], axis=1)
 
     @cached_property
     def unit(self) -> float:
@@ -278,21 +382,20 @@ class Fit:
 
     def errors(self, here: FitPoint) -> Array:
         """Distances ``(n,)`` from what is asked at the rows, angles as arcs of radius L beside lengths."""
-        squares = np.bincount(self.asked[0], self.residual(here) ** 2, minlength=self.rows)
-        return self.unit * np.sqrt(squares)
+        return np.asarray(self.unit * np.linalg.norm(self.missed(here)[:, 0], axis=1))
 
     # --- as a vector -------------------------------------------------------------------------------------------------------
 
     def vector(self, here: FitPoint) -> Array:
-        """Unknowns and open drivers ``(v,)``."""
-        return np.concatenate([here.z, here.theta[self.open]])
+        """Unknowns and open drivers ``(v,)`` of one mechanism."""
+        return np.concatenate([here.z[:, 0], here.theta[self.open, 0]])
 
     def parts(self, v: Array) -> tuple[Array, Array]:
         """``z`` and ``theta`` of a vector."""
         theta = self.theta.copy()
         u = len(self.z0)
         theta[self.open] = v[u:]
-        return v[:u], theta
+        return v[:u, None], theta[:, :, None]
 
     def limits(self, bounds: Bounds) -> tuple[Array, Array]:
         """Lower and upper ends of a vector."""
@@ -305,12 +408,58 @@ class Fit:
         return np.concatenate([low, -rest]), np.concatenate([high, rest])
 
 
-class Trials:
-    """Trial vectors of an optimizer, each carried from the last one that was kept."""
+def descended(fit: Fit, here: FitPoint, low: Array, high: Array, steps: int) -> tuple[FitPoint, Array]:
+    """The rows of mechanisms on their way to the least sums of squares, some steps on; and these sums ``(T,)``.
 
-    def __init__(self, fit: Fit, begin: FitPoint) -> None:
-        self.fit, self.kept, self.last = fit, begin, begin
-        self.refused = 1e3 * (1.0 + float(np.abs(fit.residual(begin)).max(initial=0.0)))
+    With ``J = [Z Y]`` by the unknowns and the drivers ``Y^T Y`` is diagonal, as a driver acts on its own row: the unknowns are those of
+    ``(Z^T Z + m D - Z^T Y (Y^T Y)^-1 Y^T Z) dz``, ``D`` the diagonal of ``Z^T Z``, the damping ``m`` one for each mechanism.
+    """
+    low, high = low[: len(here.z), None], high[: len(here.z), None]
+    T, open_, unit = here.z.shape[1], np.asarray(fit.open.any(axis=1))[:, None], np.eye(len(here.z), dtype=bool)
+    left = fit.missed(here)
+    size, damping = (left**2).sum(axis=(0, 2)), np.full(T, 1e-2)
+    for _ in range(steps):
+        rates = fit.rates(here)
+        Z, Y = fit.missed_rates(rates)
+        rows, y, r = Z.swapaxes(0, 1), Y.sum(axis=3), left.swapaxes(0, 1)
+        whole = rows.reshape(T, -1, len(here.z))
+        across = (y.swapaxes(0, 1)[:, :, None] @ rows)[:, :, 0]
+        own = np.where(open_, (y**2).sum(axis=2) * (1 + damping) + np.finfo(float).tiny, 1.0).T
+        pull = (y * left).sum(axis=2).T
+        A = whole.swapaxes(1, 2) @ whole
+        g = (r.reshape(T, 1, -1) @ whole)[:, 0] - ((pull / own)[:, None] @ across)[:, 0]
+        size_of = np.where(unit, A, 0.0) * damping[:, None, None]
+        A += size_of + 1e-14 * unit - across.swapaxes(1, 2) @ (across / own[..., None])
+        # unknowns at a bound that would leave it stay
+        held = (((here.z <= low) & (g.T > 0)) | ((here.z >= high) & (g.T < 0))).T
+        A = np.where(held[:, :, None] | held[:, None], unit, A)
+        dz = -np.linalg.solve(A, np.where(held, 0.0, g)[..., None])[..., 0].T
+        z = np.clip(here.z + dz, low, high)
+        moved = np.where(open_, -(pull + (across @ (z - here.z).T[..., None])[..., 0]).T / own.T, 0.0)
+        theta = here.theta + np.where(fit.open[:, :, None], moved[:, None], 0.0)
+        there, came = fit.stepped(here, rates, z, theta)
+        new = fit.missed(there)
+        sizes = np.where(came, (new**2).sum(axis=(0, 2)), np.inf)
+        better = sizes < size
+        damping = np.clip(np.where(better, damping / 5, damping * 6), 1e-12, 1e12)
+        size, left = np.where(better, sizes, size), np.where(better[:, None], new, left)
+        here = fit.mixed(better, there, here)
+    return here, size
+
+
+class Trials:
+    """Trial vectors of an optimizer, each carried from the last one that was kept.
+
+    What is small is followed by ``weight`` times how far margins are below what an optimum has and a quarter more, as logarithms.
+    """
+
+    def __init__(self, fit: Fit, begin: FitPoint, weight: float = 0.0) -> None:
+        self.fit, self.kept, self.last, self.weight = fit, begin, begin, weight
+        self.refused = 1e3 * (1.0 + float(np.abs(self._all(begin)).max(initial=0.0)))
+
+    def _all(self, here: FitPoint) -> Array:
+        near = self.weight * np.log(np.maximum(1.25 * MARGIN / self.fit.margins(here)[:, 0], 1.0))
+        return np.concatenate([self.fit.residual(here), near])
 
     def at(self, v: Array) -> FitPoint | None:
         """The rows at a vector; None where they cannot be carried there."""
@@ -325,14 +474,18 @@ class Trials:
     def residual(self, v: Array) -> Array:
         """See ``Fit.residual``; large where the rows cannot be carried there."""
         here = self.at(v)
-        return np.full(len(self.fit.asked[0]), self.refused) if here is None else self.fit.residual(here)
+        return np.full(len(self.fit.asked[0]) + self.fit.rows, self.refused) if here is None else self._all(here)
 
     def jacobian(self, v: Array) -> Array:
         """See ``Fit.jacobian``; the vector is kept."""
         here = self.at(v)
         if here is not None:
             self.kept = here
-        return self.fit.jacobian(self.kept)
+        fit, margins = self.fit, self.fit.margins(self.kept)[:, 0]
+        near, slopes = np.flatnonzero(margins < 1.25 * MARGIN * (self.weight > 0)), np.zeros((fit.rows, len(v)))
+        if near.size:
+            slopes[near] = -self.weight * fit.margin_slopes(self.kept, near) / margins[near, None]
+        return np.concatenate([fit.jacobian(self.kept), slopes])
 
 
 Limit = tuple[Callable[[FitPoint], Array], float | None, float | None]
@@ -360,34 +513,31 @@ def fitted(
 ) -> Fitted:
     """The optima to which dimensions lead: the declared ones, those that do parts of the task exactly, and up to ``starts`` random ones.
 
-    ``exact`` are values of all names.
-    ``way``, ``goal`` and ``limits`` are those of ``constrained``. All starts are followed a few steps, the best of them to the end.
+    ``exact`` are values of all names. ``way``, ``goal`` and ``limits`` are those of ``constrained``.
     """
     low, high = fit.limits(bounds)
     rng, u = np.random.default_rng(seed), len(fit.z0)
     box = np.where(np.isfinite(low[:u]), low[:u], fit.z0 - 0.5), np.where(np.isfinite(high[:u]), high[:u], fit.z0 + 0.5)
-    begun: list[FitPoint] = []
     told = [fit.p.inside(values[:, None])[:, 0] for values in exact]
     tries = [fit.z0, *told, *(rng.uniform(*box) for _ in range(starts - 1 - len(told)))]
-    for tried, z in enumerate(tries, 1):
-        here = fit.begun(np.clip(z, low[:u], high[:u]))
-        if here is not None:
-            begun.append(least_squares(fit, here, low, high, 12))
-        if progress is not None:
-            progress(f"start {tried} of {len(tries)}")
+    begun, count = _best(fit, np.clip(np.transpose(tries), low[:u, None], high[:u, None]), low, high, progress)
     if not begun and (evolved := _evolved(fit, *box, seed)) is not None:
         begun.append(evolved)
-    order = sorted(range(len(begun)), key=lambda i: _size(fit, begun[i]))
     ends: list[FitPoint] = []
     unsafe = lost = early = 0
-    wide: Limit = fit.margins, 20 * LEAST_MARGIN, None
-    # the best starts, which are followed to the end
-    for i in order[:4]:
-        end: FitPoint | None = least_squares(fit, begun[i], low, high, 200)
-        narrow = end is not None and fit.margins(end).min() < 20 * LEAST_MARGIN
+    wide: Limit = (lambda here: fit.margins(here)[:, 0]), MARGIN, None
+    for i, begin in enumerate(begun, 1):
+        if progress is not None:
+            progress(f"best start {i} of {len(begun)} to the end")
+        # an optimum without a margin is none: it is looked for where it keeps one, by weights that grow from the size of what is missed
+        end: FitPoint | None = begin
+        for part in (0.0, 1.0, 10.0, 100.0):
+            if end is not None and (fit.margins(end).min() < MARGIN) == (part > 0):
+                size = max(float(np.sqrt(np.mean(fit.residual(end) ** 2))), 1e-9)
+                end = least_squares(fit, end, low, high, 200, part * size)
+        narrow = end is not None and fit.margins(end).min() < MARGIN
         if narrow or way != "least_squares" or limits:
-            # an optimum without a margin is none: it is looked for again where it keeps one
-            best = begun[i] if narrow or end is None else end
+            best = begin if narrow or end is None else end
             end, came = constrained(fit, best, low, high, way, goal, [*limits, wide] if narrow else limits)
             early += end is not None and not came
         if end is None:
@@ -411,7 +561,7 @@ def fitted(
             kept.append(here)
     same = sum(abs(value(here) - value(ends[0])) <= 1e-4 * abs(value(ends[0])) + 1e-12 for here in ends) if ends else 0
     words = [
-        f"{counted(len(begun), 'start')} of {len(tries)} led to all rows; the best {min(4, len(begun))} were followed to the end, "
+        f"{counted(count, 'start')} of {len(tries)} led to all rows; the best {len(begun)} that differ were followed to the end, "
         f"{same} of them to the best one."
     ]
     if told:
@@ -425,12 +575,49 @@ def fitted(
     return Fitted(tuple(kept), tuple(words))
 
 
+def _best(
+    fit: Fit, tries: Array, low: Array, high: Array, progress: Callable[[str], None] | None
+) -> tuple[list[FitPoint], int]:
+    """The rows of the best mechanisms to which dimensions ``tries (u, n)`` lead, by some rows first; and how many lead to all rows."""
+    # rows by which starts are compared, starts that go down together, and those whose end is sought
+    coarse, together, most, found, sizes = fit.of_some(24), 64, 4, [tries[:, :0]], [np.zeros(0)]
+    count = 0
+    for k in range(0, tries.shape[1], together):
+        here, came = coarse.begun(tries[:, k : k + together])
+        here, count = coarse.taken(here, np.flatnonzero(came)), count + int(came.sum())
+        # the better half goes on, with open drivers put anew where the path comes nearest
+        for _ in range(4 if came.any() else 0):
+            here, size = descended(coarse, here, low, high, 8)
+            if coarse.open.any():
+                there, came = coarse.begun(here.z)
+                again = (coarse.missed(there) ** 2).sum(axis=(0, 2))
+                here, size = (
+                    coarse.mixed(came & (again < size), there, here),
+                    np.where(came, np.minimum(size, again), size),
+                )
+            order = np.argsort(size, kind="stable")[: max(len(size) // 2, most)]
+            here, size = coarse.taken(here, order), size[order]
+        found.append(here.z)
+        sizes.append((coarse.missed(here) ** 2).sum(axis=(0, 2)))
+        if progress is not None:
+            progress(f"{min(k + together, tries.shape[1])} of {tries.shape[1]} starts")
+    z, size = np.concatenate(found, axis=1), np.concatenate(sizes)
+    kept = list[int]()
+    # those that differ, in L
+    for i in np.argsort(size, kind="stable").tolist():
+        if len(kept) < most and all(np.abs(z[:, i] - z[:, j]).max() > 1e-2 for j in kept):
+            kept.append(i)
+    here, came = fit.begun(z[:, kept])
+    here, _ = descended(fit, fit.taken(here, np.flatnonzero(came)), low, high, 24)
+    return [fit.taken(here, np.array([i])) for i in range(here.z.shape[1])], count
+
+
 def _evolved(fit: Fit, low: Array, high: Array, seed: int) -> FitPoint | None:
     """The rows of the best dimensions that differential evolution finds in a box; None where it finds none that reaches all rows."""
 
     def costs(Z: Array) -> Any:
-        found = [fit.begun(z) for z in Z.T]
-        return np.array([1e6 if here is None else _size(fit, here) for here in found])
+        here, came = fit.begun(Z)
+        return np.where(came, (fit.missed(here) ** 2).sum(axis=(0, 2)), 1e6)
 
     found = scipy.optimize.differential_evolution(
         costs,
@@ -442,15 +629,18 @@ def _evolved(fit: Fit, low: Array, high: Array, seed: int) -> FitPoint | None:
         rng=seed,
         polish=False,
     )
-    return fit.begun(found.x)
+    here, came = fit.begun(found.x[:, None])
+    return here if came[0] else None
 
 
-def least_squares(fit: Fit, begin: FitPoint, low: Array, high: Array, evaluations: int = 100) -> FitPoint:
-    """The rows with the least sum of squares to which a start leads."""
+def least_squares(
+    fit: Fit, begin: FitPoint, low: Array, high: Array, evaluations: int = 100, weight: float = 0.0
+) -> FitPoint:
+    """The rows with the least sum of squares to which a start leads; ``weight``: see ``Trials``."""
     here = begin
     # times that open drivers are put anew where the path comes nearest
     for _ in range(3):
-        trials = Trials(fit, here)
+        trials = Trials(fit, here, weight)
         v = np.clip(fit.vector(here), low, high)
         found = scipy.optimize.least_squares(
             trials.residual,
@@ -464,8 +654,8 @@ def least_squares(fit: Fit, begin: FitPoint, low: Array, high: Array, evaluation
             gtol=1e-14,
         )
         here = trials.at(found.x) or trials.kept
-        again = fit.begun(here.z) if fit.open.any() else None
-        if again is None or _size(fit, again) > (1 - 1e-6) * _size(fit, here):
+        again, came = fit.begun(here.z) if fit.open.any() else (here, np.zeros(1, dtype=bool))
+        if not came[0] or _size(fit, again) > (1 - 1e-6) * _size(fit, here):
             return here
         here = again
     return here

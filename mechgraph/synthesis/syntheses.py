@@ -20,7 +20,7 @@ from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import MODES
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.setups import DefectName, FitName, SynthesisSetup, is_interval, two_ends
-from mechgraph.modes.homotopy import ELSEWHERE, Mask
+from mechgraph.modes.homotopy import ELSEWHERE, TRACKS_TOGETHER, Mask
 from mechgraph.quantities import Count, door, items_of, real_array, wrong
 from mechgraph.quantities import Index as Seed
 from mechgraph.synthesis.answers import (
@@ -380,6 +380,8 @@ def subset_values(problem: RowProblem, tasks: Any, subsets: int, seed: int, cach
         return np.zeros((0, len(problem.unknowns.names)))
     if not cache or (start := kept(of)) is None:
         return np.zeros((0, len(problem.unknowns.names)))
+    if not (subsets := min(subsets, TRACKS_TOGETHER // start.x.shape[1])):
+        return np.zeros((0, len(problem.unknowns.names)))
     picks = np.unique([np.sort(rng.choice(alike, R, replace=False)) for _ in range(subsets)], axis=0)
     drive = np.moveaxis(problem.asked[picks], 0, -1).astype(complex)
     goals = ClassMember(of.problem.numbers.taken(np.zeros(len(picks), dtype=np.intp)), np.nan_to_num(drive))
@@ -405,8 +407,8 @@ class FittedSynthesis:
     def rows(self, here: FitPoint) -> tuple[Mechanism, Array]:
         """The mechanism of fitted rows, and its coordinates ``(rows, F)``."""
         p = self.problem
-        q = p.system.coordinates_of(here.x).T[:, : len(p.m.freedom_names())]
-        m = p.unknowns.mechanism(p.outside(here.z[:, None])[:, 0])
+        q = p.system.coordinates_of(here.x[..., 0]).T[:, : len(p.m.freedom_names())]
+        m = p.unknowns.mechanism(p.outside(here.z)[:, 0])
         return m.replace(start=dict(zip(m.freedom_names(), q[0].tolist(), strict=True))), q
 
     def measured(
@@ -427,7 +429,7 @@ class FittedSynthesis:
             p.first.declared,
             tuple(m for m, _ in made),
             p.unknowns.names,
-            np.array([p.outside(here.z[:, None])[:, 0] for here in points]).reshape(len(points), len(p.unknowns.names)),
+            np.array([p.outside(here.z)[:, 0] for here in points]).reshape(len(points), len(p.unknowns.names)),
             np.array([p.first.poses_of(here.at.here) for here in points]).reshape(-1, *shape),
             np.array([q for _, q in made]).reshape(len(made), self.fit.rows, len(p.m.freedom_names())),
             np.array(closed),
