@@ -280,7 +280,7 @@ class Fit:
             way = [begin[0]]
             for stop, row in line:
                 # the longest step of a driver, in radians or lengths over L
-                parts = int(np.ceil(np.abs(stop - way[-1]).max() / 0.1))
+                parts = int(np.ceil(np.abs(stop - way[-1]).max() / 0.15))
                 way += [*(way[-1] + (stop - way[-1]) * np.arange(1, parts + 1)[:, None] / max(parts, 1))]
                 if row >= 0:
                     places[row] = len(way) - 1, w
