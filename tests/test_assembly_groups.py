@@ -21,7 +21,7 @@ from mechgraph.maths.tolerances import ModeTolerances
 from mechgraph.modes import certificate as certificates
 from mechgraph.modes import start_sets
 from mechgraph.modes.assemblies import Question
-from mechgraph.modes.certificate import Ball, Moved, certificate, curvature, loop_rows, rows, told_apart
+from mechgraph.modes.certificate import Ball, MovedMarker, certificate, curvature, loop_rows, rows, told_apart
 from mechgraph.modes.family import Family, Labelling
 from mechgraph.modes.homotopy import Care, Equations, Leg, Linear, follow
 from mechgraph.modes.start_sets import MISSED, TrackGroup, kept
@@ -454,7 +454,7 @@ def test_rods_of_balls_are_those_of_the_rows_of_rods(make: object) -> None:
     assert max(opened.rad.max(), turned.rad.max()) < 1e-11
 
 
-def placed(here: Configuration, moved: list[Moved], u: np.ndarray) -> Configuration:
+def placed(here: Configuration, moved: list[MovedMarker], u: np.ndarray) -> Configuration:
     """Other coordinates, and markers moved along their twists, by ``u``."""
     s, F = here.system, here.system.n_freedoms
     markers = [np.array(s.par.marker_a), np.array(s.par.marker_b)]
@@ -464,7 +464,7 @@ def placed(here: Configuration, moved: list[Moved], u: np.ndarray) -> Configurat
     return Configuration(s.with_parameters(par) if moved else s, s.advance(here.x, u[:F, None]))
 
 
-def largest_curvature(here: Configuration, rng: np.random.Generator, moved: list[Moved] | None = None) -> float:
+def largest_curvature(here: Configuration, rng: np.random.Generator, moved: list[MovedMarker] | None = None) -> float:
     """The largest second derivative along a unit direction that is found, by differences of first ones."""
     h, moved = 1e-5, moved or []
     n = here.system.n_freedoms + len(moved)
@@ -500,8 +500,8 @@ def test_markers_that_may_move_open_loops_as_fast_as_differences_say(
     monkeypatch.setattr(certificates, "MODES", ModeTolerances(ball=1e-9))
     rng, h = np.random.default_rng(1), 1e-6
     here = scaled_start(mg.load(name))
-    moved = [Moved(k, side, twist) for k in (1, 2) for side in (0, 1) for twist in (np.eye(6)[3], np.eye(6)[4])]
-    moved.append(Moved(0, 1, np.array([0.0, 0.6, 0.8, 0.3, 0.1, -0.2])))
+    moved = [MovedMarker(k, side, twist) for k in (1, 2) for side in (0, 1) for twist in (np.eye(6)[3], np.eye(6)[4])]
+    moved.append(MovedMarker(0, 1, np.array([0.0, 0.6, 0.8, 0.3, 0.1, -0.2])))
     A, F = rows(here, moved)[1], here.system.n_freedoms
     assert np.abs(A.mid[:, :F] - here.J[:, :, 0]).max() < 1e-12
     for k in range(len(moved)):

@@ -106,7 +106,7 @@ class Open(ValueError):
     """A loop has pairs for which there is no ball arithmetic."""
 
 
-class Moved(NamedTuple):
+class MovedMarker(NamedTuple):
     """A marker, of a pair on a side (0 or 1), that may move along a unit twist ``(6,)`` in the frame of its link."""
 
     pair: int
@@ -130,7 +130,7 @@ def rod_row(here: Configuration, rod: int) -> tuple[Ball, Ball]:
     return walk.distance(k.at_a[:, rod, 0], k.at_b[:, rod, 0], k.squares[rod, 0])
 
 
-def loop_rows(here: Configuration, loop: int, moved: Sequence[Moved] = ()) -> tuple[Ball, Ball]:
+def loop_rows(here: Configuration, loop: int, moved: Sequence[MovedMarker] = ()) -> tuple[Ball, Ball]:
     """Of a loop at one position ``f (width,)`` by which it is open, about its middle, and its derivatives by its freedoms ``(width, n)``.
 
     ``f = (vee (R - R^T) / 2, p)`` and ``f' = (w + vee part of w x (R - 1), v + w x p)`` for a twist ``(w, v)``. Behind the freedoms stand
@@ -151,7 +151,7 @@ def loop_rows(here: Configuration, loop: int, moved: Sequence[Moved] = ()) -> tu
 class _Walk:
     """Along a loop: the ``pose`` reached, and the twists of the freedoms passed, about ``middle`` in outer directions."""
 
-    def __init__(self, here: Configuration, middle: Array, moved: Sequence[Moved] = ()) -> None:
+    def __init__(self, here: Configuration, middle: Array, moved: Sequence[MovedMarker] = ()) -> None:
         self.here, self.system, self.middle, self.moved = here, here.system, middle, moved
         self.pose: Ball | None = None
         self.twists: list[Ball] = []
@@ -369,7 +369,7 @@ def told_apart(family: Family, x: Array, sure: Sequence[Certificate | None]) -> 
     return out
 
 
-def rows(here: Configuration, moved: Sequence[Moved] = ()) -> tuple[Ball, Ball]:
+def rows(here: Configuration, moved: Sequence[MovedMarker] = ()) -> tuple[Ball, Ball]:
     """What rows leave open ``(n,)`` and their derivatives ``(n, F)``, with bounds of their rounding; those of couplings are linear.
 
     Behind the freedoms stand the markers that may move.
@@ -402,7 +402,7 @@ def _columns_of_rods(s: RodSystem) -> list[Index]:
     return [np.concatenate([np.arange(first[k], first[k + 1]) for k, _ in way]) for way in ways]
 
 
-def curvature(here: Configuration, moved: Sequence[Moved] = ()) -> float:
+def curvature(here: Configuration, moved: Sequence[MovedMarker] = ()) -> float:
     """A bound of the second derivatives of the rows of all loops and rods within ``MODES.ball``."""
     s, S, total = here.system, here.S[:, :, 0], 0.0
     ends = [here.poses[:, :, (s.a, s.b)[side][pair]] for pair, side, _ in moved]

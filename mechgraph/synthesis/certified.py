@@ -14,7 +14,7 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import MODES
-from mechgraph.modes.certificate import UP, Ball, Certificate, Moved, Open, curvature, exact, root_near, rows
+from mechgraph.modes.certificate import UP, Ball, Certificate, MovedMarker, Open, curvature, exact, root_near, rows
 from mechgraph.synthesis.classes import ClassMember, TaskClass
 from mechgraph.synthesis.system import RowNumbers, RowProblem
 
@@ -70,13 +70,13 @@ def _certificate(of: TaskClass, goal: ClassMember, x: Array, rank: int) -> tuple
     return root_near(f, A, rank, float(K), False, open_), told
 
 
-def _moves(p: RowProblem, numbers: RowNumbers) -> tuple[list[Moved], list[int]] | None:
+def _moves(p: RowProblem, numbers: RowNumbers) -> tuple[list[MovedMarker], list[int]] | None:
     """How markers move with unknown dimensions, and with which; None where that is not served."""
-    out, which, turning = list[Moved](), list[int](), dict[tuple[int, int], list[tuple[int, int]]]()
+    out, which, turning = list[MovedMarker](), list[int](), dict[tuple[int, int], list[tuple[int, int]]]()
     for k, own in enumerate(p.places):
         for place in own:
             if place.array == "point":
-                out.append(Moved(place.pair, place.side, np.eye(6)[3 + place.component]))
+                out.append(MovedMarker(place.pair, place.side, np.eye(6)[3 + place.component]))
                 which.append(k)
             elif place.array == "axis":
                 turning.setdefault((place.pair, place.side), []).append((k, place.component))
@@ -91,6 +91,6 @@ def _moves(p: RowProblem, numbers: RowNumbers) -> tuple[list[Moved], list[int]] 
             return None
         across = np.cross(a, np.eye(3)[found[0][1]])[None] if len(found) == 1 else np.linalg.svd(a[None])[2][1:]
         for (k, _), w in zip(found, across / np.linalg.norm(across, axis=1)[:, None], strict=True):
-            out.append(Moved(pair, side, np.concatenate([w, np.cross(at, w)])))
+            out.append(MovedMarker(pair, side, np.concatenate([w, np.cross(at, w)])))
             which.append(k)
     return out, which
