@@ -6,6 +6,7 @@ import itertools
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -674,6 +675,29 @@ def test_after_a_stated_effort_what_was_found_is_called_searched(empty: None, mo
     assert (modes.total, modes.completeness) == (4, "searched")
     assert any("others were not looked for any further" in text for text in modes.evidence)
     assert not list(cache_folder().glob("*"))
+
+
+def test_how_many_there_are_is_estimated_from_what_random_loops_bring_again() -> None:
+    """Loops that are random permutations of 4,000 numbers: from a third of them it is known to some percent how many there are."""
+
+    class Numbers:
+        family = None
+
+        @staticmethod
+        def fingerprints(_base: None, x: np.ndarray) -> np.ndarray:
+            return x
+
+    class Shuffled(start_sets.TrackGroup):
+        def _round(self, _family: None, loops: int, rng: np.random.Generator, _progress: None) -> tuple[Any, Any]:
+            come = [1.0 * rng.permutation(4000)[: self.x.shape[1]] for _ in range(loops)]
+            return np.concatenate(come)[None], np.repeat(np.arange(loops), self.x.shape[1])
+
+    told = list[float]()
+    for seed in range(4):
+        group, rng = Shuffled(Numbers(), None, np.zeros((1, 1)), 1300), np.random.default_rng(seed)
+        group.grow(1e-4, rng, None)
+        told.append(float(re.findall(r"of some (\S+) \(\+-\d+ %\)", group.estimate)[0]))
+    assert np.abs(np.array(told) / 4000 - 1).max() < 0.15
 
 
 @pytest.mark.slow

@@ -154,8 +154,25 @@ def test_the_program_says_where_nothing_is_left_and_what_is_not_there(tmp_path: 
     result = run("synthesize", path)
     assert result.exit_code == 1
     assert "no [synthesis]" in bad("synthesize", "four-bar")
+    path.write_text(exact.replace('conditions = { "D.effort" = [-inf, 40] }', ""), encoding="utf-8")
+    page = tmp_path / "s.html"
+    assert "there are 3 mechanisms, counted from 0" in bad("synthesize", path, "--solution", "3", "--page", page)
+    assert not page.exists()
     path.write_text(FITTED + '\n[synthesis.sweep]\n"A.point.x" = [0, 1]\n', encoding="utf-8")
     assert "sweep" in bad("synthesize", path)
+
+
+def test_faults_of_tasks_and_unknowns_are_told_together_and_no_field_twice(tmp_path: Path) -> None:
+    path = tmp_path / "f.toml"
+    path.write_text(
+        FILE.replace('"B.point", "C.point"', '"Q.point"').replace('output = "D"', 'output = "Z"'), encoding="utf-8"
+    )
+    told = bad("synthesize", path)
+    assert "unknown freedom 'Z'" in told
+    assert "'Q.point'" in told
+    path.write_text(f"{FILE}pairs = [[0, 0], [1, 1]]\n", encoding="utf-8")
+    with pytest.raises(mg.MechgraphError, match="pairs_deg are both given"):
+        mg.load(path)
 
 
 def test_what_is_given_beside_a_stored_setup_replaces_it() -> None:

@@ -734,11 +734,12 @@ def synthesize(
         found = mg.synthesize(m, progress=say)
         found = found.good if good else found
         found = found if rank is None else found.ranked(rank)
+        if found and solution >= len(found):
+            there = f"there are {counted(len(found), 'mechanism')}, counted from 0"
+            opt.refuse("synthesize", f"--solution {solution}: {there}")
         figure = found.plot() if plot is not None and len(found) else None
         if page is not None and found:
             mg.write_report(found, path=page)
-    if found and solution >= len(found):
-        opt.refuse("synthesize", f"--solution {solution}: there are {counted(len(found), 'mechanism')}, counted from 0")
     if out is not None and found:
         mg.save(found[solution], out)
     _tell_found("synthesize", found, figure, plot, json)

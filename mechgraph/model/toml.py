@@ -159,6 +159,8 @@ class _Reader:
         for key, value in raw.items():
             if key in table.fields:
                 out[key] = value
+            elif key in table.in_degrees and table.in_degrees[key] in raw:
+                self.faults.append(f"{where}: {table.in_degrees[key]} and {key} are both given; leave one out")
             elif key in table.in_degrees:
                 out[table.in_degrees[key]] = self.radians(value, f"{where}.{key}")
             else:

@@ -768,9 +768,9 @@ def _of_class(family: Family, start: StartSet) -> tuple[str, tuple[str, ...]]:
     """The word for a start set, and what it rests on."""
     N, known, trace = start.x.shape[1], bound(family), start.trace
     loops = (
-        f"A random complex mechanism of the class has {counted(N, 'mode')}: {counted(start.loops, 'loop')} of such mechanisms brought no "
-        f"further one (chance of one missed {start.chance:.1g} where all permutations are as likely), {start.lost} of {start.followed} "
-        "tracks lost."
+        f"A random complex mechanism of the class has {counted(N, 'mode')}{start.estimate}: {counted(start.loops, 'loop')} of such "
+        f"mechanisms brought no further one (chance of one missed {start.chance:.1g} where all permutations are as likely), "
+        f"{start.lost} of {start.followed} tracks lost."
     )
     if not start.whole:
         return "searched", (loops, f"After {counted(start.followed, 'track')} others were not looked for any further.")

@@ -287,12 +287,14 @@ def follow(
     laps: int = 1,
     stride: int = 0,
     enough: Callable[[Tracked], bool] | None = None,
+    told: Callable[[str], None] | None = None,
 ) -> Tracked:
     """Tracks from states ``x (nx, V)`` at ``s = 0`` to ``s = 1``, at the end polished; ``tracks`` are their numbers on the leg.
 
     Of several ``laps`` each one follows the ways ``stride`` (else V) numbers further on from where the last one ended. There no track waits
     for others, and the last ones, which may come near to where assemblies meet, are given up where they take twice the steps of all others.
     Where what has arrived is ``enough``, the others stay on their way.
+    ``told`` is now and then how far they are.
     """
     V = x.shape[1]
     every, stride = np.arange(V) if tracks is None else tracks, stride or V
@@ -303,13 +305,22 @@ def follow(
             executor.submit(_followed_here, leg, x[:, at], care, straight, every[at], polish, laps, stride)
             for at in blocks
         ]
-        each = [vars(part.result()).values() for part in parts]
+        each = []
+        for k, part in enumerate(parts, 1):
+            each.append(vars(part.result()).values())
+            if told is not None and k < len(parts):
+                told(f"{k} of {len(parts)} parts of the tracks came")
         return Tracked(*(np.concatenate(values, axis=-1) for values in zip(*each, strict=True)))
     out = Tracked(x.copy(), np.zeros(V), np.zeros(V, dtype=bool), np.zeros(V, dtype=bool))
     march = _March(leg, x, every, way, stride)
     # steps after which a track is given up
-    most = 2000 * laps
+    most, silent = 2000 * laps, 0
     for step in range(most):
+        # numbers of states that are led on until a line is told: some seconds
+        silent += march.x.size
+        if told is not None and silent > 200_000:
+            told(f"{V - len(march.who)} of {V} tracks came so far")
+            silent = 0
         # tracks that are not waited for
         if laps > 1 and most == 2000 * laps and 20 * len(march.who) <= V:
             most = 2 * step

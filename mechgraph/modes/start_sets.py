@@ -34,6 +34,10 @@ test, Arnold Math. J. 4, 2018.
 
 All assemblies of a random member of a class, by monodromy: paths of members that come back permute the assemblies.
 
+How many there are is estimated while some are missing, by capture and recapture: a loop leads the ``N`` that are known to ``N`` others, of
+which ``N^2 / total`` are known already, where all permutations are as likely. Over all loops ``total = sum N n / sum m`` with ``n`` that
+came back and ``m`` of them known (Schnabel, The estimation of the total fish population of a lake, Amer. Math. Monthly 45, 1938).
+
 Sources: Duff, Hill, Jensen, Lee, Leykin and Sommars, Solving polynomial systems via homotopy continuation and monodromy, IMA J. Numer.
 Anal. 39, 2019; Sommese and Wampler, The Numerical Solution of Systems of Polynomials, 2005, section 15.4.
 
@@ -420,7 +424,7 @@ class StartSet:
 
     ``loops`` is the number of loops of members that brought no further assembly, ``chance`` that of one having been missed by them, were
     every permutation as likely; ``lost`` of the tracks ``followed`` did not come to the end of their leg. ``trace`` is the trace test,
-    which is left out where a bound is met.
+    which is left out where a bound is met. ``estimate``: how many there are in words, where loops bring further ones.
     """
 
     member: Member
@@ -432,6 +436,7 @@ class StartSet:
     followed: int
     whole: bool
     trace: Trace
+    estimate: str = ""
 
     def fits(self, family: Family) -> bool:
         """Whether it is closed for a class."""
@@ -516,7 +521,16 @@ def _permuted(
     test = whole and not met
     trace = trace_test(equations, group.base, group.x, rng, progress) if test else NOT_PASSED
     return StartSet(
-        group.base, group.x, equations.mixing, group.quiet, group.chance, group.lost, group.followed, whole, trace
+        group.base,
+        group.x,
+        equations.mixing,
+        group.quiet,
+        group.chance,
+        group.lost,
+        group.followed,
+        whole,
+        trace,
+        group.estimate,
     )
 
 
@@ -525,6 +539,8 @@ class TrackGroup:
 
     def __init__(self, equations: Equated, base: Any, x: Array, most: int) -> None:
         self.equations, self.most, self.lost, self.followed = equations, most, 0, 0
+        # sums over loops of how many were known before times how many came back, and of how many of these were known
+        self.caught, self.again = 0, 0
         self.move(base, x)
 
     def move(self, base: Any, x: Array) -> None:
@@ -541,32 +557,50 @@ class TrackGroup:
                 break
             if progress is not None:
                 progress(
-                    f"{counted(N, 'solution')} of a random member so far, {self.quiet} loops brought no further one"
+                    f"{counted(N, 'solution')} of a random member so far{self.estimate}, {self.quiet} loops brought no further one"
                 )
             # so many that where none brings a further one they are enough, and no fewer than are followed at the cost of one
             enough = int(np.ceil(np.log(missed / self.chance) / -np.log(N + 1.0)))
             # 96 tracks are followed together at least, of as many loops as it takes: a step of so many costs little more than one of few
             loops = max(min(enough, TRACKS_TOGETHER // N), 96 // N, 1)
-            there = self._round(family, loops, rng)
+            there, loop = self._round(family, loops, rng, progress)
             poses = self.equations.fingerprints(self.base, there)
-            new = distinct(poses, self.known)
+            for mine in (loop == k for k in range(loops)):
+                new = distinct(poses[:, mine], self.known)
+                self.caught += self.x.shape[1] * int(mine.sum())
+                self.again += int(mine.sum()) - new.size
+                self.x = np.concatenate([self.x, there[:, mine][:, new]], axis=1)
+                self.known = np.concatenate([self.known, poses[:, mine][:, new]], axis=1)
             # a further one stays outside where the loop leaves it where it is, or where its track is lost
             outside = min(1.0 / (N + 1.0) + (1.0 - there.shape[1] / (N * loops)), 1.0)
-            self.quiet, self.chance = (0, 1.0) if new.size else (self.quiet + loops, self.chance * outside**loops)
-            self.x = np.concatenate([self.x, there[:, new]], axis=1)
-            self.known = np.concatenate([self.known, poses[:, new]], axis=1)
+            quiet = self.x.shape[1] == N
+            self.quiet, self.chance = (self.quiet + loops, self.chance * outside**loops) if quiet else (0, 1.0)
 
-    def _round(self, family: Any, loops: int, rng: np.random.Generator) -> Array:
-        """Where all assemblies come to on several loops through two random members each."""
+    @property
+    def estimate(self) -> str:
+        """How many there are in all, by what loops bring again; nothing is said where loops bring all again."""
+        caught, again = self.caught, self.again
+        # the number that is counted again is off by its root; three are not counted with a chance of .95 where none is
+        least = caught / (again + 2 * again**0.5 + 3)
+        if self.quiet or (again < 10 and least <= self.x.shape[1]):
+            return ""
+        if again < 10:
+            return f", of more than {least:.2g} by what loops bring again"
+        return f", of some {caught / again:.4g} (+-{100 / again**0.5:.0f} %) by what loops bring again"
+
+    def _round(
+        self, family: Any, loops: int, rng: np.random.Generator, progress: Callable[[str], None] | None
+    ) -> tuple[Array, Array]:
+        """Where all assemblies come to on several loops through two random members each, and on which of these."""
         base, corners = self.base.joined([self.base] * loops), family.random_members(rng, 2 * loops)
         first, second = (self.base.joined(corners[i::2]) for i in range(2))
         begin, end = self.base.joined([base, first, second]), self.base.joined([first, second, base])
         N, laps = self.x.shape[1], 3
         leg = self.equations.leg(begin, end, np.repeat(np.arange(laps * loops), N))
-        tracked = follow(leg, np.tile(self.x, loops), Care(), laps=laps)
+        tracked = follow(leg, np.tile(self.x, loops), Care(), laps=laps, told=progress)
         self.lost += int((~tracked.arrived).sum())
         self.followed += laps * N * loops
-        return tracked.x[:, tracked.arrived]
+        return tracked.x[:, tracked.arrived], np.repeat(np.arange(loops), N)[tracked.arrived]
 
 
 def tame(equations: Equated, base: Any, x: Array, rng: np.random.Generator) -> tuple[Any, Array]:

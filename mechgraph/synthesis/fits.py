@@ -536,7 +536,8 @@ def fitted(
                 size = max(float(np.sqrt(np.mean(fit.residual(end) ** 2))), 1e-9)
                 end = least_squares(fit, end, low, high, 200, part * size)
         narrow = end is not None and fit.margins(end).min() < MARGIN
-        if narrow or way != "least_squares" or limits:
+        kept_as_is = end is not None and all(keeps(f(end), least, most) for f, least, most in limits)
+        if narrow or way != "least_squares" or not kept_as_is:
             best = begin if narrow or end is None else end
             end, came = constrained(fit, best, low, high, way, goal, [*limits, wide] if narrow else limits)
             early += end is not None and not came

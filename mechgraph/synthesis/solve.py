@@ -31,6 +31,7 @@ from mechgraph.modes.homotopy import TRACKS_TOGETHER, Care, Mask, Tracked, follo
 from mechgraph.modes.start_sets import (
     MISSED,
     MISSED_AGAIN,
+    MOST_TRACKED,
     NOT_PASSED,
     Pencil,
     Trace,
@@ -53,7 +54,8 @@ class TaskStart:
 
     ``source``: who published that there are so many, for sets that came with the package. Of a large set ``x`` has one of
     ``each`` solutions that do the same; ``alike (nx, N, k)`` are these, but for exchanges of pairs, as far as they are known.
-    ``against``: how many fail some of what is asked, see ``doing_all``.
+    ``against``: how many fail some of what is asked, see ``doing_all``. ``estimate``: how many there are in words, where loops bring
+    further ones.
     """
 
     member: ClassMember
@@ -66,6 +68,7 @@ class TaskStart:
     source: str = ""
     each: int = 1
     against: int = 0
+    estimate: str = ""
 
     @property
     def x(self) -> Array:
@@ -94,7 +97,7 @@ class TaskStart:
         """What that rests on."""
         against = f"{self.against} more fail some of what is asked, and are left out; " if self.against else ""
         loops = (
-            f"A random complex task of the class has {counted(self.total, 'solution')}{self._each}: {against}"
+            f"A random complex task of the class has {counted(self.total, 'solution')}{self._each}{self.estimate}: {against}"
             f"{counted(self.loops, 'loop')} of such tasks brought no further one (chance of one missed {self.chance:.1g} where all "
             f"permutations are as likely), {self.lost} of {self.followed} tracks lost."
         )
@@ -175,6 +178,8 @@ def start_set(
         group.most = most
         group.grow(MISSED, rng, progress)
     known = group.quiet, group.chance
+    if known[1] > MISSED and group.followed >= MOST_TRACKED:
+        return TaskStart(group.base, group.x[:, :, None], *known, group.lost, group.followed, NOT_PASSED, estimate=group.estimate)
     group.move(*tame(of, group.base, group.x, rng))
     if source and group.x.shape[1] == most:
         return TaskStart(group.base, group.x[:, :, None], *known, group.lost, group.followed, NOT_PASSED, source)
@@ -394,8 +399,8 @@ def ends(
             which = np.repeat(np.arange(len(some)), x.shape[1])
             if not which.size:
                 continue
-            enough = partial(_enough, of, goals.taken(some), which, N, [0])
-            here = follow(of.leg(begin, goals.taken(some), which), np.tile(x, len(some)), care, enough=enough)
+            enough, way = partial(_enough, of, goals.taken(some), which, N, [0]), of.leg(begin, goals.taken(some), which)
+            here = follow(way, np.tile(x, len(some)), care, enough=enough, told=progress)
             for j, place in enumerate(some.tolist()):
                 mine, trust = which == j, 2 if run == runs - 1 else min(run, 1)
                 leg = of.leg(begin, goals.taken(np.array([place])))

@@ -210,6 +210,8 @@ class RowProblem:
             faults.append(f"the relation of the coupling {moving[0]!r} is no polynomial; leave it out (couplings=)")
         if self.tasks is None or not m.has_geometry:
             bare = [] if m.has_geometry else ["the pairs have no geometry; a topology can be counted, not dimensioned"]
+            if m.has_geometry:
+                Unknowns(m, m, unknown, faults)
             raise DeclarationError(self.name, [*faults, *bare])
         values = self.tasks.values
         filled = {
