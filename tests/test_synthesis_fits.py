@@ -103,6 +103,22 @@ def test_the_least_ratio_of_lengths_is_less_than_that_of_all_others_near_by_that
     assert min(ratio(best + step * way) for way in ways for step in (0.01, 0.1, 0.3)) > s.fitness[0].ratio
 
 
+def test_where_no_start_leads_through_all_rows_nothing_is_found_and_that_is_said() -> None:
+    """The shortest of a frame of 3, a crank of 3, a coupler of some 3.1 and a rocker of 2.5 is the rocker: the crank swings (Grashof)."""
+    angles = np.linspace(0.0, 2 * np.pi, 9)
+    task = mg.function("A", "D", np.column_stack([angles, 0.3 * np.sin(angles)]))
+    s = mg.synthesize(
+        replaced(four_bar(), B=(0, 3)),
+        task,
+        ["C.point.x"],
+        fit="least_squares",
+        starts=2,
+        bounds={"C.point.x": (3, 3.1)},
+    )
+    assert len(s) == 0
+    assert s.evidence[0].startswith("0 starts of 2 led to all rows")
+
+
 def test_fits_begin_with_exact_solutions_of_parts_of_the_task() -> None:
     """A function of another four-bar: every part of it that determines a mechanism exactly gives that one among its answers."""
     other = {"A": (0, 0), "B": (-0.3, 0.8), "C": (2.6, 1.9), "D": (3, 0)}

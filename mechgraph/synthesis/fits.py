@@ -608,7 +608,9 @@ def _best(
     for i in np.argsort(size, kind="stable").tolist():
         if len(kept) < most and all(np.abs(z[:, i] - z[:, j]).max() > 1e-2 for j in kept):
             kept.append(i)
-    here, came = fit.begun(z[:, kept])
+    here, came = fit.begun(z[:, kept]) if kept else (here, np.zeros(0, dtype=bool))
+    if not came.any():
+        return [], count
     here, _ = descended(fit, fit.taken(here, np.flatnonzero(came)), low, high, 24)
     return [fit.taken(here, np.array([i])) for i in range(here.z.shape[1])], count
 

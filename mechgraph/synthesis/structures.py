@@ -235,9 +235,9 @@ def _placed(
     at_frame = [pair.name for pair in m.pairs if pair.a == m.frame]
     still = roles.at_frame[:2] if not roles.bodies else ()
     pins = [pair.name for pair in m.pairs if pair.name not in at_frame] + [n for n in at_frame if n not in still]
-    return m, [f"{n}.point" for n in pins] + [
-        p for p, row in zip(_points(roles), at, strict=True) if np.isnan(row).any()
-    ]
+    sought = [f"{n}.point" for n in pins]
+    sought += [p for p, row in zip(_points(roles), at, strict=True) if np.isnan(row).any()]
+    return m, [f"{name}.{axis}" for name in sought for axis in "xy"]
 
 
 def _determined(m: Mechanism, tasks: Any, candidates: Sequence[str], rng: np.random.Generator) -> tuple[str, ...] | str:

@@ -363,7 +363,9 @@ def driver_of(m: Mechanism, tasks: Any) -> tuple[str | None, str | None]:
     return (names[0], None) if len(names) == 1 else (None, None)
 
 
-def subset_values(problem: RowProblem, tasks: Any, subsets: int, seed: int, cache: bool) -> Array:
+def subset_values(
+    problem: RowProblem, tasks: Any, subsets: int, seed: int, cache: bool, progress: Progress = None
+) -> Array:
     """Values ``(n, names)`` of all real solutions of so many subsets of rows with as many conditions as unknowns.
 
     None where no start set of such tasks is kept or came with the package: to make one takes longer than a fit.
@@ -385,7 +387,7 @@ def subset_values(problem: RowProblem, tasks: Any, subsets: int, seed: int, cach
     picks = np.unique([np.sort(rng.choice(alike, R, replace=False)) for _ in range(subsets)], axis=0)
     drive = np.moveaxis(problem.asked[picks], 0, -1).astype(complex)
     goals = ClassMember(of.problem.numbers.taken(np.zeros(len(picks), dtype=np.intp)), np.nan_to_num(drive))
-    found = ends(of, start, goals, rng, None)
+    found = ends(of, start, goals, rng, progress)
     real = [real_states(of, goals.taken(np.array([i])), one.x)[0] for i, one in enumerate(found)]
     return problem.outside(np.concatenate(real, axis=1)[: of.u]).T
 
@@ -659,7 +661,7 @@ def _fitted(
     """What comes nearest to what is asked, or meets it and is best in something else."""
     of = FittedSynthesis(m, tasks, unknown, bounds, over)
     _refuse_other_names(of.problem, bounds)
-    exact = subset_values(RowProblem(m, tasks, unknown), tasks, starts, seed, cache) if fit else ()
+    exact = subset_values(RowProblem(m, tasks, unknown), tasks, starts, seed, cache, progress) if fit else ()
     goal = of.measured(*goals[0]) if goals else None
     limited = [
         (of.measured(measure, none=1e3 if least is None else -1e3, most=least is None), least, most)
