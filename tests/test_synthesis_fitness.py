@@ -159,3 +159,29 @@ def test_mechanisms_of_one_topology_are_judged_together_as_each_alone() -> None:
         angles = [[fit.transmission, fit.transmission_between] for fit in (a, b)]
         assert np.allclose(*angles, atol=1e-5, equal_nan=True)
     assert {fit.full_turn for fit in together} == {fit.good for fit in together} == {True, False}
+
+
+@pytest.mark.parametrize("name", ["bennett", "spherical-four-bar", "r-sp-r", "geneva"])
+def test_transmission_is_that_of_solutions(name: str) -> None:
+    """Redundant loops, a point in a plane, and contacts, whose forces act elsewhere."""
+    m = mg.load(name)
+    driver = m.full_name(m.drives[0].freedom)
+    s = mg.kinematics(m, {driver: m.start.get(driver, 0.0) + np.array([0.0, 0.05, 0.1])})
+    q = np.concatenate([s[p.name].position for p in m.pairs], axis=1)
+    outputs = [p.freedom_names[0] for p in m.pairs if p.type.f == 1 and m.frame in (p.a, p.b)]
+    wanted = [mg.transmission(s, output).transmission_angle for output in outputs if output != driver]
+    found = fitness(m, q, driver)
+    assert found.good
+    assert found.transmission == pytest.approx(np.min(wanted), abs=1e-7)
+
+
+def test_change_points_are_passed_straight_on() -> None:
+    pairs = {"A": (0, 0), "B": (0.6, 0.8), "C": (2.6, 0.8), "D": (2, 0)}
+    ends = ["frame", "crank", "coupler", "rocker", "frame"]
+    made = [
+        mg.Pair(name, "R", a, b, point=at) for (name, at), a, b in zip(pairs.items(), ends[:4], ends[1:], strict=True)
+    ]
+    m = mg.Mechanism("parallelogram", pairs=made, drives=["A"], planar=True)
+    turned = np.array([0.0, 2.0, 4.0, 6.0])
+    found = fitness(m, np.outer(turned, [1, -1, 1, -1]), "A", "D")
+    assert (found.good, found.full_turn) == (True, True)

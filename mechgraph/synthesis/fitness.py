@@ -26,7 +26,7 @@ from mechgraph.errors import DeclarationError, MechgraphWarning
 from mechgraph.kinematics.assembly import closed_start
 from mechgraph.kinematics.motion_path import FARTHEST
 from mechgraph.kinematics.reach import BEYOND_END, beyond
-from mechgraph.kinematics.state import Configuration
+from mechgraph.kinematics.state import CLOSED, Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.kinetostatics import kinematics, solve, transmission
 from mechgraph.maths.newton import cubic
@@ -154,7 +154,10 @@ class _Circuits:
         self.back = np.flatnonzero((system.single_rows >= 0) & np.isfinite(family.periods))
         self.turns, self.closes = np.zeros(self.V, dtype=np.intp), np.zeros(self.V, dtype=bool)
         points = self.here(x[:, :, 0], np.arange(self.V)).pair_points
-        self.size = np.sqrt(((points - points.mean(axis=1, keepdims=True)) ** 2).sum(axis=0).mean(axis=0))
+        sizes = np.sqrt(((points - points.mean(axis=1, keepdims=True)) ** 2).sum(axis=0).mean(axis=0))
+        sizes = np.where(sizes > CLOSED, sizes, 1.0)
+        # that of the first is the unit of length
+        self.size = sizes / sizes[0]
         self.nodes = self._joined(self._followed())
         self._number()
         self._place()
@@ -208,7 +211,7 @@ class _Circuits:
         far = 8 * self.period if turns else MODES.slide_stroke
         low, high = (ends(goals[:, :1] if turns else goals, axis=1)[case] for ends in (np.min, np.max))
         h, wide, going, out = np.full(2 * self.V, 0.1), np.zeros(2 * self.V), ~self.dead[case], list[_Nodes]()
-        before, closing = last.taken(np.arange(2 * self.V)), np.zeros(self.V, dtype=bool)
+        (before, clear), closing = (last.taken(np.arange(2 * self.V)) for _ in range(2)), np.zeros(self.V, dtype=bool)
         out.append(last.taken(np.arange(0, 2 * self.V, 2)))
         # steps after which a circuit is left open
         for _ in range(3000):
@@ -220,10 +223,13 @@ class _Circuits:
             leap, here = h[at] < 1e-6, last.taken(at)
             ahead = np.where(leap, 1e-3, h[at])
             dq = here.t * ahead
-            known = np.flatnonzero(wide[at] > 0)
+            known = np.flatnonzero((wide[at] > 0) & ~leap)
             some = before.taken(at[known])
             y, _ = self._way(here.taken(known), some)
             dq[:, known] = cubic(y, here.t[:, known], s.tangent(y, some.t), -wide[at[known]], ahead[known])
+            # beside where they meet motions are noise, ways that lead there are not
+            y, w = self._way(clear.taken(at[leap]), here.taken(leap))
+            dq[:, leap] = np.where(w > 0, 1e-3 / np.where(w > 0, w, 1.0) * y, dq[:, leap])
             x = s.advance(here.x, dq)
             one, _ = self.at(x, here.case)
             two, new = self.at(s.advance(x, one), here.case)
@@ -240,6 +246,7 @@ class _Circuits:
             on, new, here = at[good], new.taken(good), here.taken(good)
             wide[on] = self._way(here, new)[1]
             before.put(on, here)
+            clear.put(on[wide[on] > 1e-4], here.taken(wide[on] > 1e-4))
             last.put(on, new)
             out.append(new)
             gone = np.maximum(low - last.x[self.row], last.x[self.row] - high) > far
@@ -496,9 +503,15 @@ def _transmitted(
         loaded = U[:, np.searchsorted(free, output), :r] / sigma
         every = np.concatenate([loaded[:, None] @ V[:, :r], V[:, r:]], axis=1)
         w, p = here.pair_wrenches(every.transpose(2, 1, 0)), here.pair_points
-        w[:3] -= cross(p[:, :, None], w[3:])
-        least = np.concatenate([w[:3] / of.size[case], w[3:]]).transpose(3, 0, 1, 2).reshape(here.T, -1, w.shape[2])
-        y = np.linalg.pinv(np.nan_to_num(least[:, :, 1:])) @ np.nan_to_num(least[:, :, :1])
+        reactions = w.copy()
+        for f in (of.column, output):
+            own = reactions[:, s.pair_of_freedom[f]]
+            own -= here.E[:, f, None] * (here.S[:, f, None] * own).sum(axis=0)
+        for wrenches in (w, reactions):
+            wrenches[:3] -= cross(p[:, :, None], wrenches[3:])
+        reactions[:3] /= of.size[case]
+        least = np.nan_to_num(reactions.transpose(3, 0, 1, 2).reshape(here.T, -1, w.shape[2]))
+        y = np.linalg.pinv(least[:, :, 1:]) @ least[:, :, :1]
         guide = int(s.pair_of_freedom[output])
         link = s.a[guide] if s.b[guide] == s.graph.frame else s.b[guide]
         pairs = np.flatnonzero(((s.a == link) | (s.b == link)) & (np.arange(len(s.a)) != guide))
