@@ -179,7 +179,9 @@ def start_set(
         group.grow(MISSED, rng, progress)
     known = group.quiet, group.chance
     if known[1] > MISSED and group.followed >= MOST_TRACKED:
-        return TaskStart(group.base, group.x[:, :, None], *known, group.lost, group.followed, NOT_PASSED, estimate=group.estimate)
+        return TaskStart(
+            group.base, group.x[:, :, None], *known, group.lost, group.followed, NOT_PASSED, estimate=group.estimate
+        )
     group.move(*tame(of, group.base, group.x, rng))
     if source and group.x.shape[1] == most:
         return TaskStart(group.base, group.x[:, :, None], *known, group.lost, group.followed, NOT_PASSED, source)
@@ -399,7 +401,10 @@ def ends(
             which = np.repeat(np.arange(len(some)), x.shape[1])
             if not which.size:
                 continue
-            enough, way = partial(_enough, of, goals.taken(some), which, N, [0]), of.leg(begin, goals.taken(some), which)
+            enough, way = (
+                partial(_enough, of, goals.taken(some), which, N, [0]),
+                of.leg(begin, goals.taken(some), which),
+            )
             here = follow(way, np.tile(x, len(some)), care, enough=enough, told=progress)
             for j, place in enumerate(some.tolist()):
                 mine, trust = which == j, 2 if run == runs - 1 else min(run, 1)
