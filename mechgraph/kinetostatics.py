@@ -869,14 +869,16 @@ def _wrenches(s: Solution, link: str, guide: str) -> list[tuple[Array, Array, Ar
     m, found = s.mechanism, []
     for pair in m.pairs:
         if link in (pair.a, pair.b) and pair.name != guide:
-            total = s[pair.name].total
+            # totals act on link b, forces of gears on the second one
+            total = s[pair.name].total if link == pair.b else -s[pair.name].total
             p = s.contact(pair.name).center if pair.type.touching else s.link(pair.b).point(pair.markers[1].point)[0]
             found.append((total[..., 3:], total[..., :3] - np.cross(p, total[..., 3:]), p))
     for coupling in m.couplings:
-        if coupling.steps and link in coupling.gears(m):
+        if coupling.steps and link in (gears := coupling.gears(m)):
             result = s.coupling(coupling.name)
             assert isinstance(result, CouplingResult)
-            found.append((result.force, np.zeros_like(result.force), result.point))
+            force = result.force if link == gears[1] else -result.force
+            found.append((force, np.zeros_like(force), result.point))
     return found
 
 

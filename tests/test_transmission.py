@@ -43,6 +43,49 @@ def test_driven_from_the_other_end() -> None:
     assert np.allclose(t.transmission_angle[known], between(C - B, B - A)[known], atol=1e-6)
 
 
+@pytest.mark.parametrize("turned", [(), ("C",), ("F",), ("C", "F"), ("D",), ("g",)])
+def test_an_output_that_is_pushed_in_two_places(turned: tuple[str, ...]) -> None:
+    """A six-bar driven between two couplers, and an output with a gear and a pin: whichever link of a pair, or gear, is named first.
+
+    Forces on the output do the work of its effort, one for a unit; they could do their sizes times speeds.
+    """
+
+    def pair(name: str, a: str, b: str, point: tuple[float, float]) -> mg.Pair:
+        return mg.Pair(name, "R", *((b, a) if name in turned else (a, b)), point=(*point, 0), axis=(0, 0, 1))
+
+    six = [
+        pair("D", "frame", "out", (0, 0)),
+        pair("C", "out", "K", (1, 1)),
+        pair("F", "out", "L", (-0.6, 1.2)),
+        pair("H", "K", "M", (2, 2)),
+        pair("G", "L", "M", (0.2, 2.6)),
+        pair("B", "K", "crank", (2.6, 0.8)),
+        pair("A", "frame", "crank", (2.4, 0)),
+    ]
+    five = [
+        pair("D", "frame", "out", (0, 0)),
+        pair("A", "frame", "wheel", (3, 0)),
+        pair("C", "out", "K", (0.5, 0.8)),
+        pair("B", "wheel", "L", (3.4, 0.9)),
+        pair("E", "K", "L", (1.6, 2.1)),
+    ]
+    Z = (0, 0, 1)
+    gears = [mg.Gear("p", "out", 20, (0, 0, 0), Z, module=0.1), mg.Gear("w", "wheel", 40, (3, 0, 0), Z, module=0.1)]
+    mesh = mg.Mesh("g", *(("w", "p") if "g" in turned else ("p", "w")))
+    for m, driver, pins in (
+        (mg.Mechanism("six-bar", pairs=six, planar=True, drives=["G"], frame="frame"), "G", ("C", "F")),
+        (mg.Mechanism("geared", pairs=five, gears=gears, couplings=[mesh], drives=["E"], frame="frame"), "E", ("C",)),
+    ):
+        s = mg.solve(m.replace(loads=[mg.Effort("D", 1.0)]), {driver: 0.02}, redundant="minimum_norm")
+        could = 0.0
+        for name in pins:
+            at = s.link("out").pose @ np.append(np.asarray(m.pair(name).point), 1.0)
+            could += np.linalg.norm(s[name].total[3:]) * np.linalg.norm(at[:3])
+        if m.couplings:
+            could += np.linalg.norm(s.coupling("g").force) * np.linalg.norm(s.coupling("g").point)
+        assert mg.transmission(s, "D").index == pytest.approx(1.0 / could, rel=1e-9)
+
+
 def test_slider_crank() -> None:
     """The deviation angle of the slider is that of the rod to its way."""
     s = mg.solve(mg.load("slider-crank"))
