@@ -354,9 +354,9 @@ def test_loops_are_followed_in_one_go_where_many_assemblies_need_many(monkeypatc
     assert start is not None
     rounds: list[int] = []
 
-    def back(group: TrackGroup, _: Family, loops: int, __: np.random.Generator) -> np.ndarray:
+    def back(group: TrackGroup, _: Family, loops: int, *__: object) -> tuple[np.ndarray, np.ndarray]:
         rounds.append(loops)
-        return np.tile(group.x, loops)
+        return np.tile(group.x, loops), np.repeat(np.arange(loops), group.x.shape[1])
 
     monkeypatch.setattr(TrackGroup, "_round", back)
     group = TrackGroup(Equations(family, start.mixing), start.member, start.x, 100)
