@@ -721,7 +721,8 @@ def transmission(s: Solution, output: str, driver: str | None = None) -> Transmi
     s : Solution
         A solution.
     output : str
-        A single freedom, ``"D"`` or ``"C.Tz"``, of the pair of the output link and the link that guides it.
+        A single freedom, ``"D"`` or ``"C.Tz"``, of the pair of the output link (link b; link a where b is the frame) and the link that
+        guides it.
     driver : str, optional
         The input freedom. Default: those that take the efforts of the solution.
 

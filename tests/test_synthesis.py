@@ -580,6 +580,18 @@ def test_certificates_hold_the_mechanisms() -> None:
     assert list(mg.synthesize(*rated).certificates) == [None]
 
 
+def test_what_is_found_can_be_sought_again_and_slips_are_told() -> None:
+    """Answers have a ``start`` at all pairs, those of rods too; equal bounds and names that are none are refused in words."""
+    m, task, unknown, _ = LADDER["four-bar function, 5 pairs"]()
+    s = mg.synthesize(m, task, unknown)
+    np.testing.assert_allclose(mg.synthesize(s[-1], task, unknown).values, s.values, atol=1e-9)
+    with pytest.raises(mg.DeclarationError, match=r"bounds\['B.point.x'\]: both ends are 1") as told:
+        mg.synthesize(m, task, unknown, fit="minimax", bounds={"B.point.x": (1, 1)}, over={"Q": [1.0]})
+    assert "over: unknown freedom 'Q'" in str(told.value)
+    with pytest.warns(mg.MechgraphWarning, match=r"angles are in radians"), pytest.raises(mg.DeclarationError):
+        mg.synthesize(m, mg.function("A", "D", np.rad2deg(task.pairs)), unknown[:1])
+
+
 def test_other_positions_of_a_given_dyad_are_no_solutions() -> None:
     """The crank of a four-bar for three poses of its own coupler: its pivot alone is as far from the pin in all of them; the rocker, given,
     stands on its other side in no solution.

@@ -58,6 +58,48 @@ def test_defects_and_transmission_of_four_bars_are_those_of_closed_forms(seed: i
         assert found.transmission_between == pytest.approx(min(between), abs=1e-3)
 
 
+@pytest.mark.parametrize("gap", [1e-2, 1e-3, 1e-4, 1e-5])
+def test_rows_beside_a_near_change_point_lie_on_one_branch(gap: float) -> None:
+    """The crank passes its ground while coupler and rocker are nearly in line, where the other circuit comes as near as the gap."""
+    rng, made, rows, least = np.random.default_rng(5), list[mg.Mechanism](), list[np.ndarray](), list[float]()
+    while len(made) < 12:
+        known, (a, b, c) = FourBarFormula(rng), np.round(np.exp(0.6 * rng.normal(size=3)), 2)
+        known.lengths, side = (a, b, c, a + abs(c - b) + gap), rng.choice([-1, 1])
+        reach = np.abs(known.lengths[3] - a * np.exp(0.3j))
+        if abs(b - c) < 0.2 or reach > b + c:
+            continue
+        angles = np.sort(rng.uniform(-0.3, 0.3, 20))
+        made.append(known.mechanism(angles[0], side))
+        rows.append(rows_of(made[-1], [known.start(angle, side) for angle in angles]))
+        dense = np.concatenate([np.linspace(angles[0], angles[-1], 4001), angles])
+        least.append(min(transmission_angle(known, angle, side) for angle in dense))
+    for one, angle in zip(fitnesses(made, np.array(rows), "O0", "O3"), least, strict=True):
+        assert (one.branch, one.circuit, one.order) == (False, False, False)
+        assert one.transmission_between == pytest.approx(angle, abs=1e-4)
+
+
+def test_a_slide_that_drives_beyond_its_folds_is_followed_to_them() -> None:
+    """Both sides of an eccentric slider-crank meet where the slide turns back, however far from the first row: one circuit."""
+    crank, rod, e = 1.0, 1.7, 0.8
+    rows = []
+    for x, side in ((0.0, -1), (1.0, 1)):
+        r, tip = np.hypot(x, e), x + 1j * e
+        u = (crank**2 - rod**2 + r**2) / (2 * r)
+        rows.append((tip / r * (u + 1j * side * np.sqrt(crank**2 - u**2)), tip))
+    (B, C), (B1, C1) = rows
+    pairs = [
+        mg.Pair("A", "R", "frame", "crank", point=(0, 0)),
+        mg.Pair("B", "R", "crank", "rod", point=(B.real, B.imag)),
+        mg.Pair("C", "R", "rod", "slider", point=(C.real, C.imag)),
+        mg.Pair("P", "P", "frame", "slider", point=(C.real, C.imag), axis=(1, 0)),
+    ]
+    m = mg.Mechanism("slider-crank", pairs=pairs, planar=True, frame="frame")
+    turn, swing = np.angle(B1 / B), np.angle((C1 - B1) / (C - B))
+    q = np.array([[0.0, 0, 0, 0], [turn, swing - turn, -swing, 1.0]])
+    found = fitness(m, q, "P", "A")
+    assert (found.branch, found.circuit) == (True, False)
+
+
 def test_places_of_a_slider_crank_are_met_on_a_branch_if_the_rod_stays_on_one_side() -> None:
     """With the slider driven its crank stands on either side of the dead positions: one circuit, two branches."""
     z, crank, rod = (0.0, 0.0, 1.0), 1.0, 2.5

@@ -342,8 +342,14 @@ class Syntheses(Shown, Sequence[Mechanism]):
 
     def document(self) -> Document:
         """A table of the mechanisms, and how sure it is that these are all."""
-        fits = [("yes" if fit.good else "no", _degrees(fit.transmission), f"{fit.size:.4g}") for fit in self.fitness]
+        verdict = {True: "yes", False: "no", None: "-"}
+        fits: list[tuple[str, ...]] = [
+            (verdict[fit.good if fit.branch is not None else None], _degrees(fit.transmission), f"{fit.size:.4g}")
+            for fit in self.fitness
+        ]
         judged: tuple[str, ...] = ("good", "transmission [deg]", "size")
+        if self.total is None:
+            judged, fits = (*judged, "error"), [(*a, f"{b.error:.3g}") for a, b in zip(fits, self.fitness, strict=True)]
         parts: list[tuple[tuple[str, ...], Sequence[tuple[str, ...]]]]
         if self.sources:
             own: list[tuple[str, ...]] = [(one.name,) for one in self.sources]

@@ -86,7 +86,7 @@ class Fitness:
     def words(self) -> str:
         """Defects and transmission, as under a picture."""
         defects = [name for name in ("branch", "circuit", "order") if getattr(self, name)]
-        told = f"{' and '.join(defects)} defect" if defects else "good"
+        told = f"{' and '.join(defects)} defect" if defects else "good" if self.branch is not None else "no driver"
         return told + (f", {np.rad2deg(self.transmission):.3g} deg" if np.isfinite(self.transmission) else "")
 
     def lacks(self, wanted: Iterable[Defect]) -> tuple[Defect, ...]:
@@ -207,8 +207,8 @@ class _Circuits:
         self.dead = (rate <= MOTIONS.dependent * np.abs(last.t).max(axis=0))[::2]
         last.t *= sense * np.where(last.t[self.column] < 0, -1.0, 1.0)
         goals, turns = self.x[self.row], np.isfinite(self.period)
-        # turns of the driver after which a branch may come back, at most; else what lies so far beyond is not asked for
-        far = 8 * self.period if turns else MODES.slide_stroke
+        # turns of the driver after which a branch may come back, at most
+        far = 8 * self.period if turns else np.inf
         low, high = (ends(goals[:, :1] if turns else goals, axis=1)[case] for ends in (np.min, np.max))
         h, wide, going, out = np.full(2 * self.V, 0.1), np.zeros(2 * self.V), ~self.dead[case], list[_Nodes]()
         (before, clear), closing = (last.taken(np.arange(2 * self.V)) for _ in range(2)), np.zeros(self.V, dtype=bool)
@@ -376,12 +376,30 @@ class _Circuits:
 
     def states(self, step: Index, value: Array) -> tuple[Array, Mask]:
         """States on steps between nodes where the driver has some values, and whether they were met there."""
+        x, met, left = self.a.x[:, step], np.zeros(len(step), dtype=bool), np.arange(len(step))
         a, b = self.a.taken(step), self.b.taken(step)
-        y, w = (b.x - a.x)[self.row], self._way(a, b)[1]
-        ra, rb, begin = a.t[self.column], b.t[self.column], a.x[self.row]
-        part = _root(lambda u: begin + cubic(y, ra, rb, w, u * w) - value, len(step))
-        node, last = self.closed(self._between(a, b, part), a.case, a.t + b.t, value)
-        return node.x, (last < 1e-8) & (node.t[self.column] * self.rises[step] > -1e-6)
+        straight = a.leads_to(b)
+        # parts at which steps are divided where a circuit nearby is come to instead
+        for part in (0.5, 0.25, 0.75, 0.1, 0.9) * 4:
+            y, w = (b.x - a.x)[self.row], self._way(a, b)[1]
+            ra, rb, off = a.t[self.column], b.t[self.column], a.x[self.row] - value[left]
+            at = _root(
+                partial(lambda u, y, ra, rb, w, off: off + cubic(y, ra, rb, w, u * w), y=y, ra=ra, rb=rb, w=w, off=off),
+                len(left),
+            )
+            node, last = self.closed(self._between(a, b, at), a.case, a.t + b.t, value[left])
+            good = (last < 1e-8) & (node.t[self.column] * self.rises[step[left]] > -1e-6)
+            good &= ~straight[left] | (a.leads_to(node) & node.leads_to(b))
+            x[:, left[good]], met[left[good]] = node.x[:, good], True
+            left, a, b = left[~good], a.taken(~good), b.taken(~good)
+            if not left.size:
+                break
+            middle, last = self.closed(self._between(a, b, np.full(len(left), part)), a.case, a.t + b.t)
+            whole = (last < 1e-8) & a.leads_to(middle) & middle.leads_to(b)
+            beyond_it = (value[left] - middle.x[self.row]) * self.rises[step[left]] > 0
+            for ends_, some in ((a, whole & beyond_it), (b, whole & ~beyond_it)):
+                ends_.put(np.flatnonzero(some), middle.taken(some))
+        return x, met
 
     def along(self, case: Index, value: Array) -> tuple[Array, Mask]:
         """States on the branches of the first states where the driver has some values."""
@@ -452,14 +470,28 @@ def fitnesses(
     if good.size and outputs:
         low, high = np.array([way[[0, -1]] for way in ways if way is not None]).T
         between[good] = at[good]
-        # so many samples; the least value lies between the neighbors of the least one
-        for n in (91, 45):
-            values, own = np.linspace(low, high, n), np.tile(good, n)
-            there, met = of.along(own, values.ravel())
-            found = np.where(met, angles(of.here(there, own), own, own), np.nan).reshape(n, -1)
-            between[good] = np.minimum(between[good], found.min(axis=0))
-            near = np.argmin(np.nan_to_num(found, nan=-1.0), axis=0)
-            low, high = (values[np.clip(near + i, 0, n - 1), np.arange(good.size)] for i in (-1, 1))
+        # samples, and all nodes, which are dense where circuits nearly meet; the least value lies between the neighbors of a low one
+        case, places = of.a.case[of.of_branch == 0], of.a.x[of.row, of.of_branch == 0]
+        some = np.isin(case, good)
+        some[some] &= (
+            np.abs(places[some] - (low + high)[k := np.searchsorted(good, case[some])] / 2) < (high - low)[k] / 2
+        )
+        own, values = (
+            np.append(np.repeat(good, 91), case[some]),
+            np.append(np.linspace(low, high, 91, axis=1), places[some]),
+        )
+        for _ in range(3):
+            order = np.lexsort((values, own))
+            own, values = own[order], values[order]
+            there, met = of.along(own, values)
+            found = np.where(met, angles(of.here(there, own), own, own), np.nan)
+            np.minimum.at(between, own, found)
+            # of two dips the lower one may be the sharper one
+            before, behind = (np.clip(np.arange(len(own)) + k, 0, len(own) - 1) for k in (-1, 1))
+            before, behind = (np.where(own[at] == own, at, np.arange(len(own))) for at in (before, behind))
+            dips = (found <= found[before]) & (found <= found[behind]) & (found <= 8.0 * between[own])
+            low, high = values[before[dips]], values[behind[dips]]
+            own, values = np.repeat(own[dips], 45), np.linspace(low, high, 45, axis=1).ravel()
     full_turn = (of.turns > 0) & m.turns(driver)
     for v, (one, dead, off, apart, turns) in enumerate(
         zip(out, *(np.asarray(told).tolist() for told in (of.dead, branch, circuit, full_turn)), strict=True)

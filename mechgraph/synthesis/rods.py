@@ -84,7 +84,8 @@ class RodProblem(RowProblem):
             for rod in rods
         ]
         self.own = full.own - len(gone)
-        self.whole = m.replace(links=[m.links[i] for i in links], pairs=[m.pairs[k] for k in kept])
+        start = {name: value for name, value in m.start.items() if m.freedom(name)[0] in kept}
+        self.whole = m.replace(links=[m.links[i] for i in links], pairs=[m.pairs[k] for k in kept], start=start)
         self.numbers = full.numbers.of_pairs(self.order)
         columns = [np.arange(s.first_column[k], s.first_column[k + 1]) for k in kept]
         self.columns = np.searchsorted(np.concatenate(columns), full.columns)

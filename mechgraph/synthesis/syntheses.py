@@ -565,10 +565,13 @@ def synthesize(
         faults.append("fit, minimize, maximize: expected one of them")
     if fit is not None and fit not in get_args(FitName):
         faults.append(wrong(fit, "fit", " or ".join(map(repr, get_args(FitName)))))
+    faults += [f"over: {fault}" for name in over or () if (fault := m.freedom_fault(name, single=True))]
     if fitting and sweep:
         faults.append("sweep: expected for exact syntheses alone; give the numbers values in the mechanism")
     odd = {name: ends for name, ends in within.items() if not is_interval(two_ends(ends))}
     faults += [wrong(ends, f"bounds[{name!r}]", "(least, greatest), None for no end") for name, ends in odd.items()]
+    same = [name for name, ends in within.items() if fitting and name not in odd and np.equal(*two_ends(ends))]
+    faults += [f"bounds[{name!r}]: both ends are {within[name][0]}; let a fit leave it out of unknown" for name in same]
     if faults:
         raise DeclarationError(where, faults)
     changed = {end for p in m.pairs if any(name.split(".")[0] == p.name for name in unknown) for end in (p.a, p.b)}
@@ -580,7 +583,12 @@ def synthesize(
         return _fitted(
             m, tasks, unknown, fit, within, limits, goals, require, over, int(starts), int(seed), cache, progress
         )
-    found = Synthesis(RowProblem(m, tasks, unknown), tasks, dict(sweep or {}), int(seed), cache, progress)
+    problem = RowProblem(m, tasks, unknown)
+    angles = np.abs(problem.asked[:, ~problem.system.is_length[problem.columns]])
+    if (most := np.nanmax(angles, initial=0.0)) > 4 * np.pi:
+        told = f"{where}: an angle of {most:.4g} rad is asked, {most / (2 * np.pi):.3g} turns; angles are in radians, not degrees"
+        warnings.warn(told, MechgraphWarning, stacklevel=3)
+    found = Synthesis(problem, tasks, dict(sweep or {}), int(seed), cache, progress)
     _refuse_other_names(found.problem, within)
     driver, _ = driver_of(m, tasks)
     answers = [one._kept(require, within, limits, driver) for one in found.answers()]
