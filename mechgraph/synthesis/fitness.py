@@ -485,7 +485,9 @@ def fitnesses(
             own, values = own[order], values[order]
             there, met = of.along(own, values)
             found = np.where(met, angles(of.here(there, own), own, own), np.nan)
-            np.minimum.at(between, own, found)
+            # what is not known stays so
+            with np.errstate(invalid="ignore"):
+                np.minimum.at(between, own, found)
             # of two dips the lower one may be the sharper one
             before, behind = (np.clip(np.arange(len(own)) + k, 0, len(own) - 1) for k in (-1, 1))
             before, behind = (np.where(own[at] == own, at, np.arange(len(own))) for at in (before, behind))
