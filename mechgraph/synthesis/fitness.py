@@ -481,6 +481,8 @@ def fitnesses(
             np.append(np.linspace(low, high, 91, axis=1), places[some]),
         )
         for _ in range(3):
+            if not own.size:
+                break
             order = np.lexsort((values, own))
             own, values = own[order], values[order]
             there, met = of.along(own, values)
