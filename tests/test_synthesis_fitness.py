@@ -68,7 +68,7 @@ def test_rows_beside_a_near_change_point_lie_on_one_branch(gap: float) -> None:
         reach = np.abs(known.lengths[3] - a * np.exp(0.3j))
         if abs(b - c) < 0.2 or reach > b + c:
             continue
-        angles = np.sort(rng.uniform(-0.3, 0.3, 20))
+        angles = np.sort(rng.uniform(-0.3, 0.3, 20))[:: rng.choice([-1, 1])]
         made.append(known.mechanism(angles[0], side))
         rows.append(rows_of(made[-1], [known.start(angle, side) for angle in angles]))
         dense = np.concatenate([np.linspace(angles[0], angles[-1], 4001), angles])
@@ -76,6 +76,17 @@ def test_rows_beside_a_near_change_point_lie_on_one_branch(gap: float) -> None:
     for one, angle in zip(fitnesses(made, np.array(rows), "O0", "O3"), least, strict=True):
         assert (one.branch, one.circuit, one.order) == (False, False, False)
         assert one.transmission_between == pytest.approx(angle, abs=1e-4)
+
+
+def test_a_crank_that_turns_back_just_before_its_ground_has_one_circuit() -> None:
+    """The links are 1e-6 too short for a whole turn of the crank: both sides of the coupler meet at folds beside it."""
+    known = FourBarFormula(np.random.default_rng(0))
+    known.lengths = a, b, c, _ = 0.1482443553669891, 1.2394762856049273, 6.141277460297319, 7.232510390535257
+    asked = [(-1.6331, -1), (0.3005, 1), (0.9428, 1), (0.8938, -1)]
+    m = known.mechanism(*asked[0])
+    found = fitness(m, rows_of(m, [known.start(*at) for at in asked]), "O0", "O3")
+    assert b + c < a + known.lengths[3]
+    assert (found.branch, found.circuit, found.full_turn) == (True, False, False)
 
 
 def test_a_slide_that_drives_beyond_its_folds_is_followed_to_them() -> None:

@@ -314,6 +314,11 @@ class ModeTolerances:
     same_place: Annotated[float, "Difference of what does not move up to which two points are of one continuum."] = 1e-5
     slide: Annotated[float, "Turn of a marker below which it slides."] = 1e-9
     most_noise: Annotated[float, "Rounding with which a track may end."] = 1e-5
+    noise_apart: Annotated[
+        float,
+        "Difference of solutions of a task, or of how they move, against their size, that no rounding of two runs makes: up to "
+        "3e-5 where dimensions are thousands; of some tasks two in a thousand differ by less.",
+    ] = 1e-4
     pole_range: Annotated[float, "Size of ``z`` or ``1 / z`` up to which poles are sampled."] = 200.0
     one_assembly: Annotated[
         float, "Difference of link poses, against their size, up to which two assemblies are one."

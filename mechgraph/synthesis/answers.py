@@ -45,8 +45,8 @@ class Degenerate:
     text: str
 
 
-class Fitnesses(Sequence[Any]):
-    """Fitness, or certificates, of mechanisms, found when first asked for."""
+class Deferred(Sequence[Any]):
+    """What is found of mechanisms when it is first asked for: fitness, certificates."""
 
     def __init__(self, makers: Sequence[Callable[[], Any]]) -> None:
         self._makers = tuple(makers)
@@ -58,14 +58,14 @@ class Fitnesses(Sequence[Any]):
         return tuple(make() for make in self._makers[i]) if isinstance(i, slice) else self._makers[i]()
 
     @classmethod
-    def at_once(cls, find: Callable[[], Sequence[Any]], count: int) -> Fitnesses:
+    def at_once(cls, find: Callable[[], Sequence[Any]], count: int) -> Deferred:
         """Those that are found together."""
         found = cache(find)
         return cls([partial(lambda k: found()[k], i) for i in range(count)])
 
     def __reduce__(self) -> tuple[Any, ...]:
         found = tuple(self)  # before they go elsewhere
-        return Fitnesses, ([partial(found.__getitem__, i) for i in range(len(found))],)
+        return Deferred, ([partial(found.__getitem__, i) for i in range(len(found))],)
 
 
 @dataclass(frozen=True)
@@ -240,8 +240,8 @@ class Syntheses(Shown, Sequence[Mechanism]):
             copies=tuple(tuple(sorted(place[j] for j in self.copies[i] if j in place)) for i in k if self.copies),
             mechanisms=tuple(self.mechanisms[i] for i in k),
             sources=tuple(self.sources[i] for i in k if self.sources),
-            fitness=Fitnesses([partial(self.fitness.__getitem__, i) for i in k]),
-            certificates=Fitnesses([partial(self.certificates.__getitem__, i) for i in k if self.certificates]),
+            fitness=Deferred([partial(self.fitness.__getitem__, i) for i in k]),
+            certificates=Deferred([partial(self.certificates.__getitem__, i) for i in k if self.certificates]),
             **{name: getattr(self, name)[k] for name in ("values", "poses", "coordinates", "residual", "condition")},
         )
 
@@ -499,14 +499,14 @@ def joined_answers(found: Sequence[Syntheses], told: Sequence[str]) -> Syntheses
         weakest(s.completeness for s in found),
         (*told, *(f"{s.mechanism.name}: {text}" for s in found for text in s.evidence)),
         np.concatenate([s.condition for s in found]),
-        Fitnesses([partial(s.fitness.__getitem__, k) for s in found for k in range(len(s))]),
+        Deferred([partial(s.fitness.__getitem__, k) for s in found for k in range(len(s))]),
         whole("classes"),
         tuple(one for s in found for one in s.symmetries),
         tuple(tuple(n + k for k in mine) for n, s in zip(first, found, strict=False) for mine in s.copies),
         tuple(one for s in found for one in s.rejected),
         tuple(s.mechanism for s in found for _ in s),
         found[0].driver,
-        Fitnesses([partial(s.certificates.__getitem__, k) for s in found for k in range(len(s.certificates))]),
+        Deferred([partial(s.certificates.__getitem__, k) for s in found for k in range(len(s.certificates))]),
     )
     return out._sorted
 

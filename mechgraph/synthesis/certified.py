@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import scipy
 
 from mechgraph.kinematics.state import Configuration
 from mechgraph.maths.linear import rank_of, singular_values
@@ -59,14 +60,10 @@ def _certificate(of: TaskClass, goal: ClassMember, x: Array, rank: int) -> tuple
             return None, told
         parts.append((f, A[:, free], A[:, F:] @ exact(ways)))
         K, open_ = np.hypot(K, curvature(here, moved)), max(open_, float(here.closure[0]))
-    n, places = len(parts[0][0].mid), np.cumsum([0, *map(len, of.free)])
-    f, A = (Ball(np.zeros(shape), np.zeros(shape)) for shape in (len(parts) * n, (len(parts) * n, places[-1] + p.u)))
-    for i, (own, by_coordinates, by_unknowns) in enumerate(parts):
-        for part in ("mid", "rad"):
-            getattr(f, part)[i * n : (i + 1) * n] = getattr(own, part)
-            rows_ = getattr(A, part)[i * n : (i + 1) * n]
-            rows_[:, places[i] : places[i + 1]] = getattr(by_coordinates, part)
-            rows_[:, places[-1] :] = getattr(by_unknowns, part)
+    f = Ball(*(np.concatenate([getattr(own, part) for own, _, _ in parts]) for part in ("mid", "rad")))
+    by_coordinates = (scipy.linalg.block_diag(*(getattr(J, part) for _, J, _ in parts)) for part in ("mid", "rad"))
+    by_unknowns = (np.concatenate([getattr(B, part) for _, _, B in parts]) for part in ("mid", "rad"))
+    A = Ball(*(np.concatenate(own, axis=1) for own in zip(by_coordinates, by_unknowns, strict=True)))
     return root_near(f, A, rank, float(K), False, open_), told
 
 

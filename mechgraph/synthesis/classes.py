@@ -74,7 +74,7 @@ class TaskClass:
 
     ``free[i]`` are the freedoms of row ``i`` of which nothing is asked; rows of equal shape are eliminated together, in ``blocks``;
     ``conditions (R,)`` are left for the unknowns; solutions of two runs are one where ``fingerprints``
-    are less ``apart``, against their size.
+    are less than ``apart``, against their size, from each other.
 
     Raises
     ------

@@ -270,7 +270,8 @@ class _Circuits:
             self.turns[done] = np.abs(np.round((p.x - m.x)[self.row, done] / self.period))
         going[::2][done] = False
         near = going[::2] & going[1::2] & (ahead > 0) & (behind < 0) & (d < h[::2] + h[1::2])
-        met = near & ((a * b).sum(axis=0) < -0.8) & (ahead > 0.9 * d)
+        # steps that are short beside what is left still go round a corner, which may lead elsewhere
+        met = near & ((a * b).sum(axis=0) < -0.8) & (ahead > 0.9 * d) & (d <= 3.01 * np.minimum(h[::2], h[1::2]))
         met[met] = p.taken(met).leads_to(m.taken(met))
         going[1::2][met], closing[met] = False, True
         # a little more than what is left
@@ -381,13 +382,7 @@ class _Circuits:
         straight = a.leads_to(b)
         # parts at which steps are divided where a circuit nearby is come to instead
         for part in (0.5, 0.25, 0.75, 0.1, 0.9) * 4:
-            y, w = (b.x - a.x)[self.row], self._way(a, b)[1]
-            ra, rb, off = a.t[self.column], b.t[self.column], a.x[self.row] - value[left]
-            at = _root(
-                partial(lambda u, y, ra, rb, w, off: off + cubic(y, ra, rb, w, u * w), y=y, ra=ra, rb=rb, w=w, off=off),
-                len(left),
-            )
-            node, last = self.closed(self._between(a, b, at), a.case, a.t + b.t, value[left])
+            node, last = self._met(a, b, value[left])
             good = (last < 1e-8) & (node.t[self.column] * self.rises[step[left]] > -1e-6)
             good &= ~straight[left] | (a.leads_to(node) & node.leads_to(b))
             x[:, left[good]], met[left[good]] = node.x[:, good], True
@@ -400,6 +395,13 @@ class _Circuits:
             for ends_, some in ((a, whole & beyond_it), (b, whole & ~beyond_it)):
                 ends_.put(np.flatnonzero(some), middle.taken(some))
         return x, met
+
+    def _met(self, a: _Nodes, b: _Nodes, value: Array) -> tuple[_Nodes, Array]:
+        """Nodes next to the arcs between others where the driver has some values, and the last Newton steps."""
+        y, w = (b.x - a.x)[self.row], self._way(a, b)[1]
+        ra, rb, off = a.t[self.column], b.t[self.column], a.x[self.row] - value
+        part = _root(lambda u: off + cubic(y, ra, rb, w, u * w), len(value))
+        return self.closed(self._between(a, b, part), a.case, a.t + b.t, value)
 
     def along(self, case: Index, value: Array) -> tuple[Array, Mask]:
         """States on the branches of the first states where the driver has some values."""
@@ -468,34 +470,8 @@ def fitnesses(
     ways = [None if branch[v] else in_order(of.value[v], float(periods[v])) for v in range(V)]
     good, between = np.array([v for v in range(V) if ways[v] is not None], dtype=np.intp), np.full(V, np.nan)
     if good.size and outputs:
-        low, high = np.array([way[[0, -1]] for way in ways if way is not None]).T
-        between[good] = at[good]
-        # samples, and all nodes, which are dense where circuits nearly meet; the least value lies between the neighbors of a low one
-        case, places = of.a.case[of.of_branch == 0], of.a.x[of.row, of.of_branch == 0]
-        some = np.isin(case, good)
-        some[some] &= (
-            np.abs(places[some] - (low + high)[k := np.searchsorted(good, case[some])] / 2) < (high - low)[k] / 2
-        )
-        own, values = (
-            np.append(np.repeat(good, 91), case[some]),
-            np.append(np.linspace(low, high, 91, axis=1), places[some]),
-        )
-        for _ in range(3):
-            if not own.size:
-                break
-            order = np.lexsort((values, own))
-            own, values = own[order], values[order]
-            there, met = of.along(own, values)
-            found = np.where(met, angles(of.here(there, own), own, own), np.nan)
-            # what is not known stays so
-            with np.errstate(invalid="ignore"):
-                np.minimum.at(between, own, found)
-            # of two dips the lower one may be the sharper one
-            before, behind = (np.clip(np.arange(len(own)) + k, 0, len(own) - 1) for k in (-1, 1))
-            before, behind = (np.where(own[at] == own, at, np.arange(len(own))) for at in (before, behind))
-            dips = (found <= found[before]) & (found <= found[behind]) & (found <= 8.0 * between[own])
-            low, high = values[before[dips]], values[behind[dips]]
-            own, values = np.repeat(own[dips], 45), np.linspace(low, high, 45, axis=1).ravel()
+        low, high = np.sort([way[[0, -1]] for way in ways if way is not None], axis=1).T
+        between[good] = np.minimum(at[good], _least_between(of, good, low, high, angles))
     full_turn = (of.turns > 0) & m.turns(driver)
     for v, (one, dead, off, apart, turns) in enumerate(
         zip(out, *(np.asarray(told).tolist() for told in (of.dead, branch, circuit, full_turn)), strict=True)
@@ -505,6 +481,39 @@ def fitnesses(
         )
         out[v] = replace(one, branch=True) if dead else replace(known, error=one.error)
     return out
+
+
+def _least_between(
+    of: _Circuits, cases: Index, low: Array, high: Array, angles: Callable[[Configuration, Index, Index], Array]
+) -> Array:
+    """Least ``angles (n,)`` of some mechanisms between driver values on the branches of their first states; NaN where not all are met."""
+    least = np.full(of.V, np.inf)
+    # samples, and all nodes, which are dense where circuits nearly meet; the least value lies between the neighbors of a low one
+    case, places = of.a.case[of.of_branch == 0], of.a.x[of.row, of.of_branch == 0]
+    some = np.flatnonzero(np.isin(case, cases))
+    k = np.searchsorted(cases, case[some])
+    some = some[(places[some] > low[k]) & (places[some] < high[k])]
+    own = np.append(np.repeat(cases, 91), case[some])
+    values = np.append(np.linspace(low, high, 91, axis=1), places[some])
+    for _ in range(3):
+        if not own.size:
+            break
+        order = np.lexsort((values, own))
+        own, values = own[order], values[order]
+        there, met = of.along(own, values)
+        found = np.where(met, angles(of.here(there, own), own, own), np.nan)
+        # what is not known stays so
+        with np.errstate(invalid="ignore"):
+            np.minimum.at(least, own, found)
+        # of two dips the lower one may be the sharper one
+        before, behind = (np.clip(np.arange(len(own)) + i, 0, len(own) - 1) for i in (-1, 1))
+        before, behind = (np.where(own[at] == own, at, np.arange(len(own))) for at in (before, behind))
+        dips = (found <= found[before]) & (found <= found[behind]) & (found <= 8.0 * least[own])
+        own, values = (
+            np.repeat(own[dips], 45),
+            np.linspace(values[before[dips]], values[behind[dips]], 45, axis=1).ravel(),
+        )
+    return least[cases]
 
 
 def _transmitted(

@@ -323,8 +323,7 @@ def placed(of: TaskClass, member: ClassMember, z: Array, rng: np.random.Generato
 def by_motions(of: TaskClass) -> TaskClass:
     """The class with solutions that do the same as one."""
     out = copy(of)
-    # motions of a solution in thousands are known to 3e-5; of some tasks two in a thousand differ by less than this
-    out.apart = 10.0 * MODES.most_noise
+    out.apart = MODES.noise_apart
     vars(out)["fingerprints"] = partial(motions_of, of)
     return out
 

@@ -133,8 +133,8 @@ def fitted(
     told = [fit.p.inside(values[:, None])[:, 0] for values in exact]
     tries = [fit.z0, *told, *(rng.uniform(*box) for _ in range(starts - 1 - len(told)))]
     begun, count = _best(fit, np.clip(np.transpose(tries), low[:u, None], high[:u, None]), low, high, progress)
-    if not begun and (evolved := _evolved(fit, *box, seed)) is not None:
-        begun.append(evolved)
+    evolved = None if begun else _evolved(fit, *box, seed)
+    begun += [] if evolved is None else [evolved]
     ends: list[FitPoint] = []
     unsafe = lost = early = 0
     wide: Limit = (lambda here: fit.margins(here)[:, 0]), LEAST_MARGIN, None
@@ -173,15 +173,16 @@ def fitted(
         if all(np.abs(here.z - other.z).max() > 1e-3 for other in kept):
             kept.append(here)
     same = sum(abs(value(here) - value(ends[0])) <= 1e-4 * abs(value(ends[0])) + 1e-12 for here in ends) if ends else 0
-    words = [
-        f"{counted(count, 'start')} of {len(tries)} led to all rows; the best {len(begun)} that differ were followed to the end, "
-        f"{same} of them to the best one."
-    ]
+    followed = (
+        f"; the best {len(begun)} that differ were followed to the end, {same} of them to the best one" if begun else ""
+    )
+    followed = followed if evolved is None else "; the best that differential evolution finds was followed to the end"
+    words = [f"{counted(count, 'start')} of {len(tries)} led to all rows{followed}."]
     if told:
         words.append(f"{counted(len(told), 'start')} of these do a part of the positions exactly.")
     if unsafe + lost:
         words.append(
-            f"Left out: {unsafe} of which the path does not lead through all rows, {lost} without an end within the limits."
+            f"Left out: {unsafe} of which the path does not lead through all rows, {lost} that came to no optimum within the limits."
         )
     if early:
         words.append(f"Stopped after 100 steps, before the optimum: {early}; better ones may be near.")

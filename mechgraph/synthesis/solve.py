@@ -365,7 +365,7 @@ class TaskEnds:
         """Put regular ends ``(nx, n)`` of some of all ``tracks``, and their conjugates, to those that are known."""
         # a task in real numbers has with each solution the conjugate one; what is known differs from others by the noise of both
         first = MODES.one_assembly if not self.x.size else of.apart
-        for states, apart in ((there, first), (there.conj(), 10.0 * MODES.most_noise)):
+        for states, apart in ((there, first), (there.conj(), MODES.noise_apart)):
             if self.x.shape[1] < tracks:
                 least = np.full(states.shape[1], apart)
                 new = distinct(of.fingerprints(goal, states), of.fingerprints(goal, self.x), least)
@@ -607,7 +607,7 @@ def alike_at(of: TaskClass, start: TaskStart, goal: ClassMember, x: Array, progr
         some, closed = polished(of.leg(start.member, start.member), some, 1.0, np.zeros(some.shape[1], dtype=np.intp))
         there = follow(of.leg(start.member, goal), some, Care(), partial(_bent, -bend))
         apart = np.abs(motions_of(of, goal, there.x) - np.repeat(motions_of(of, goal, left), K, axis=1)).max(axis=0)
-        same = closed & there.arrived & (apart < 10.0 * MODES.most_noise)
+        same = closed & there.arrived & (apart < MODES.noise_apart)
         good = begun.arrived & same.reshape(-1, K).all(axis=1)
         out.append(there.x[:, np.repeat(good, K)])
         left = left[:, ~good]
@@ -632,7 +632,7 @@ def doing_all(of: TaskClass, member: ClassMember, x: Array) -> Mask:
 def real_states(of: TaskClass, goal: ClassMember, x: Array) -> tuple[Array, Array, Array]:
     """Real ones of solutions ``x (nx, n)`` of a task, closed to rounding, their errors in all rows, and which these are ``(n,)``."""
     size = np.maximum(1.0, np.abs(x[: of.u]).max(axis=0, initial=0.0))
-    near = np.flatnonzero(np.abs(x[: of.u].imag).max(axis=0, initial=0.0) < MODES.real_singular * size)
+    near = np.flatnonzero(_imaginary(x[: of.u]) < MODES.real_singular)
     if not near.size:
         return x[:, near].real, np.zeros(0), near
     leg, t, tracks = of.leg(goal, goal), np.ones(len(near)), np.arange(len(near))

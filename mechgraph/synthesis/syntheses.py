@@ -25,8 +25,8 @@ from mechgraph.quantities import Count, door, items_of, real_array, wrong
 from mechgraph.quantities import Index as Seed
 from mechgraph.synthesis.answers import (
     ComplexSyntheses,
+    Deferred,
     Degenerate,
-    Fitnesses,
     Syntheses,
     SynthesesOver,
     joined_answers,
@@ -56,6 +56,16 @@ from mechgraph.synthesis.unknowns import Unknowns
 
 NO_SCREWS = "a screw ties an angle to a length: the equations are not algebraic, their number of solutions has no end"
 NO_CONTACTS = "curves and surfaces are made of pieces: solutions on one cannot be led to those on all others"
+
+
+DEGENERATE = {
+    "double": "{} track{} ended where solutions meet.",
+    "continuum": "{} track{} ended among solutions without end: conditions depend on each other here.",
+    "open": "In {} solution{} conditions are not met that follow from the others where numbers are as declared.",
+    "coincident": "In {} solution{} elements of a link coincide.",
+    "reversed": "In {} solution{} an axis that is sought points against the motion that is asked about it.",
+}
+"""What is said of solutions that are no mechanisms of their own, by kind."""
 
 
 class Synthesis:
@@ -208,30 +218,14 @@ class Synthesis:
         copies = {k: mine for mine in alike for k in mine}
         made = [self._mechanism(goal, x[:, k], values[k], i) for k in range(len(values))]
         shape = (p.tasks.rows if p.tasks else 0, len(p.m.links), 4, 4)
-        # what follows from what is solved for, where known numbers are such as are declared
-        missed = failing + (~fits).sum() + (~done).sum()
-        degenerate = [
-            Degenerate(kind, int(n), what.format(counted(int(n), "solution" if "In {}" in what else "track")))
-            for kind, n, what in (
-                ("double", (~free).sum(), "{} ended where solutions meet."),
-                (
-                    "continuum",
-                    free.sum(),
-                    "{} ended among solutions without end: conditions depend on each other here.",
-                ),
-                (
-                    "open",
-                    missed,
-                    "In {} conditions are not met that follow from the others where numbers are as declared.",
-                ),
-                ("coincident", (merged & ~against).sum(), "In {} elements of a link coincide."),
-                (
-                    "reversed",
-                    against.sum(),
-                    "In {} an axis that is sought points against the motion that is asked about it.",
-                ),
-            )
-        ]
+        counts = {
+            "double": int((~free).sum()),
+            "continuum": int(free.sum()),
+            # what follows from what is solved for, where known numbers are such as are declared
+            "open": failing + int((~fits).sum() + (~done).sum()),
+            "coincident": int((merged & ~against).sum()),
+            "reversed": int(against.sum()),
+        }
         names = (*p.unknowns.names, *self.sweep.names)
         swept = np.repeat(self.swept[:, i][None], len(values), axis=0)
         out = Syntheses(
@@ -244,20 +238,24 @@ class Synthesis:
             error,
             ComplexSyntheses(p.outside(others).T),
             start.total,
-            tuple(one for one in degenerate if one.count),
+            tuple(
+                Degenerate(kind, n, DEGENERATE[kind].format(n, "" if n == 1 else "s"))
+                for kind, n in counts.items()
+                if n
+            ),
             found.infinite,
             # of what goes to infinity, or where solutions meet, there is no certificate
             "searched" if found.lost or missing else "tested" if found.infinite or found.singular.size else start.word,
             tuple(told),
             condition,
-            Fitnesses.at_once(
+            Deferred.at_once(
                 partial(self._fitness, [m for m, _, _ in made], np.array([q for _, q, _ in made])), len(made)
             ),
             apart,
             (*self.symmetries, *cognates(alike, self.symmetries, motions)),
             tuple(tuple(copies[k]) for k in range(len(values))),
             driver=driver_of(p.m, self.tasks)[0],
-            certificates=Fitnesses.at_once(partial(certificates, of, goal, x), len(values)),
+            certificates=Deferred.at_once(partial(certificates, of, goal, x), len(values)),
         )
         # of a sweep nothing is said of fitness, which takes longer than the solutions, until it is asked for
         return out if self.sweep.names else out._sorted
@@ -568,10 +566,7 @@ def synthesize(
     faults += [f"over: {fault}" for name in over or () if (fault := m.freedom_fault(name, single=True))]
     if fitting and sweep:
         faults.append("sweep: expected for exact syntheses alone; give the numbers values in the mechanism")
-    odd = {name: ends for name, ends in within.items() if not is_interval(two_ends(ends))}
-    faults += [wrong(ends, f"bounds[{name!r}]", "(least, greatest), None for no end") for name, ends in odd.items()]
-    same = [name for name, ends in within.items() if fitting and name not in odd and np.equal(*two_ends(ends))]
-    faults += [f"bounds[{name!r}]: both ends are {within[name][0]}; let a fit leave it out of unknown" for name in same]
+    faults += _faults_of_bounds(within, fitting)
     if faults:
         raise DeclarationError(where, faults)
     changed = {end for p in m.pairs if any(name.split(".")[0] == p.name for name in unknown) for end in (p.a, p.b)}
@@ -584,8 +579,9 @@ def synthesize(
             m, tasks, unknown, fit, within, limits, goals, require, over, int(starts), int(seed), cache, progress
         )
     problem = RowProblem(m, tasks, unknown)
-    angles = np.abs(problem.asked[:, ~problem.system.is_length[problem.columns]])
-    if (most := np.nanmax(angles, initial=0.0)) > 4 * np.pi:
+    # a whole turn more or less changes nothing, and many take long to follow
+    most = np.nan_to_num(np.abs(problem.asked[:, ~problem.system.is_length[problem.columns]])).max(initial=0.0)
+    if most > 4 * np.pi:
         told = f"{where}: an angle of {most:.4g} rad is asked, {most / (2 * np.pi):.3g} turns; angles are in radians, not degrees"
         warnings.warn(told, MechgraphWarning, stacklevel=3)
     found = Synthesis(problem, tasks, dict(sweep or {}), int(seed), cache, progress)
@@ -595,6 +591,17 @@ def synthesize(
     if sweep:
         return SynthesesOver(dict(zip(found.sweep.names, found.swept, strict=True)), tuple(answers))
     return answers[0]
+
+
+def _faults_of_bounds(bounds: Mapping[str, Any], fitting: bool) -> list[str]:
+    """What is no interval, and of a fit what is none to move in."""
+    out = list[str]()
+    for name, given in bounds.items():
+        if not is_interval(two_ends(given)):
+            out.append(wrong(given, f"bounds[{name!r}]", "(least, greatest), None for no end"))
+        elif fitting and np.equal(*two_ends(given)):
+            out.append(f"bounds[{name!r}]: both ends are {given[0]}; declare that value, and leave it out of unknown")
+    return out
 
 
 def _of_chains(
