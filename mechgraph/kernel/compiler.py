@@ -18,7 +18,7 @@ from pathlib import Path
 
 SOURCES = tuple(Path(__file__).with_name(name) for name in ("calls.c", "derivative.c"))
 """What is compiled."""
-INCLUDED = tuple(Path(__file__).with_name(name) for name in ("kernel.c", "kernel.h", "motion.c"))
+INCLUDED = tuple(Path(__file__).with_name(name) for name in ("kernel.c", "kernel.h", "motion.c", "tracks.c"))
 FLAGS = ("-O3", "-std=c99", "-ffp-contract=off", "-shared", "-fPIC")
 """No -march and no -ffast-math: the same bits from one build, and from one source the same on every machine to rounding."""
 LONGEST_BUILD = 600.0

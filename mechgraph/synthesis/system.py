@@ -443,12 +443,12 @@ class ArrowRows:
 
     def __init__(self, problem: RowProblem, numbers: RowNumbers, x: Array, drive: Array | None = None) -> None:
         self.problem, self.numbers, self.x, self.drive = problem, numbers, x, drive
-        system, s = problem.system_with(numbers), problem.system
+        s = problem.system
         self.R, _, self.T = x.shape
         # nodes of the circles on which coefficients of curves are found, and below their radius times the rates: the first coefficient of
         # the residual that is taken for another one is that of ``h^9``, below ``3^9 / 9!`` for angles that turn at 3
         orders, self.N = len(problem.rates), 8 if problem.rates else 1
-        states, self._steps = np.moveaxis(x[:, : s.n_state, None], 1, 0), None
+        self._steps = None
         if orders:
             rates = x[:, s.n_state :].reshape(self.R, orders, s.n_freedoms, self.T)
             size = np.abs(rates).max(axis=2) ** (1.0 / np.arange(1, orders + 1))[:, None]
@@ -457,10 +457,17 @@ class ArrowRows:
             powers = h[:, None] ** np.arange(orders + 1)[:, None, None]
             self._coefficients, self._powers = 1.0 / (self.N * powers), powers
             self._steps = np.einsum("rkft,rknt->frnt", rates, powers[:, 1:])
+
+    @cached_property
+    def here(self) -> Configuration:
+        """All rows and nodes in one batch."""
+        system, s = self.problem.system_with(self.numbers), self.problem.system
+        states = np.moveaxis(self.x[:, : s.n_state, None], 1, 0)
+        if self._steps is not None:
             states = system.advance(np.broadcast_to(states, (s.n_state, self.R, self.N, self.T)), self._steps)
         if self.R * self.N > 1 and system.par.batch > 1:
             system = system.cases(np.tile(np.arange(self.T), self.R * self.N))
-        self.here = Configuration(system, states.reshape(s.n_state, -1))
+        return Configuration(system, states.reshape(s.n_state, -1))
 
     def _by_row(self, values: Array) -> Array:
         """``(n, ..., R N T) -> (R, n, ..., T)``, where rates are asked with all orders of ``n`` one after the other."""

@@ -1,0 +1,350 @@
+"""Tracks of a class of tasks: ways between members, and the equations along them, linearized.
+
+A step of Newton's method eliminates row by row: with ``J_i dq_i + B_i dz = b_i`` and ``N_i`` the left null space of ``J_i``, at last
+
+    (N_i B_i) dz = N_i b_i,    dq_i = J_i^+ (b_i - B_i dz).
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Sequence
+from copy import copy
+from functools import cache, cached_property
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from mechgraph.kernel import build
+from mechgraph.kernel.tables import fundamental, layout, tables, why_not
+from mechgraph.maths.se3 import Index, cross, finite_twist, pose_exp
+from mechgraph.maths.tolerances import MODES
+from mechgraph.memo import dataclass
+from mechgraph.modes.family import Array
+from mechgraph.modes.homotopy import rounding, solved
+from mechgraph.synthesis.rods import RodProblem
+from mechgraph.synthesis.system import RowNumbers
+from mechgraph.synthesis.unknowns import marker_twists, unit_rates
+from mechgraph.variants.numbers import MARKER
+
+if TYPE_CHECKING:
+    from mechgraph.modes.form import RodSystem
+    from mechgraph.synthesis.classes import TaskClass
+
+
+@dataclass(frozen=True)
+class ClassMember:
+    """Mechanisms, their ``numbers`` of markers, and the values asked of them ``drive (R, d, n)``; what is not asked is ignored."""
+
+    numbers: RowNumbers
+    drive: Array
+
+    def taken(self, which: Index) -> ClassMember:
+        """Some of them; one serves for all."""
+        return self if self.drive.shape[-1] == 1 else ClassMember(self.numbers.taken(which), self.drive[..., which])
+
+    @staticmethod
+    def joined(members: Sequence[ClassMember]) -> ClassMember:
+        """Several, one after the other."""
+        drive = np.concatenate([m.drive for m in members], axis=-1)
+        return ClassMember(RowNumbers.joined([m.numbers for m in members]), drive)
+
+
+@dataclass(frozen=True)
+class RowBlock:
+    """Rows ``rows (G,)`` of equal shape.
+
+    Of their equations the combinations ``mixing (G, rank, n)`` are independent, of their coordinates ``ways (G, F, f)`` are free, and so
+    many combinations are ``settled``: along passive motions, which the equations leave free, nothing moves.
+    """
+
+    rows: Index
+    settled: int
+    ways: Array
+    mixing: Array | None
+
+
+class TaskLeg:
+    """Straight ways between members ``begin`` and ``end``, one or several; ``which (V,)`` says which of them a track follows."""
+
+    def __init__(self, of: TaskClass, begin: ClassMember, end: ClassMember, which: Index | None = None) -> None:
+        self.equations, self.begin, self.end, self._which = of, begin, end, which
+        M0, M1 = begin.numbers.poses, end.numbers.poses
+        R = np.einsum("ijspb,kjspb->ikspb", M1[:, :3], M0[:, :3])
+        turned = np.einsum("ijspb,jspb->ispb", R, M0[:, 3])
+        eta = finite_twist(R, M1[:, 3] - turned, np.zeros_like(turned))
+        eta[:, of.turning.reshape(2, -1)] = 0.0
+        # rounding of a pose that stands still
+        self._eta = np.where(np.abs(eta).max(axis=(0, 3), keepdims=True) > MODES.slide, eta, 0.0)
+        self._change = [
+            np.where(of.turning.reshape(2, 1, -1, 1), b - a, 0.0)
+            for a, b in zip(begin.numbers.vectors, end.numbers.vectors, strict=True)
+        ]
+        moves = (self._eta != 0).any(axis=(0, 3)) | np.any([(c != 0).any(axis=(1, 3)) for c in self._change], axis=0)
+        # sides and pairs of the markers that move
+        self.known = np.nonzero(moves)
+
+    def prints(self, x: Array, t: Array, tracks: Index) -> Array:
+        """What tells mechanisms apart."""
+        return x[: self.equations.u]
+
+    def at(self, x: Array, t: Array, tracks: Index) -> Arrow:
+        """The equations at states of tracks at ``t (T,)``."""
+        return (Arrow if self.equations.compiled is None else CompiledArrow)(self, t, tracks, x)
+
+    def member(self, t: Array, tracks: Index) -> tuple[ClassMember, Array, Array]:
+        """Members on the way, with the rates of what is asked ``(R, d, T)`` and of all vectors ``(3, 3, 2, P, T)``."""
+        if self._which is None:
+            begin, last, eta, change = self.begin, self.end.drive, self._eta, self._change
+        else:
+            which = self._which[tracks]
+            begin, (last, eta, *change) = (
+                self.begin.taken(which),
+                (v[..., which] if v.shape[-1] > 1 else v for v in (self.end.drive, self._eta, *self._change)),
+            )
+        X = pose_exp(t * eta)
+        vectors = begin.numbers.moved(X).vectors
+        w, (point, axis, second) = eta[:3], (v.swapaxes(0, 1) for v in vectors)
+        rates = np.stack([cross(w, point) + eta[3:], cross(w, axis), cross(w, second)])
+        rates = rates + np.stack([c.swapaxes(0, 1) for c in change])
+        numbers = RowNumbers.of(*(v + t * c for v, c in zip(vectors, change, strict=True)))
+        drive = last - begin.drive
+        return ClassMember(numbers, begin.drive + t * drive), drive, rates
+
+
+class Arrow:
+    """The equations linearized at a batch of states, row by row."""
+
+    _of_states = ("x", "_factored")
+
+    def __init__(self, leg: TaskLeg, t: Array, tracks: Index, x: Array) -> None:
+        self.leg, self.of = leg, leg.equations
+        self.member, self._change, self._rates = leg.member(t, tracks)
+        self.rows = self.of.at(self.member, x)
+
+    @cached_property
+    def x(self) -> Array:
+        """The states."""
+        return self.of.state(self.rows)
+
+    def again(self, x: Array) -> Arrow:
+        """The equations of the same members at other states."""
+        out = copy(self)
+        for name in self._of_states:
+            vars(out).pop(name, None)
+        out.rows = self.of.at(self.member, x)
+        return out
+
+    def idle(self) -> Array:
+        """None: what equations leave free stays at rest in the least norm."""
+        return np.zeros((self.rows.T, 0, 0))
+
+    @property
+    def noise(self) -> Array:
+        """Rounding ``(T,)`` to be expected of a Newton step."""
+        size = self._size
+        lengths = np.maximum(size, np.abs(self.x[: self.of.u]).max(axis=0, initial=1.0))
+        # of rows in squares of lengths; seen at tracks on which these are thousands
+        return 6.0 * rounding(np.cbrt(size * lengths**2))
+
+    @property
+    def _size(self) -> Array:
+        """The largest number ``(T,)`` in a pose of a link."""
+        return np.asarray(np.abs(self.rows.here.poses).max(axis=(0, 1, 2)).reshape(-1, self.rows.T).max(axis=0))
+
+    def _mixed(self, block: RowBlock, values: Array) -> Array:
+        """``(R, n, k, T)`` as the combinations of every row of a block, ``(G, T, rank, k)``."""
+        own = values[block.rows].transpose(0, 3, 1, 2)
+        mixed = own if block.mixing is None else block.mixing[:, None] @ own
+        return np.where(np.isfinite(mixed), mixed, 0.0)
+
+    @cached_property
+    def _factored(self) -> tuple[list[tuple[Array, Array, Array]], Array]:
+        """``N_i``, ``J_i^+`` and ``B_i`` ``(G, T, ., .)`` of the rows of all blocks, and the matrix of the unknowns."""
+        out, T = [], self.rows.T
+        for block in self.of.blocks:
+            J, B = (self._mixed(block, v) for v in (self.rows.by_coordinates, self.rows.by_unknowns))
+            J, n = J @ block.ways[:, None], block.settled
+            if n < J.shape[3]:
+                # of passive motions, which a moving frame of the states turns, only the least norm is never led astray
+                Q, sigma, V = np.linalg.svd(J)
+                back = V[..., :n, :].conj().swapaxes(2, 3) / np.maximum(sigma[..., None, :n], 1e-300)
+            else:
+                Q, upper = np.linalg.qr(J, mode="complete")
+                back = np.linalg.inv(
+                    upper[:, :, :n] + np.where(np.eye(n, dtype=bool) & (upper[:, :, :n] == 0), 1e-300, 0.0)
+                )
+            back = block.ways[:, None] @ back @ Q[..., :n].conj().swapaxes(2, 3)
+            out.append((Q[..., n:].conj().swapaxes(2, 3), back, B))
+        return out, np.concatenate([_beneath(N @ B, T) for N, _, B in out], axis=1)
+
+    @property
+    def matrix(self) -> Array:
+        """The matrix of the unknowns ``(T, u, u)``, all else eliminated."""
+        return self._factored[1]
+
+    def solve(self, right: Array, by: Callable[[Array, Array], Array] = solved) -> Array:
+        """Increments ``(head + R F, T)`` for a right side ``(R, n, T)``; NaN where singular, unless ``by`` knows more."""
+        of, (parts, S) = self.of, self._factored
+        T, b = self.rows.T, [self._mixed(block, right[:, :, None]) for block in of.blocks]
+        dz = by(S, np.concatenate([_beneath(N @ own, T) for (N, _, _), own in zip(parts, b, strict=True)], axis=1))
+        dq = np.zeros((of.R, of.F, T), dtype=complex)
+        for block, (_, back, B), own in zip(of.blocks, parts, b, strict=True):
+            dq[block.rows] = (back @ (own - B @ dz))[..., 0].swapaxes(1, 2)
+        return np.concatenate([dz[:, :, 0].T, np.zeros((of.W, T)), dq.reshape(of.R * of.F, T)])
+
+    def newton(self, idle: Array) -> Array:
+        """The Newton step."""
+        return self.solve(-self.rows.residual)
+
+    def rates(self, idle: Array) -> tuple[Array, Array]:
+        """Rates of increments with ``t``."""
+        of, columns, change = self.of, self.of.columns, self.asked_rates()
+        out = self._led(change)
+        whole, factor_of = out[of.head :].reshape(of.R, of.F, -1), of.problem.factor_of
+        if (scaled := factor_of >= 0).any() and self.rows.drive is not None:
+            first = of.u - 1 - factor_of.max()
+            change[:, scaled] += self.rows.drive[:, scaled] * out[first + factor_of[scaled]]
+        for i, given in enumerate(of.given):
+            whole[i][columns[given]] = change[i, given]
+        return out, idle
+
+    def asked_rates(self) -> Array:
+        """Rates ``(R, d, T)`` of what is asked, factors apart."""
+        change = self._change * self.of.problem.factors(self.rows.numbers)
+        out = np.zeros((*change.shape[:2], self.rows.T), dtype=complex)
+        return np.add(out, change, out=out, where=self.of.given[:, :, None])
+
+    def _led(self, change: Array) -> Array:
+        """Rates of increments where what is asked changes at rates ``(R, d, T)``, but for those of what is asked itself."""
+        opened = np.einsum("rndt,rdt->rnt", self.rows.by_coordinates[:, :, self.of.columns], change)
+        if len(self.leg.known[0]):
+            opened = opened + self.rows.moved(*self.leg.known, self.known_rates()).sum(axis=2)
+        return self.solve(-opened)
+
+    def known_rates(self) -> Array:
+        """Rates ``(3, 3, n, T)`` of points, axes and second directions of markers that move, as far as they are known."""
+        out = self._rates.copy()
+        for places in self.of.problem.places:
+            for p in (p for p in places if p.array in MARKER):
+                out[MARKER.index(p.array), p.component, p.side, p.pair] = 0.0
+        side, pair = self.leg.known
+        return out[:, :, side, pair]
+
+
+class CompiledRows:
+    """The rows of a class of tasks as ``kernel/tracks.c`` takes them: what they are made of, and what mixes them."""
+
+    def __init__(self, of: TaskClass) -> None:
+        p, s = of.problem, of.problem.system
+        known = layout(s, np.zeros(0, dtype=np.intp), [])
+        made = tables(known, s, p.at_rest[:, None], None)
+        assert made is not None
+        self.of, self.I, self.P = of, made[0], made[1][0]
+        every = [(k, q) for k, own in enumerate(p.places) for q in own if q.array in MARKER]
+        self.side, self.pair = (np.array([getattr(q, name) for _, q in every], dtype=int) for name in ("side", "pair"))
+        self.rates = unit_rates([q for _, q in every])
+        rods, ways = (p.rods, cast("RodSystem", s).ways) if isinstance(p, RodProblem) else ([], [])
+        through = np.zeros((s.graph.n_loops, len(p.whole.pairs)))
+        for loop, pair, sign in zip(*fundamental(s), strict=True):
+            through[loop, pair] = sign
+        factors = np.where(p.factor_of < 0, -1, of.u - 1 - p.factor_of.max(initial=0) + p.factor_of)
+        self.height = s.graph.loop_rows + len(p.whole.couplings) + len(rods)
+        rows = sorted((int(i), block, j) for block in of.blocks for j, i in enumerate(block.rows))
+        told, mixing = [], [np.zeros(0, dtype=complex)]
+        for i, block, j in rows:
+            mixed = block.mixing is not None
+            rank = self.height if block.mixing is None else block.mixing.shape[1]
+            told += [rank, block.settled, len(of.free[i]), mixed, *of.free[i]]
+            mixing += [block.mixing[j].ravel()] if block.mixing is not None else []
+        head = [of.R, of.u, of.head, of.nx, len(p.order), len(rods), len(every), len(of.columns)]
+        parts = [
+            head, known.side, [k for k, _ in every], self.side, self.pair, [[*near, *far] for near, far in rods],
+            ways, through, of.columns, factors, told,
+        ]  # fmt: skip
+        self.A = np.concatenate([np.asarray(part, dtype=np.int32).ravel() for part in parts])
+        self.mixing = np.concatenate(mixing)
+        size = _library().mgk_tracks_size(self.I.ctypes.data, self.A.ctypes.data, len(self.P))
+        self.memory = np.empty(size, dtype=complex)
+
+    @staticmethod
+    def of_class(of: TaskClass) -> CompiledRows | None:
+        """Those of a class, where the kernel is there and serves it."""
+        square = sum(of.conditions) == of.u
+        if build.installed() is None or of.problem.rates or not square or why_not(of.problem.system) is not None:
+            return None
+        return CompiledRows(of)
+
+    def steps(self, at: CompiledArrow, change: Array | None) -> tuple[Array, Array | None, Array]:
+        """Steps of Newton's method, rates where what is asked changes at rates ``(R, d, T)``, and the largest numbers in poses ``(T,)``."""
+        of, rows, T = self.of, at.rows, at.rows.T
+        side, pair = at.leg.known if change is not None else (self.side[:0], self.pair[:0])
+        eta = np.empty((6, len(self.side) + len(side), T), dtype=complex)
+        for own, (i, k, rates) in (
+            (eta[:, : len(self.side)], (self.side, self.pair, self.rates)),
+            (eta[:, len(self.side) :], (side, pair, at.known_rates() if len(side) else self.rates[:, :, :0])),
+        ):
+            vectors = [v[i, :, k].swapaxes(0, 1) for v in rows.numbers.vectors]
+            own[:] = marker_twists(vectors, rows.numbers.norms[:, i, k], rates)
+            rod = k >= len(of.problem.whole.pairs)
+            own[3:, rod] = rates[0][:, rod]
+        known = np.array([side, pair], dtype=np.int32)
+        marker = np.broadcast_to(rows.numbers.poses, (3, 4, 2, len(of.problem.order), T))
+        arrays = [marker, rows.x, eta, np.zeros(0) if rows.drive is None else rows.drive, np.zeros(0) if change is None else change]
+        given = [np.ascontiguousarray(v, dtype=complex) for v in arrays]
+        step = np.empty((of.head + of.R * of.F, T), dtype=complex)
+        led, size = None if change is None else np.empty_like(step), np.empty(T)
+        out = [step.ctypes.data, None if led is None else led.ctypes.data, size.ctypes.data, self.memory.ctypes.data]
+        _library().mgk_tracks(
+            self.I.ctypes.data, self.P.ctypes.data, len(self.P), self.A.ctypes.data, self.mixing.ctypes.data, T, len(side),
+            known.ctypes.data, *(v.ctypes.data for v in given), *out,
+        )  # fmt: skip
+        return step, led, size
+
+
+class CompiledArrow(Arrow):
+    """The same from the kernel."""
+
+    _of_states = (*Arrow._of_states, "_stepped", "_both")
+    _known = False
+
+    def again(self, x: Array) -> Arrow:
+        """See there; of the same members rates are asked as well."""
+        out = super().again(x)
+        vars(out)["_known"] = True
+        return out
+
+    @cached_property
+    def _stepped(self) -> tuple[Array, Array | None, Array]:
+        return self._both if self._known else self.of.compiled.steps(self, None)
+
+    @cached_property
+    def _both(self) -> tuple[Array, Array | None, Array]:
+        return self.of.compiled.steps(self, self.asked_rates())
+
+    @property
+    def _size(self) -> Array:
+        return self._stepped[2]
+
+    def newton(self, idle: Array) -> Array:
+        """See there."""
+        return self._stepped[0]
+
+    def _led(self, change: Array) -> Array:
+        return self._both[1].copy()
+
+
+def _beneath(values: Array, T: int) -> Array:
+    """``(G, T, n, k)`` of rows, one beneath the other ``(T, G n, k)``."""
+    return values.swapaxes(0, 1).reshape(T, -1, values.shape[3])
+
+
+@cache
+def _library() -> ctypes.CDLL:
+    """The kernel, its functions for tracks declared."""
+    library = build.built()
+    pointer, whole = ctypes.c_void_p, ctypes.c_int
+    library.mgk_tracks_size.argtypes, library.mgk_tracks_size.restype = [pointer, pointer, whole], ctypes.c_size_t
+    library.mgk_tracks.argtypes = [pointer, pointer, whole, *[pointer] * 2, whole, whole, *[pointer] * 10]
+    library.mgk_tracks.restype = None
+    return library
