@@ -7,7 +7,7 @@ the closure has independent ones in its coordinates and the unknowns; beyond the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from copy import copy
 from functools import cached_property
 
@@ -21,13 +21,11 @@ from mechgraph.maths.linear import complement, rank_of, singular_values
 from mechgraph.maths.newton import least_norm_steps
 from mechgraph.maths.se3 import Index, cross, finite_twist, inverse, move_twist, pose_exp, rotation_exp
 from mechgraph.maths.tolerances import MODES
-from mechgraph.memo import dataclass
 from mechgraph.modes.family import Array, Family, common, generated
 from mechgraph.modes.homotopy import ENDLESS_STATE, Equations, Mask
 from mechgraph.synthesis.legs import ClassMember, CompiledRows, RowBlock, TaskLeg
 from mechgraph.synthesis.rods import RodProblem, rods_of
 from mechgraph.synthesis.system import ArrowRows, RowNumbers, RowProblem
-from mechgraph.variants.numbers import MARKER
 
 
 class NoClass(Exception):
@@ -516,4 +514,3 @@ def _closed(system: System, x: Array) -> tuple[Array, Array]:
 
 def _rank(A: Array) -> int:
     return rank_of(singular_values(A), MODES.generic) if A.size else 0
-

@@ -11,7 +11,7 @@ import ctypes
 from collections.abc import Callable, Sequence
 from copy import copy
 from functools import cache, cached_property
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -21,10 +21,9 @@ from mechgraph.maths.se3 import Index, cross, finite_twist, pose_exp
 from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
 from mechgraph.modes.family import Array
-from mechgraph.modes.homotopy import rounding, solved
+from mechgraph.modes.homotopy import Corrected, Ways, rounding, solved
 from mechgraph.synthesis.rods import RodProblem
-from mechgraph.synthesis.system import RowNumbers
-from mechgraph.synthesis.unknowns import marker_twists, unit_rates
+from mechgraph.synthesis.system import ArrowRows, RowNumbers
 from mechgraph.variants.numbers import MARKER
 
 if TYPE_CHECKING:
@@ -64,7 +63,7 @@ class RowBlock:
     mixing: Array | None
 
 
-class TaskLeg:
+class TaskLeg(Ways):
     """Straight ways between members ``begin`` and ``end``, one or several; ``which (V,)`` says which of them a track follows."""
 
     def __init__(self, of: TaskClass, begin: ClassMember, end: ClassMember, which: Index | None = None) -> None:
@@ -80,9 +79,15 @@ class TaskLeg:
             np.where(of.turning.reshape(2, 1, -1, 1), b - a, 0.0)
             for a, b in zip(begin.numbers.vectors, end.numbers.vectors, strict=True)
         ]
-        moves = (self._eta != 0).any(axis=(0, 3)) | np.any([(c != 0).any(axis=(1, 3)) for c in self._change], axis=0)
-        # sides and pairs of the markers that move
-        self.known = np.nonzero(moves)
+        self._moves = (self._eta != 0).any(axis=(0, 3)) | np.any(
+            [(c != 0).any(axis=(1, 3)) for c in self._change], axis=0
+        )
+
+    @cached_property
+    def moving(self) -> tuple[Index, Index]:
+        """Sides and pairs of the markers that move."""
+        side, pair = np.nonzero(self._moves)
+        return side, pair
 
     def prints(self, x: Array, t: Array, tracks: Index) -> Array:
         """What tells mechanisms apart."""
@@ -91,6 +96,32 @@ class TaskLeg:
     def at(self, x: Array, t: Array, tracks: Index) -> Arrow:
         """The equations at states of tracks at ``t (T,)``."""
         return (Arrow if self.equations.compiled is None else CompiledArrow)(self, t, tracks, x)
+
+    def corrected(self, x: Array, t: Array, dt: Array, tracks: Index, idle: Array) -> Corrected:
+        """See there."""
+        rows = self.equations.compiled
+        if rows is None:
+            return super().corrected(x, t, dt, tracks, idle)
+        x, _, v, (*sizes, size) = rows.tracked(self, x, t, tracks, rate=dt)
+        return Corrected(x, v, sizes, noise_of(size, x[: self.equations.u]), idle)
+
+    @cached_property
+    def numbers(self) -> tuple[int, list[Array]]:
+        """How many ways there are, and their numbers as the kernel takes them."""
+        begin, drive = self.begin.numbers, self.begin.drive
+        arrays = (
+            np.stack([*np.broadcast_arrays(*begin.vectors)]),
+            self._eta,
+            np.stack([*np.broadcast_arrays(*self._change)]),
+        )
+        shifted = [arrays[0].swapaxes(1, 2), arrays[1], arrays[2].swapaxes(1, 2), drive, self.end.drive - drive]
+        n = max(v.shape[-1] for v in shifted)
+        out = [np.ascontiguousarray(np.broadcast_to(v, (*v.shape[:-1], n)), dtype=complex) for v in shifted]
+        return n, out
+
+    def ways(self, tracks: Index) -> Index:
+        """On which way each track is."""
+        return np.zeros(len(tracks), dtype=np.intp) if self._which is None else self._which[tracks]
 
     def member(self, t: Array, tracks: Index) -> tuple[ClassMember, Array, Array]:
         """Members on the way, with the rates of what is asked ``(R, d, T)`` and of all vectors ``(3, 3, 2, P, T)``."""
@@ -115,12 +146,13 @@ class TaskLeg:
 class Arrow:
     """The equations linearized at a batch of states, row by row."""
 
-    _of_states = ("x", "_factored")
-
     def __init__(self, leg: TaskLeg, t: Array, tracks: Index, x: Array) -> None:
-        self.leg, self.of = leg, leg.equations
-        self.member, self._change, self._rates = leg.member(t, tracks)
-        self.rows = self.of.at(self.member, x)
+        self.leg, self.of, self._t, self._tracks = leg, leg.equations, t, tracks
+        self.rows = self.of.at(self._way[0], x)
+
+    @cached_property
+    def _way(self) -> tuple[ClassMember, Array, Array]:
+        return self.leg.member(self._t, self._tracks)
 
     @cached_property
     def x(self) -> Array:
@@ -130,9 +162,9 @@ class Arrow:
     def again(self, x: Array) -> Arrow:
         """The equations of the same members at other states."""
         out = copy(self)
-        for name in self._of_states:
+        for name in ("x", "_factored"):
             vars(out).pop(name, None)
-        out.rows = self.of.at(self.member, x)
+        out.rows = self.of.at(self._way[0], x)
         return out
 
     def idle(self) -> Array:
@@ -142,10 +174,7 @@ class Arrow:
     @property
     def noise(self) -> Array:
         """Rounding ``(T,)`` to be expected of a Newton step."""
-        size = self._size
-        lengths = np.maximum(size, np.abs(self.x[: self.of.u]).max(axis=0, initial=1.0))
-        # of rows in squares of lengths; seen at tracks on which these are thousands
-        return 6.0 * rounding(np.cbrt(size * lengths**2))
+        return noise_of(self._size, self.x[: self.of.u])
 
     @property
     def _size(self) -> Array:
@@ -199,8 +228,14 @@ class Arrow:
 
     def rates(self, idle: Array) -> tuple[Array, Array]:
         """Rates of increments with ``t``."""
-        of, columns, change = self.of, self.of.columns, self.asked_rates()
-        out = self._led(change)
+        of, columns = self.of, self.of.columns
+        change = np.where(of.given[:, :, None], self._way[1] * of.problem.factors(self.rows.numbers), 0.0)
+        J = self.rows.by_coordinates
+        opened = np.einsum("rndt,rdt->rnt", J[:, :, columns], np.broadcast_to(change, (*change.shape[:2], self.rows.T)))
+        side, pair = self.leg.moving
+        if len(side):
+            opened = opened + self.rows.moved(side, pair, self._known_rates()).sum(axis=2)
+        out = self.solve(-opened)
         whole, factor_of = out[of.head :].reshape(of.R, of.F, -1), of.problem.factor_of
         if (scaled := factor_of >= 0).any() and self.rows.drive is not None:
             first = of.u - 1 - factor_of.max()
@@ -209,27 +244,21 @@ class Arrow:
             whole[i][columns[given]] = change[i, given]
         return out, idle
 
-    def asked_rates(self) -> Array:
-        """Rates ``(R, d, T)`` of what is asked, factors apart."""
-        change = self._change * self.of.problem.factors(self.rows.numbers)
-        out = np.zeros((*change.shape[:2], self.rows.T), dtype=complex)
-        return np.add(out, change, out=out, where=self.of.given[:, :, None])
-
-    def _led(self, change: Array) -> Array:
-        """Rates of increments where what is asked changes at rates ``(R, d, T)``, but for those of what is asked itself."""
-        opened = np.einsum("rndt,rdt->rnt", self.rows.by_coordinates[:, :, self.of.columns], change)
-        if len(self.leg.known[0]):
-            opened = opened + self.rows.moved(*self.leg.known, self.known_rates()).sum(axis=2)
-        return self.solve(-opened)
-
-    def known_rates(self) -> Array:
+    def _known_rates(self) -> Array:
         """Rates ``(3, 3, n, T)`` of points, axes and second directions of markers that move, as far as they are known."""
-        out = self._rates.copy()
+        out = self._way[2].copy()
         for places in self.of.problem.places:
             for p in (p for p in places if p.array in MARKER):
                 out[MARKER.index(p.array), p.component, p.side, p.pair] = 0.0
-        side, pair = self.leg.known
+        side, pair = self.leg.moving
         return out[:, :, side, pair]
+
+
+def noise_of(size: Array, z: Array) -> Array:
+    """Rounding ``(T,)`` to be expected of a Newton step where the largest numbers in poses are of a ``size``, for unknowns ``z (u, T)``."""
+    lengths = np.maximum(size, np.abs(z).max(axis=0, initial=1.0))
+    # of rows in squares of lengths; seen at tracks on which these are thousands
+    return 6.0 * rounding(np.cbrt(size * lengths**2))
 
 
 class CompiledRows:
@@ -241,26 +270,27 @@ class CompiledRows:
         made = tables(known, s, p.at_rest[:, None], None)
         assert made is not None
         self.of, self.I, self.P = of, made[0], made[1][0]
-        every = [(k, q) for k, own in enumerate(p.places) for q in own if q.array in MARKER]
-        self.side, self.pair = (np.array([getattr(q, name) for _, q in every], dtype=int) for name in ("side", "pair"))
-        self.rates = unit_rates([q for _, q in every])
+        places = [
+            [k, MARKER.index(q.array), q.component, q.side, q.pair]
+            for k, own in enumerate(p.places)
+            for q in own
+            if q.array in MARKER
+        ]
         rods, ways = (p.rods, cast("RodSystem", s).ways) if isinstance(p, RodProblem) else ([], [])
         through = np.zeros((s.graph.n_loops, len(p.whole.pairs)))
         for loop, pair, sign in zip(*fundamental(s), strict=True):
             through[loop, pair] = sign
         factors = np.where(p.factor_of < 0, -1, of.u - 1 - p.factor_of.max(initial=0) + p.factor_of)
-        self.height = s.graph.loop_rows + len(p.whole.couplings) + len(rods)
-        rows = sorted((int(i), block, j) for block in of.blocks for j, i in enumerate(block.rows))
+        height = s.graph.loop_rows + len(p.whole.couplings) + len(rods)
         told, mixing = [], [np.zeros(0, dtype=complex)]
-        for i, block, j in rows:
-            mixed = block.mixing is not None
-            rank = self.height if block.mixing is None else block.mixing.shape[1]
-            told += [rank, block.settled, len(of.free[i]), mixed, *of.free[i]]
-            mixing += [block.mixing[j].ravel()] if block.mixing is not None else []
-        head = [of.R, of.u, of.head, of.nx, len(p.order), len(rods), len(every), len(of.columns)]
+        for i in range(of.R):
+            own, at = next((b, int(np.flatnonzero(b.rows == i)[0])) for b in of.blocks if i in b.rows)
+            rank = height if own.mixing is None else own.mixing.shape[1]
+            told += [rank, own.settled, len(of.free[i]), own.mixing is not None, *of.free[i]]
+            mixing += [] if own.mixing is None else [own.mixing[at].ravel()]
+        head = [of.R, of.u, of.head, of.nx, len(p.order), len(rods), len(places), len(of.columns)]
         parts = [
-            head, known.side, [k for k, _ in every], self.side, self.pair, [[*near, *far] for near, far in rods],
-            ways, through, of.columns, factors, told,
+            head, known.side, places, [[*near, *far] for near, far in rods], ways, through, of.columns, factors, of.given, told,
         ]  # fmt: skip
         self.A = np.concatenate([np.asarray(part, dtype=np.int32).ravel() for part in parts])
         self.mixing = np.concatenate(mixing)
@@ -275,63 +305,59 @@ class CompiledRows:
             return None
         return CompiledRows(of)
 
-    def steps(self, at: CompiledArrow, change: Array | None) -> tuple[Array, Array | None, Array]:
-        """Steps of Newton's method, rates where what is asked changes at rates ``(R, d, T)``, and the largest numbers in poses ``(T,)``."""
-        of, rows, T = self.of, at.rows, at.rows.T
-        side, pair = at.leg.known if change is not None else (self.side[:0], self.pair[:0])
-        eta = np.empty((6, len(self.side) + len(side), T), dtype=complex)
-        for own, (i, k, rates) in (
-            (eta[:, : len(self.side)], (self.side, self.pair, self.rates)),
-            (eta[:, len(self.side) :], (side, pair, at.known_rates() if len(side) else self.rates[:, :, :0])),
-        ):
-            vectors = [v[i, :, k].swapaxes(0, 1) for v in rows.numbers.vectors]
-            own[:] = marker_twists(vectors, rows.numbers.norms[:, i, k], rates)
-            rod = k >= len(of.problem.whole.pairs)
-            own[3:, rod] = rates[0][:, rod]
-        known = np.array([side, pair], dtype=np.int32)
-        marker = np.broadcast_to(rows.numbers.poses, (3, 4, 2, len(of.problem.order), T))
-        arrays = [marker, rows.x, eta, np.zeros(0) if rows.drive is None else rows.drive, np.zeros(0) if change is None else change]
-        given = [np.ascontiguousarray(v, dtype=complex) for v in arrays]
-        step = np.empty((of.head + of.R * of.F, T), dtype=complex)
-        led, size = None if change is None else np.empty_like(step), np.empty(T)
-        out = [step.ctypes.data, None if led is None else led.ctypes.data, size.ctypes.data, self.memory.ctypes.data]
+    def tracked(
+        self, leg: TaskLeg, x: Array, t: Array, tracks: Index, rates: bool = False, rate: Array | None = None
+    ) -> tuple[Array, Array, Array, Array]:
+        """States ``x (nx, T)`` with what is asked of them, steps of Newton's method, rates where asked for, and sizes ``(3, T)``.
+
+        ``rate (T,)``: ``x`` are predictions to be corrected by two steps, and rates are those of states, times it; see ``kernel/tracks.c``.
+        """
+        of, T, (ways, numbers) = self.of, x.shape[1], leg.numbers
+        x, at = np.array(x, dtype=complex, order="C"), np.ascontiguousarray(t, dtype=complex)
+        step = np.empty((0 if rate is not None else of.head + of.R * of.F, T), dtype=complex)
+        led, sizes = np.empty_like(step if rate is None else x), np.empty((3, T))
+        which, numbers_at = (
+            leg.ways(tracks).astype(np.int32),
+            np.array([v.ctypes.data for v in numbers], dtype=np.uintp),
+        )
+        dt = None if rate is None else np.ascontiguousarray(rate, dtype=complex)
         _library().mgk_tracks(
-            self.I.ctypes.data, self.P.ctypes.data, len(self.P), self.A.ctypes.data, self.mixing.ctypes.data, T, len(side),
-            known.ctypes.data, *(v.ctypes.data for v in given), *out,
+            self.I.ctypes.data, self.P.ctypes.data, len(self.P), self.A.ctypes.data, self.mixing.ctypes.data, numbers_at.ctypes.data, ways,
+            T, which.ctypes.data, at.ctypes.data, None if dt is None else dt.ctypes.data, x.ctypes.data, step.ctypes.data,
+            led.ctypes.data if rates or dt is not None else None, sizes.ctypes.data, self.memory.ctypes.data,
         )  # fmt: skip
-        return step, led, size
+        return x, step, led, sizes
 
 
 class CompiledArrow(Arrow):
-    """The same from the kernel."""
+    """The same from the kernel; rows are made where more is asked for."""
 
-    _of_states = (*Arrow._of_states, "_stepped", "_both")
-    _known = False
+    def __init__(self, leg: TaskLeg, t: Array, tracks: Index, x: Array) -> None:
+        assert leg.equations.compiled is not None
+        self.leg, self.of, self._t, self._tracks, self._compiled = leg, leg.equations, t, tracks, leg.equations.compiled
+        self.x, self._step, self._led_on, sizes = self._compiled.tracked(leg, x, t, tracks, rates=True)
+        self._largest = sizes[2]
+
+    @cached_property
+    def rows(self) -> ArrowRows:
+        """The equations."""
+        return self.of.at(self._way[0], self.x)
 
     def again(self, x: Array) -> Arrow:
-        """See there; of the same members rates are asked as well."""
-        out = super().again(x)
-        vars(out)["_known"] = True
-        return out
-
-    @cached_property
-    def _stepped(self) -> tuple[Array, Array | None, Array]:
-        return self._both if self._known else self.of.compiled.steps(self, None)
-
-    @cached_property
-    def _both(self) -> tuple[Array, Array | None, Array]:
-        return self.of.compiled.steps(self, self.asked_rates())
+        """See there."""
+        return CompiledArrow(self.leg, self._t, self._tracks, x)
 
     @property
     def _size(self) -> Array:
-        return self._stepped[2]
+        return self._largest
 
     def newton(self, idle: Array) -> Array:
         """See there."""
-        return self._stepped[0]
+        return self._step
 
-    def _led(self, change: Array) -> Array:
-        return self._both[1].copy()
+    def rates(self, idle: Array) -> tuple[Array, Array]:
+        """See there."""
+        return self._led_on, idle
 
 
 def _beneath(values: Array, T: int) -> Array:
@@ -345,6 +371,6 @@ def _library() -> ctypes.CDLL:
     library = build.built()
     pointer, whole = ctypes.c_void_p, ctypes.c_int
     library.mgk_tracks_size.argtypes, library.mgk_tracks_size.restype = [pointer, pointer, whole], ctypes.c_size_t
-    library.mgk_tracks.argtypes = [pointer, pointer, whole, *[pointer] * 2, whole, whole, *[pointer] * 10]
+    library.mgk_tracks.argtypes = [pointer, pointer, whole, *[pointer] * 3, whole, whole, *[pointer] * 8]
     library.mgk_tracks.restype = None
     return library

@@ -41,8 +41,9 @@ from mechgraph.modes.start_sets import (
     trace_test,
 )
 from mechgraph.modes.targets import FAR_APART, TrackRun, run_tracks
-from mechgraph.synthesis.classes import ClassMember, TaskClass, TaskLeg
+from mechgraph.synthesis.classes import TaskClass
 from mechgraph.synthesis.labelling import TaskLabelling, by_motions, motions_of, placed, symmetries
+from mechgraph.synthesis.legs import ClassMember, TaskLeg
 from mechgraph.variants.numbers import MARKER
 
 Progress = Callable[[str], None] | None

@@ -32,10 +32,11 @@ from mechgraph.synthesis.answers import (
     joined_answers,
 )
 from mechgraph.synthesis.certified import certificates
-from mechgraph.synthesis.classes import ClassMember, NoClass, TaskClass
+from mechgraph.synthesis.classes import NoClass, TaskClass
 from mechgraph.synthesis.fitness import Fitness, Measure, fitnesses, limits_of
 from mechgraph.synthesis.fits import Fit, FitPoint
 from mechgraph.synthesis.labelling import cognates, motions_of, orbits, symmetries
+from mechgraph.synthesis.legs import ClassMember
 from mechgraph.synthesis.optima import Fitted, fitted
 from mechgraph.synthesis.solve import (
     Progress,
