@@ -1,5 +1,6 @@
 """Tracks of synthesis: the kernel and numpy lead them alike."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -105,3 +106,16 @@ def test_without_a_kernel_the_same_is_found(name: str, monkeypatch: pytest.Monke
     plain = mg.synthesize(m, task, unknown)
     assert np.allclose(np.sort_complex(plain.values.ravel()), np.sort_complex(fast.values.ravel()), atol=1e-10)
     assert plain.total == fast.total
+
+
+def test_a_search_that_ended_by_its_number_of_tracks_is_kept(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("MECHGRAPH_CACHE", str(tmp_path))
+    m, task, unknown = parallel()
+    for module in ("mechgraph.modes.start_sets", "mechgraph.synthesis.solve"):
+        monkeypatch.setattr(f"{module}.MOST_TRACKED", 1)
+    said: list[list[str]] = [[], []]
+    first, second = (mg.synthesize(m, task, unknown, progress=lines.append) for lines in said)
+    assert first.completeness == second.completeness == "searched"
+    assert (first.total, first.evidence[0]) == (second.total, second.evidence[0])
+    assert any("first task" in line for line in said[0])
+    assert not any("first task" in line for line in said[1])

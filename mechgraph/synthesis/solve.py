@@ -305,7 +305,7 @@ def _read(labelling: TaskLabelling, file: Path, prefix: str) -> TaskStart | None
         with file.open("rb") as handle, np.load(handle, allow_pickle=False) as f:
             loops, lost, followed, degree, samples = f[prefix + "counts"].tolist()
             chance, last, beyond = f[prefix + "sizes"].tolist()
-            source = str(f[prefix + "source"])
+            source, estimate = str(f[prefix + "source"]), str(f.get(prefix + "estimate", ""))
             vectors = {name: f[prefix + name] for name in MARKER}
             (each, K), stored = np.append(f[prefix + "each"], 1)[:2].tolist(), f[prefix + "x"]
             if not np.iscomplexobj(stored):
@@ -317,7 +317,7 @@ def _read(labelling: TaskLabelling, file: Path, prefix: str) -> TaskStart | None
         of, tracks = labelling.of, np.zeros(alike.shape[1], dtype=np.intp)
         alike[:, :, 0], closed = polished(of.leg(member, member), alike[:, :, 0], 1.0, tracks)
         trace = Trace(degree, samples, last, beyond)
-        found = TaskStart(member, alike, loops, chance, lost, followed, trace, source, each)
+        found = TaskStart(member, alike, loops, chance, lost, followed, trace, source, each, estimate=estimate)
         here = of.at(member, found.x)
         size = np.maximum(1.0, np.abs(here.here.poses).max())
         return found if closed.all() and of.error(here).max() < MODES.member_closed * size else None
@@ -333,6 +333,7 @@ def arrays(labelling: TaskLabelling, start: TaskStart) -> dict[str, Any]:
         "sizes": sizes,
         "counts": counts,
         "source": np.array(start.source),
+        "estimate": np.array(start.estimate),
         "each": np.array([start.each, start.alike.shape[2]]),
     }
     return labelling.ordered(start.member, start.alike.reshape(len(start.x), -1)) | told
@@ -562,7 +563,8 @@ def start_of(of: TaskClass, rng: np.random.Generator, cache: bool, progress: Pro
             "first task of its kind: all solutions of a random one are worked out, and kept for others; seconds to minutes"
         )
     made = start_set(of, rng, progress)
-    if cache and (made.word == "tested" or made.chance <= MISSED_AGAIN):
+    # where loops ended by their number, those of a later call would get no further
+    if cache and (made.word == "tested" or made.chance <= MISSED_AGAIN or made.followed >= MOST_TRACKED):
         _keep(of, made)
     return made
 
