@@ -6,8 +6,9 @@
  *       side[links]                             the pose among identity, markers A and markers B in which a link stands
  *       place[5 moved]                          what grows with an unknown: its number; array (point, axis, second), component, side and pair
  *       end[6 rods]                             of both ends of a rod the pair, the side on which the rod has it, and the body beyond
+ *       square[rods]                            where the square of its length stands among what is asked (-1: that of what is on the rod)
  *       way[rods pairs], through[loops pairs]   how a rod and a loop pass the pairs
- *       column[asked], factor[asked]            what is asked, and the unknown that is its factor (-1: none)
+ *       column[asked], factor[asked]            what is asked (-1: a square), and the unknown that is its factor (-1: none)
  *       given[rows asked]                       whether it is asked of a row
  *       of every row: rank, settled, free, whether it is mixed, its free columns
  * leg: numbers of the markers at the begin of a way [3 arrays][3][2][pairs], the screws on which they go [6][2][pairs], and how they change
@@ -16,13 +17,13 @@
 
 typedef struct {
   int rows, unknowns, head, states, pairs, rods, moved, asked;
-  const int *side, *place, *end, *way, *through, *column, *factor, *given, *row;
+  const int *side, *place, *end, *square, *way, *through, *column, *factor, *given, *row;
 } Arrow;
 
 static void read_arrow(const Model *m, const int *A, Arrow *a) {
   a->rows = A[0], a->unknowns = A[1], a->head = A[2], a->states = A[3], a->pairs = A[4], a->rods = A[5], a->moved = A[6], a->asked = A[7];
   const int *i = A + 8;
-  a->side = i, i += m->links, a->place = i, i += 5 * a->moved, a->end = i, i += 6 * a->rods;
+  a->side = i, i += m->links, a->place = i, i += 5 * a->moved, a->end = i, i += 6 * a->rods, a->square = i, i += a->rods;
   a->way = i, i += a->rods * m->pairs, a->through = i, i += m->loops * m->pairs;
   a->column = i, i += a->asked, a->factor = i, i += a->asked, a->given = i, i += a->rows * a->asked, a->row = i;
 }
@@ -243,8 +244,8 @@ static void put_unknowns(Track *t, number *x) {
   }
   FOR(side, 2) FOR(k, m->pairs) product(t->own + 12 * m->ends[2 * k + side], t->marker + 12 * (side * p + k), own[side] + 12 * k);
   FOR(i, t->a.rows) FOR(j, t->a.asked) {
-    const int at = i * t->a.asked + j, state = m->column_state[t->a.column[j]];
-    if (t->a.given[at]) x[t->a.head + i * t->a.states + state] = t->drive[at] * (t->a.factor[j] < 0 ? 1.0 : x[t->a.factor[j]]);
+    const int at = i * t->a.asked + j, state = t->a.column[j] < 0 ? -1 : m->column_state[t->a.column[j]];
+    if (state >= 0 && t->a.given[at]) x[t->a.head + i * t->a.states + state] = t->drive[at] * (t->a.factor[j] < 0 ? 1.0 : x[t->a.factor[j]]);
   }
 }
 
@@ -292,7 +293,7 @@ static void put_twists(Track *t) {
 /* --- the equations ------------------------------------------------------------------------------------------------------------------- */
 
 /* The rods at a state: what they leave open, and their lines W = (p_b x d, d), with the way between their points on them, and their rows of J. */
-static void put_rods(Track *t, number *open) {
+static void put_rods(Track *t, int row, number *open) {
   const Model *m = &t->m;
   const int p = t->a.pairs;
   FOR(i, t->a.rods) {
@@ -307,6 +308,7 @@ static void put_rods(Track *t, number *open) {
       sum += e * (2.0 * W[3 + r] - e);
     }
     cross(b, W + 3, W);
+    if (t->a.square[i] >= 0) sum = dot(W + 3, W + 3, 3) - t->drive[row * t->a.asked + t->a.square[i]];
     open[i] = 0.5 * sum;
     FOR(c, m->columns) {
       const int way = t->a.way[i * m->pairs + m->owner[c]];
@@ -362,7 +364,7 @@ static double linearized(Track *t, number *x, const number *mixing, int sides) {
       FOR(j, 12) size = raised(size, square_of(t->pose[12 * l + j]));
     }
     fill(m, t->w.S, t->w.middle, NULL, NULL, t->J);
-    put_rods(t, open);
+    put_rods(t, i, open);
     /* the rows of the closure: free columns, unknowns, right sides */
     FOR(r, h) {
       FOR(j, free) M[r * w + j] = t->J[r * c + columns[j]];
@@ -370,12 +372,13 @@ static double linearized(Track *t, number *x, const number *mixing, int sides) {
       M[r * w + free + u] = r < m->rows ? -t->w.residual[r] : -open[r - m->rows];
       if (sides > 1) M[r * w + last] = 0.0;
     }
+    FOR(j, sides > 1 ? a->rods : 0) if (a->square[j] >= 0) M[(m->rows + j) * w + last] = 0.5 * t->change[i * a->asked + a->square[j]];
     FOR(j, a->moved) {
       const int *place = a->place + 5 * j;
       opened_by(t, place[3], place[4], t->eta + 6 * j, column);
       FOR(r, h) M[r * w + free + place[0]] += column[r];
     }
-    FOR(j, a->asked) if (a->given[i * a->asked + j]) {
+    FOR(j, a->asked) if (a->column[j] >= 0 && a->given[i * a->asked + j]) {
       const int place = i * a->asked + j, factor = a->factor[j];
       FOR(r, h) {
         const number own = t->J[r * c + a->column[j]];
@@ -417,7 +420,7 @@ static double linearized(Track *t, number *x, const number *mixing, int sides) {
       }
       least(settled, free, w, M, t->order + i * c, b, y, s + 2 * c, v, s);
       FOR(j, free) to[a->head + i * c + columns[j]] = y[j];
-      FOR(j, side ? a->asked : 0) if (a->given[i * a->asked + j]) {
+      FOR(j, side ? a->asked : 0) if (a->column[j] >= 0 && a->given[i * a->asked + j]) {
         const int place = i * a->asked + j, factor = a->factor[j];
         to[a->head + i * c + a->column[j]] = factor < 0 ? t->change[place] : t->change[place] * x[factor] + t->drive[place] * to[factor];
       }

@@ -15,6 +15,7 @@ from concurrent.futures import Executor
 from contextlib import suppress
 from contextvars import ContextVar
 from dataclasses import field, replace
+from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -25,6 +26,7 @@ from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Index, finite_twist, homogeneous, move_twist, multiplied, quaternion_product
 from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
+from mechgraph.modes.compiled_tracks import CompiledTracks, Led, LedRow, LegNumbers
 from mechgraph.modes.family import Array, Family, Member
 from mechgraph.pairs.factors import screw_terms, screw_values
 
@@ -57,6 +59,20 @@ class Equations:
         self._lengths = s.single_rows[s.is_length]
         self._angles = np.setdiff1d(self._rows, self._lengths)
         self._quaternions = complement(self._rows, s.n_state)
+
+    @cached_property
+    def compiled(self) -> CompiledTracks | None:
+        """Tracks in the kernel, where it serves the class: ends of rods are pairs of their own, on which side 1 is on the body."""
+        f, s, n = self.family, self.family.system, len(self.family.points[0]) if self.family.points else 0
+        P, d = len(s.m.pairs), len(f.columns)
+        ends = [[P + 2 * i, 0, f.points[0][i], P + 2 * i + 1, 0, f.points[1][i]] for i in range(n)]
+        rank = s.n_rows if self.mixing is None else len(self.mixing)
+        columns, ways = np.concatenate([f.columns, np.full(n, -1)]), getattr(s, "ways", np.zeros(0))
+        led = Led(
+            s, f.here.x[:, 0], s.n_state, columns, np.ones((1, d + n)), [LedRow(rank, f.unknowns, f.free, self.mixing)],
+            P + 2 * n, ends, ways, d + np.arange(n),
+        )  # fmt: skip
+        return CompiledTracks(led) if led.served else None
 
     def advance(self, x: Array, dq: Array) -> Array:
         """States after increments ``dq (F, T)``."""
@@ -157,7 +173,33 @@ class Leg(Ways):
         self._eta[:, self._moving] = np.where(slides, self._turn * unit, eta)
         self._paths = np.einsum("ijknt,jlnt->ilknt", screw_terms(unit)[:3], homogeneous(first))
         self._begin, self._change = begin.drive, end.drive - begin.drive
+        self._begin_markers = begin.markers
         self._which = which
+
+    def corrected(self, x: Array, t: Array, dt: Array, tracks: Index, idle: Array) -> Corrected:
+        """See there."""
+        compiled = self.equations.compiled
+        if compiled is None:
+            return super().corrected(x, t, dt, tracks, idle)
+        which = np.zeros(len(t), dtype=np.intp) if self._which is None else self._which[tracks]
+        x, _, v, (*sizes, size) = compiled.tracked(self._numbers, which, t, x, rate=dt)
+        return Corrected(x, v, sizes, rounding(size), idle)
+
+    @cached_property
+    def _numbers(self) -> LegNumbers:
+        """The ways as the kernel takes them."""
+        P, n = len(self.family.system.m.pairs), len(self.family.bearers)
+        # markers A, markers B, and the points of rods on their bodies, those of ends a first
+        side = np.repeat([0, 1, 1], [P, P, n - 2 * P])
+        pair = np.concatenate([np.arange(P), np.arange(P), P + np.arange(n - 2 * P).reshape(-1, 2).T.ravel()])
+        begin = np.zeros((3, 3, 2, P + (n - 2 * P), self._begin_markers.shape[-1]), dtype=complex)
+        begin[1, 2], begin[2, 0] = 1.0, 1.0
+        # points, axes and second directions
+        begin[:, :, side, pair] = self._begin_markers[:, [3, 2, 0]].swapaxes(0, 1)
+        screws = np.zeros((6, *begin.shape[2:4], self._eta.shape[-1]), dtype=complex)
+        screws[:, side, pair] = self._eta
+        asked = self._begin[None], self._change[None]
+        return LegNumbers(begin, screws, np.zeros((3, *begin.shape[1:4], 1)), *asked).joined
 
     def _of(self, values: Array, tracks: Index) -> Array:
         """Values ``(..., ways)`` for tracks."""

@@ -21,9 +21,10 @@ from mechgraph.maths.linear import complement, rank_of, singular_values
 from mechgraph.maths.newton import least_norm_steps
 from mechgraph.maths.se3 import Index, cross, finite_twist, inverse, move_twist, pose_exp, rotation_exp
 from mechgraph.maths.tolerances import MODES
+from mechgraph.modes.compiled_tracks import CompiledTracks
 from mechgraph.modes.family import Array, Family, common, generated
 from mechgraph.modes.homotopy import ENDLESS_STATE, Equations, Mask
-from mechgraph.synthesis.legs import ClassMember, CompiledRows, RowBlock, TaskLeg
+from mechgraph.synthesis.legs import ClassMember, RowBlock, TaskLeg, compiled_tracks
 from mechgraph.synthesis.rods import RodProblem, rods_of
 from mechgraph.synthesis.system import ArrowRows, RowNumbers, RowProblem
 
@@ -450,9 +451,9 @@ class TaskClass:
     # --- equations ---------------------------------------------------------------------------------------------------
 
     @cached_property
-    def compiled(self) -> CompiledRows | None:
-        """The rows for the kernel, where it serves them."""
-        return CompiledRows.of_class(self)
+    def compiled(self) -> CompiledTracks | None:
+        """Tracks in the kernel, where it serves the class."""
+        return compiled_tracks(self)
 
     def leg(self, begin: ClassMember, end: ClassMember, which: Index | None = None) -> TaskLeg:
         """The ways between members."""

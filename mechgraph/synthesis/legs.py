@@ -7,19 +7,17 @@ A step of Newton's method eliminates row by row: with ``J_i dq_i + B_i dz = b_i`
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable, Sequence
 from copy import copy
-from functools import cache, cached_property
+from functools import cached_property
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from mechgraph.kernel import build
-from mechgraph.kernel.tables import fundamental, layout, tables, why_not
 from mechgraph.maths.se3 import Index, cross, finite_twist, pose_exp
 from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
+from mechgraph.modes.compiled_tracks import CompiledTracks, Led, LedRow, LegNumbers
 from mechgraph.modes.family import Array
 from mechgraph.modes.homotopy import Corrected, Ways, rounding, solved
 from mechgraph.synthesis.rods import RodProblem
@@ -102,22 +100,16 @@ class TaskLeg(Ways):
         rows = self.equations.compiled
         if rows is None:
             return super().corrected(x, t, dt, tracks, idle)
-        x, _, v, (*sizes, size) = rows.tracked(self, x, t, tracks, rate=dt)
+        x, _, v, (*sizes, size) = rows.tracked(self.numbers, self.ways(tracks), t, x, rate=dt)
         return Corrected(x, v, sizes, noise_of(size, x[: self.equations.u]), idle)
 
     @cached_property
-    def numbers(self) -> tuple[int, list[Array]]:
-        """How many ways there are, and their numbers as the kernel takes them."""
-        begin, drive = self.begin.numbers, self.begin.drive
-        arrays = (
-            np.stack([*np.broadcast_arrays(*begin.vectors)]),
-            self._eta,
-            np.stack([*np.broadcast_arrays(*self._change)]),
+    def numbers(self) -> LegNumbers:
+        """The ways as the kernel takes them."""
+        begin, change = (
+            np.stack(np.broadcast_arrays(*v)).swapaxes(1, 2) for v in (self.begin.numbers.vectors, self._change)
         )
-        shifted = [arrays[0].swapaxes(1, 2), arrays[1], arrays[2].swapaxes(1, 2), drive, self.end.drive - drive]
-        n = max(v.shape[-1] for v in shifted)
-        out = [np.ascontiguousarray(np.broadcast_to(v, (*v.shape[:-1], n)), dtype=complex) for v in shifted]
-        return n, out
+        return LegNumbers(begin, self._eta, change, self.begin.drive, self.end.drive - self.begin.drive).joined
 
     def ways(self, tracks: Index) -> Index:
         """On which way each track is."""
@@ -261,72 +253,26 @@ def noise_of(size: Array, z: Array) -> Array:
     return 6.0 * rounding(np.cbrt(size * lengths**2))
 
 
-class CompiledRows:
-    """The rows of a class of tasks as ``kernel/tracks.c`` takes them: what they are made of, and what mixes them."""
-
-    def __init__(self, of: TaskClass) -> None:
-        p, s = of.problem, of.problem.system
-        known = layout(s, np.zeros(0, dtype=np.intp), [])
-        made = tables(known, s, p.at_rest[:, None], None)
-        assert made is not None
-        self.of, self.I, self.P = of, made[0], made[1][0]
-        places = [
-            [k, MARKER.index(q.array), q.component, q.side, q.pair]
-            for k, own in enumerate(p.places)
-            for q in own
-            if q.array in MARKER
-        ]
-        rods, ways = (p.rods, cast("RodSystem", s).ways) if isinstance(p, RodProblem) else ([], [])
-        through = np.zeros((s.graph.n_loops, len(p.whole.pairs)))
-        for loop, pair, sign in zip(*fundamental(s), strict=True):
-            through[loop, pair] = sign
-        factors = np.where(p.factor_of < 0, -1, of.u - 1 - p.factor_of.max(initial=0) + p.factor_of)
-        height = s.graph.loop_rows + len(p.whole.couplings) + len(rods)
-        told, mixing = [], [np.zeros(0, dtype=complex)]
-        for i in range(of.R):
-            own, at = next((b, int(np.flatnonzero(b.rows == i)[0])) for b in of.blocks if i in b.rows)
-            rank = height if own.mixing is None else own.mixing.shape[1]
-            told += [rank, own.settled, len(of.free[i]), own.mixing is not None, *of.free[i]]
-            mixing += [] if own.mixing is None else [own.mixing[at].ravel()]
-        head = [of.R, of.u, of.head, of.nx, len(p.order), len(rods), len(places), len(of.columns)]
-        parts = [
-            head, known.side, places, [[*near, *far] for near, far in rods], ways, through, of.columns, factors, of.given, told,
-        ]  # fmt: skip
-        self.A = np.concatenate([np.asarray(part, dtype=np.int32).ravel() for part in parts])
-        self.mixing = np.concatenate(mixing)
-        size = _library().mgk_tracks_size(self.I.ctypes.data, self.A.ctypes.data, len(self.P))
-        self.memory = np.empty(size, dtype=complex)
-
-    @staticmethod
-    def of_class(of: TaskClass) -> CompiledRows | None:
-        """Those of a class, where the kernel is there and serves it."""
-        square = sum(of.conditions) == of.u
-        if build.installed() is None or of.problem.rates or not square or why_not(of.problem.system) is not None:
-            return None
-        return CompiledRows(of)
-
-    def tracked(
-        self, leg: TaskLeg, x: Array, t: Array, tracks: Index, rates: bool = False, rate: Array | None = None
-    ) -> tuple[Array, Array, Array, Array]:
-        """States ``x (nx, T)`` with what is asked of them, steps of Newton's method, rates where asked for, and sizes ``(3, T)``.
-
-        ``rate (T,)``: ``x`` are predictions to be corrected by two steps, and rates are those of states, times it; see ``kernel/tracks.c``.
-        """
-        of, T, (ways, numbers) = self.of, x.shape[1], leg.numbers
-        x, at = np.array(x, dtype=complex, order="C"), np.ascontiguousarray(t, dtype=complex)
-        step = np.empty((0 if rate is not None else of.head + of.R * of.F, T), dtype=complex)
-        led, sizes = np.empty_like(step if rate is None else x), np.empty((3, T))
-        which, numbers_at = (
-            leg.ways(tracks).astype(np.int32),
-            np.array([v.ctypes.data for v in numbers], dtype=np.uintp),
-        )
-        dt = None if rate is None else np.ascontiguousarray(rate, dtype=complex)
-        _library().mgk_tracks(
-            self.I.ctypes.data, self.P.ctypes.data, len(self.P), self.A.ctypes.data, self.mixing.ctypes.data, numbers_at.ctypes.data, ways,
-            T, which.ctypes.data, at.ctypes.data, None if dt is None else dt.ctypes.data, x.ctypes.data, step.ctypes.data,
-            led.ctypes.data if rates or dt is not None else None, sizes.ctypes.data, self.memory.ctypes.data,
-        )  # fmt: skip
-        return x, step, led, sizes
+def compiled_tracks(of: TaskClass) -> CompiledTracks | None:
+    """Tracks of a class in the kernel, where that is there and serves it."""
+    p, s = of.problem, of.problem.system
+    known = all(q.array in (*MARKER, "factor") for own in p.places for q in own)
+    if of.problem.rates or not known:
+        return None
+    places = [(k, q) for k, own in enumerate(p.places) for q in own if q.array in MARKER]
+    rods, ways = (p.rods, cast("RodSystem", s).ways) if isinstance(p, RodProblem) else ([], np.zeros(0))
+    height = s.graph.loop_rows + len(p.whole.couplings) + len(rods)
+    rows = list[LedRow]()
+    for i in range(of.R):
+        block, at = next((b, int(np.flatnonzero(b.rows == i)[0])) for b in of.blocks if i in b.rows)
+        mixing = None if block.mixing is None else block.mixing[at]
+        rows.append(LedRow(height if mixing is None else len(mixing), block.settled, of.free[i], mixing))
+    led = Led(
+        s, p.at_rest, of.nx, of.columns, of.given, rows, len(p.order), [[*near, *far] for near, far in rods], ways,
+        np.full(len(rods), -1), of.u, of.head, [(k, MARKER.index(q.array), q.component, q.side, q.pair) for k, q in places],
+        np.where(p.factor_of < 0, -1, of.u - 1 - p.factor_of.max(initial=0) + p.factor_of),
+    )  # fmt: skip
+    return CompiledTracks(led) if led.served else None
 
 
 class CompiledArrow(Arrow):
@@ -335,7 +281,7 @@ class CompiledArrow(Arrow):
     def __init__(self, leg: TaskLeg, t: Array, tracks: Index, x: Array) -> None:
         assert leg.equations.compiled is not None
         self.leg, self.of, self._t, self._tracks, self._compiled = leg, leg.equations, t, tracks, leg.equations.compiled
-        self.x, self._step, self._led_on, sizes = self._compiled.tracked(leg, x, t, tracks, rates=True)
+        self.x, self._step, self._led_on, sizes = self._compiled.tracked(leg.numbers, leg.ways(tracks), t, x)
         self._largest = sizes[2]
 
     @cached_property
@@ -363,14 +309,3 @@ class CompiledArrow(Arrow):
 def _beneath(values: Array, T: int) -> Array:
     """``(G, T, n, k)`` of rows, one beneath the other ``(T, G n, k)``."""
     return values.swapaxes(0, 1).reshape(T, -1, values.shape[3])
-
-
-@cache
-def _library() -> ctypes.CDLL:
-    """The kernel, its functions for tracks declared."""
-    library = build.built()
-    pointer, whole = ctypes.c_void_p, ctypes.c_int
-    library.mgk_tracks_size.argtypes, library.mgk_tracks_size.restype = [pointer, pointer, whole], ctypes.c_size_t
-    library.mgk_tracks.argtypes = [pointer, pointer, whole, *[pointer] * 3, whole, whole, *[pointer] * 8]
-    library.mgk_tracks.restype = None
-    return library

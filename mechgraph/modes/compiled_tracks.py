@@ -1,0 +1,140 @@
+"""Tracks led by the kernel: what ``kernel/tracks.c`` needs of a class of mechanisms, of their ways and states."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from functools import cache, cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from mechgraph.kernel import build
+from mechgraph.kernel.tables import fundamental, layout, tables, why_not
+from mechgraph.kinematics.system import System
+from mechgraph.maths.se3 import Index
+from mechgraph.memo import dataclass
+from mechgraph.modes.family import Array
+
+
+class LedRow(NamedTuple):
+    """A row of equations: how many of them are independent, of how many ``free`` coordinates they settle how many; what mixes them."""
+
+    rank: int
+    settled: int
+    free: Index
+    mixing: Array | None
+
+
+@dataclass(frozen=True)
+class Led:
+    """What is led: rows of ``states`` numbers, near ``x (nx,)`` at the start, of ``columns (d,)`` of which something is asked.
+
+    given (R, d) : whether it is asked of a row; factors (d,): unknowns up to which it is (-1: none).
+    places : of what unknowns place: number of the unknown; array (point, axis, second), component, side and pair.
+    head : numbers that stand before the rows; pairs: how many, with those of rods.
+    rods : of both ends the pair, the side of the rod and the body beyond; ``ways (n, P)`` on which rods are passed.
+    squares (n,) : where squares of their lengths stand among what is asked (-1: those of what is on the rod).
+    """
+
+    system: System
+    x: Array
+    states: int
+    columns: Index
+    given: Array
+    rows: Sequence[LedRow]
+    pairs: int
+    rods: Sequence[Sequence[int]]
+    ways: Array
+    squares: Index
+    unknowns: int = 0
+    head: int = 0
+    places: Sequence[Sequence[int]] = ()
+    factors: Index | None = None
+
+    @property
+    def served(self) -> bool:
+        """Whether the kernel is there and leads them."""
+        conditions = sum(row.rank - row.settled for row in self.rows)
+        return build.installed() is not None and conditions == self.unknowns and why_not(self.system) is None
+
+
+class LegNumbers(NamedTuple):
+    """Of ``n`` ways: numbers of markers at the begin ``(3, 3, 2, P, n)``, the screws ``(6, 2, P, n)`` on which they go, and how they change
+    beside that; what is asked at the begin, and how that changes, ``(R, d, n)``.
+    """
+
+    begin: Array
+    screws: Array
+    change: Array
+    asked: Array
+    grown: Array
+
+    @property
+    def joined(self) -> LegNumbers:
+        """All for as many ways, one after the other in memory."""
+        n = max(v.shape[-1] for v in self)
+        return LegNumbers(*(np.ascontiguousarray(np.broadcast_to(v, (*v.shape[:-1], n)), dtype=complex) for v in self))
+
+
+class CompiledTracks:
+    """Tracks of a class in the kernel."""
+
+    def __init__(self, led: Led) -> None:
+        s = led.system
+        self.led, known = led, layout(s, np.zeros(0, dtype=np.intp), [])
+        made = tables(known, s, led.x[:, None], None)
+        assert made is not None
+        self.I, self.P = made[0], made[1][0]
+        through = np.zeros((s.graph.n_loops, len(s.m.pairs)))
+        for loop, pair, sign in zip(*fundamental(s), strict=True):
+            through[loop, pair] = sign
+        R, d = led.given.shape
+        head = [R, led.unknowns, led.head, led.states, led.pairs, len(led.rods), len(led.places), d]
+        told = [(row.rank, row.settled, len(row.free), row.mixing is not None, *row.free) for row in led.rows]
+        factors = np.full(d, -1) if led.factors is None else led.factors
+        parts = [
+            head, known.side, *led.places, *led.rods, led.squares, led.ways, through, led.columns, factors, led.given, *told,
+        ]  # fmt: skip
+        self.A = np.concatenate([np.asarray(part, dtype=np.int32).ravel() for part in parts])
+        mixing = [row.mixing.ravel() for row in led.rows if row.mixing is not None]
+        self.mixing = np.concatenate([np.zeros(0), *mixing]).astype(complex)
+
+    @cached_property
+    def _size(self) -> int:
+        """Numbers of memory of a call."""
+        return int(_library().mgk_tracks_size(self.I.ctypes.data, self.A.ctypes.data, len(self.P)))
+
+    def tracked(
+        self, ways: LegNumbers, which: Index, t: Array, x: Array, rates: bool = True, rate: Array | None = None
+    ) -> tuple[Array, Array, Array, Array]:
+        """States ``x (nx, T)`` with what is asked of them, steps of Newton's method, rates where asked for, and sizes ``(3, T)``.
+
+        ``rate (T,)``: ``x`` are predictions to be corrected by two steps, and rates are those of states, times it; see ``kernel/tracks.c``.
+        """
+        led, T = self.led, x.shape[1]
+        x, t = np.array(x, dtype=complex, order="C"), np.ascontiguousarray(t, dtype=complex)
+        step = np.empty(
+            (0 if rate is not None else led.head + len(led.given) * led.system.n_freedoms, T), dtype=complex
+        )
+        grown, sizes = np.empty_like(step if rate is None else x), np.empty((3, T))
+        which, memory = which.astype(np.int32), np.empty(self._size, dtype=complex)
+        dt = None if rate is None else np.ascontiguousarray(rate, dtype=complex)
+        legs = np.array([v.ctypes.data for v in ways], dtype=np.uintp)
+        _library().mgk_tracks(
+            self.I.ctypes.data, self.P.ctypes.data, len(self.P), self.A.ctypes.data, self.mixing.ctypes.data, legs.ctypes.data,
+            ways.begin.shape[-1], T, which.ctypes.data, t.ctypes.data, None if dt is None else dt.ctypes.data, x.ctypes.data,
+            step.ctypes.data, grown.ctypes.data if rates else None, sizes.ctypes.data, memory.ctypes.data,
+        )  # fmt: skip
+        return x, step, grown, sizes
+
+
+@cache
+def _library() -> ctypes.CDLL:
+    """The kernel, its functions for tracks declared."""
+    library = build.built()
+    pointer, whole = ctypes.c_void_p, ctypes.c_int
+    library.mgk_tracks_size.argtypes, library.mgk_tracks_size.restype = [pointer, pointer, whole], ctypes.c_size_t
+    library.mgk_tracks.argtypes = [pointer, pointer, whole, *[pointer] * 3, whole, whole, *[pointer] * 8]
+    library.mgk_tracks.restype = None
+    return library
