@@ -30,6 +30,7 @@ from mechgraph.modes.family import Array, Family, common, generated
 from mechgraph.modes.homotopy import ENDLESS_STATE, Equations, Mask, rounding, solved
 from mechgraph.synthesis.rods import RodProblem, rods_of
 from mechgraph.synthesis.system import ArrowRows, RowNumbers, RowProblem
+from mechgraph.synthesis.unknowns import UnknownPlace
 from mechgraph.variants.numbers import MARKER
 
 
@@ -481,7 +482,14 @@ class TaskClass:
 
     def fingerprints(self, member: ClassMember, x: Array) -> Array:
         """What tells mechanisms apart: their unknowns."""
-        return x[: self.u]
+        return self.told(x)
+
+    def told(self, x: Array) -> Array:
+        """Unknowns ``(u, T)`` at states, those that count whole turns too as ``exp(2 pi i z / p)`` of their periods ``p``."""
+        out, p = x[: self.u], self.problem.periods[:, None]
+        turning = np.isfinite(p)
+        with np.errstate(over="ignore"):
+            return np.where(turning, np.exp(2j * np.pi * out / np.where(turning, p, 1.0)), out) if turning.any() else out
 
     # --- equations ---------------------------------------------------------------------------------------------------
 
@@ -568,35 +576,47 @@ class TaskLeg:
             np.where(of.turning.reshape(2, 1, -1, 1), b - a, 0.0)
             for a, b in zip(begin.numbers.vectors, end.numbers.vectors, strict=True)
         ]
+        sought = {(p.array, *p.index) for own in of.problem.places for p in own}
+        plain = {name: getattr(end.numbers, name) - getattr(begin.numbers, name) for name in ("pitch", "couplings")}
+        self.plain = {
+            UnknownPlace(name, 0, i, i if name == "pitch" else -1): change
+            for name, changes in plain.items()
+            for i, change in enumerate(changes)
+            if change.any() and (name, i) not in sought
+        }
         moves = (self._eta != 0).any(axis=(0, 3)) | np.any([(c != 0).any(axis=(1, 3)) for c in self._change], axis=0)
         self.moving = np.flatnonzero(moves.ravel())
 
     def prints(self, x: Array, t: Array, tracks: Index) -> Array:
         """What tells mechanisms apart."""
-        return x[: self.equations.u]
+        return self.equations.told(x)
 
     def at(self, x: Array, t: Array, tracks: Index) -> Arrow:
         """The equations at states of tracks at ``t (T,)``."""
         return Arrow(self, t, tracks, x)
 
-    def member(self, t: Array, tracks: Index) -> tuple[ClassMember, Array, Array]:
-        """Members on the way, with the rates of what is asked ``(R, d, T)`` and of all vectors ``(3, 3, 2, P, T)``."""
+    def member(self, t: Array, tracks: Index) -> tuple[ClassMember, Array, Array, dict[UnknownPlace, Array]]:
+        """Members on the way, with the rates of what is asked ``(R, d, T)``, of all vectors ``(3, 3, 2, P, T)``, and of other numbers."""
         if self._which is None:
-            begin, last, eta, change = self.begin, self.end.drive, self._eta, self._change
+            begin, last, eta, change = self.begin, self.end.drive, self._eta, [*self._change, *self.plain.values()]
         else:
-            which = self._which[tracks]
+            which, moved = self._which[tracks], (self.end.drive, self._eta, *self._change, *self.plain.values())
             begin, (last, eta, *change) = (
                 self.begin.taken(which),
-                (v[..., which] if v.shape[-1] > 1 else v for v in (self.end.drive, self._eta, *self._change)),
+                (v[..., which] if v.shape[-1] > 1 else v for v in moved),
             )
+        change, plain = change[:3], dict(zip(self.plain, change[3:], strict=True))
         X = pose_exp(t * eta)
         vectors = begin.numbers.moved(X).vectors
         w, (point, axis, second) = eta[:3], (v.swapaxes(0, 1) for v in vectors)
         rates = np.stack([cross(w, point) + eta[3:], cross(w, axis), cross(w, second)])
         rates = rates + np.stack([c.swapaxes(0, 1) for c in change])
-        numbers = RowNumbers.of(*(v + t * c for v, c in zip(vectors, change, strict=True)))
+        numbers = begin.numbers.with_vectors(*(v + t * c for v, c in zip(vectors, change, strict=True)))
+        if plain:
+            values = np.array([begin.numbers.at([p]) + t * c for p, c in plain.items()])
+            numbers = numbers.with_values([[p] for p in plain], values)
         drive = last - begin.drive
-        return ClassMember(numbers, begin.drive + t * drive), drive, rates
+        return ClassMember(numbers, begin.drive + t * drive), drive, rates, plain
 
 
 class Arrow:
@@ -604,7 +624,7 @@ class Arrow:
 
     def __init__(self, leg: TaskLeg, t: Array, tracks: Index, x: Array) -> None:
         self.leg, self.of = leg, leg.equations
-        self.member, self._change, self._rates = leg.member(t, tracks)
+        self.member, self._change, self._rates, self._plain = leg.member(t, tracks)
         self.rows = self.of.at(self.member, x)
 
     @cached_property
@@ -687,6 +707,8 @@ class Arrow:
             P = len(of.problem.order)
             side, pair = moving // P, moving % P
             opened = opened + self.rows.moved(side, pair, self._known_rates()[:, :, side, pair]).sum(axis=2)
+        for place, change_of in self._plain.items():
+            opened = opened + self.rows.by_number(place) * change_of
         out = self.solve(-opened)
         whole, factor_of = out[of.head :].reshape(of.R, of.F, -1), of.problem.factor_of
         if (scaled := factor_of >= 0).any() and self.rows.drive is not None:

@@ -54,7 +54,8 @@ from mechgraph.synthesis.system import RowNumbers, RowProblem
 from mechgraph.synthesis.tasks import FunctionTask, function, path, poses, positions
 from mechgraph.synthesis.unknowns import Unknowns
 
-NO_SCREWS = "a screw ties an angle to a length: the equations are not algebraic, their number of solutions has no end"
+NO_SCREWS = "ties an angle to a length or by an unknown ratio: the equations are not algebraic, their number of solutions has no end"
+NO_ARRAY = "the equations are not algebraic in it; exact synthesis does not serve it, fits do (fit=)"
 NO_CONTACTS = "curves and surfaces are made of pieces: solutions on one cannot be led to those on all others"
 
 
@@ -83,26 +84,21 @@ class Synthesis:
         self.problem, self.rng, self.cache, self.progress = problem, np.random.default_rng(seed), cache, progress
         self.tasks = tasks
         p, m, faults = problem, problem.m, list[str]()
-        faults += [
-            f"unknown {name!r}: is no component of a point, an axis or a second direction" for name in p.unknowns.others
-        ]
+        faults += [f"unknown {name!r}: {NO_ARRAY}" for name in p.unknowns.others]
         faults += [
             f"function with scale='free': the output {name} turns; of angles times an unknown factor there is no finite number of "
             "solutions; give the scale, or fit (fit=)"
             for name in (p.tasks.scaled if p.tasks else ())
             if p.system.m.turns(name)
         ]
-        screws = [pair.name for pair in m.pairs if pair.type.takes_pitch]
         contacts = [pair.name for pair in m.pairs if pair.contact is not None]
-        for named, why in ((screws, NO_SCREWS), (contacts, NO_CONTACTS)):
-            faults += [f"pairs {', '.join(named)}: {why}; exact synthesis does not serve them"] if named else []
+        faults += [f"{name}: {NO_SCREWS}; ask for the angle at all rows, or fit (fit=)" for name in p.plain_angles[0]]
+        faults += [f"pairs {', '.join(contacts)}: {NO_CONTACTS}; fit (fit=)"] if contacts else []
         self.sweep = Unknowns(m, p.whole, list(sweep), faults)
         faults += [
             f"sweep {name!r}: is unknown; leave it out there" for name in self.sweep.names if name in p.unknowns.names
         ]
-        faults += [
-            f"sweep {name!r}: is no component of a point, an axis or a second direction" for name in self.sweep.others
-        ]
+        faults += [f"sweep {name!r}: {NO_ARRAY}" for name in self.sweep.others]
         read = [real_array(v) for v in sweep.values()]
         columns = [np.atleast_1d(v) for v in read if v is not None and v.ndim < 2 and np.isfinite(v).all()]
         if len({len(c) for c in columns}) > 1 or len(columns) != len(self.sweep.names):
@@ -175,7 +171,7 @@ class Synthesis:
         found = ends(self.of, start, goals, self.rng, self.progress)
         apart = start.x.shape[1]
         if start.each == 1:
-            apart = len(orbits(start.x[: self.of.u], self.symmetries, motions_of(self.of, start.member, start.x)))
+            apart = len(orbits(self.of.told(start.x), self.symmetries, motions_of(self.of, start.member, start.x)))
         return [
             self._answer(start, apart, goals.taken(np.array([i])) if n > 1 else goals, one, i)
             for i, one in enumerate(found)
@@ -203,7 +199,7 @@ class Synthesis:
         told += [f"{missing} of these were not found."] * (missing > 0)
         condition, motions = self._conditions(goal, x[:, fits]), motions_of(self.of, goal, x[:, fits].astype(complex))
         free = endless(self.of, goal, found.singular)
-        goal, x = self.of.lifted(goal, x[:, fits])
+        goal, x = self.of.lifted(goal, self._near_start(x[:, fits]))
         done = of.error(of.at(goal, x.astype(complex))) <= closed_to[fits]
         x, error = self._upright(goal, x)
         against, merged = done & (error > closed_to[fits]), done & self._merged(goal, x)
@@ -259,6 +255,18 @@ class Synthesis:
         )
         # of a sweep nothing is said of fitness, which takes longer than the solutions, until it is asked for
         return out if self.sweep.names else out._sorted
+
+    def _near_start(self, x: Array) -> Array:
+        """Real states ``(nx, n)`` of which angles that are asked nowhere are by whole turns near to the start, and constants go with them."""
+        of, out = self.of, x.copy()
+        s = of.problem.system
+        rows, start = out[of.head :].reshape(of.R, of.nx, -1), s.start_coordinates(s.m.start)
+        for k, (columns, by) in of.problem.turning.items():
+            for column, c in zip(columns.tolist(), by.tolist(), strict=True):
+                turns = 2 * np.pi * np.round((rows[0, s.single_rows[column]] - start[column]) / (2 * np.pi))
+                rows[:, s.single_rows[column]] -= turns
+                out[k] -= c * turns
+        return out
 
     def _tracks(self, start: TaskStart, found: TaskEnds) -> str:
         N = start.x.shape[1]
@@ -324,6 +332,7 @@ class Synthesis:
         asked = np.zeros((q.shape[0], s.n_freedoms), dtype=bool)
         asked[:, p.columns] = ~np.isnan(p.asked)
         free = np.isfinite(period) & (s.single_rows >= 0)
+        free[s.coupled_freedoms] = False
         whole = np.where(free, np.round((q - start) / np.where(free, period, 1.0)), 0.0)
         q = np.where(asked, q, q - whole * np.where(free, period, 0.0))
         numbers = goal.numbers.with_values(p.places, x[: of.u, None])
@@ -372,9 +381,11 @@ def subset_values(
     rng, given = np.random.default_rng(seed), ~np.isnan(problem.asked)
     alike = 1 + np.flatnonzero((given[1:] == given[1]).all(axis=1))
     try:
+        if problem.unknowns.others or not problem.closed_at_start:
+            raise NoClass
         each = int(TaskClass(problem.with_rows(np.array([0, alike[0]])), rng).conditions.sum())
         R = problem.u // max(each, 1)
-        if not 0 < R < len(alike) or R * each != problem.u or not problem.closed_at_start:
+        if not 0 < R < len(alike) or R * each != problem.u:
             raise NoClass
         of = Synthesis(problem.with_rows(np.append(0, alike[:R])), tasks, {}, seed, cache, None).of
     except (NoClass, DeclarationError):

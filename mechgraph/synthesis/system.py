@@ -15,8 +15,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
+from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from math import gcd, lcm
+from typing import Any, cast
 
 import numpy as np
 
@@ -29,9 +31,10 @@ from mechgraph.memo import dataclass
 from mechgraph.model.gears import moving_lines
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Marker, Pair
-from mechgraph.model.parameters import Declared, declared
+from mechgraph.model.parameters import Declared, coupling_places, declared
+from mechgraph.modes.homotopy import TRACKS_TOGETHER
 from mechgraph.synthesis.tasks import PoseTask, asked_of
-from mechgraph.synthesis.unknowns import UnknownPlace, Unknowns, marker_twists, norms_of, unit_rates
+from mechgraph.synthesis.unknowns import UnknownPlace, Unknowns, marker_twists, norms_of, per_turn, unit_rates
 from mechgraph.variants.numbers import MARKER
 
 
@@ -39,20 +42,25 @@ from mechgraph.variants.numbers import MARKER
 class RowNumbers:
     """``point, axis, second (2, 3, P, B)`` of all markers, points over L about the origin of the problem; complex for members.
 
-    ``norms (2, 2, P, B)`` are those of both directions, see ``unknowns.norms_of``; ``factors (n, B)`` are those of what is asked up to one.
+    ``norms (2, 2, P, B)`` are those of both directions, see ``unknowns.norms_of``; ``pitch (P, B)`` over L, numbers of ``couplings
+    (K, B)`` over ``RowProblem.coupling_units``; ``factors (n, B)`` are those of what is asked up to one; ``others (k, B)``: see
+    ``unknowns.UnknownPlace``.
     """
 
     point: Array
     axis: Array
     second: Array
     norms: Array
+    pitch: Array
+    couplings: Array
     factors: Array
+    others: Array
 
-    @staticmethod
-    def of(point: Array, axis: Array, second: Array, near: Array | None = None) -> RowNumbers:
-        """Numbers with norms, nearest to others."""
+    def with_vectors(self, point: Array, axis: Array, second: Array, near: Array | None = None) -> RowNumbers:
+        """The same with other points and directions, the norms of these nearest to others."""
         norms = norms_of(axis.swapaxes(0, 1), second.swapaxes(0, 1), near)
-        return RowNumbers(point, axis, second, norms, np.zeros((0, norms.shape[-1])))
+        rest = {n: np.broadcast_to(v, (len(v), norms.shape[-1])) for n in PLAIN if len(v := getattr(self, n)) >= 0}
+        return RowNumbers(point, axis, second, norms, **rest)
 
     @staticmethod
     def joined(numbers: Sequence[RowNumbers]) -> RowNumbers:
@@ -67,7 +75,7 @@ class RowNumbers:
     def of_pairs(self, order: Index) -> RowNumbers:
         """Those of some pairs, in that order."""
         point, axis, second, norms = (v[:, :, order] for v in (*self.vectors, self.norms))
-        return RowNumbers(point, axis, second, norms, self.factors)
+        return replace(self, point=point, axis=axis, second=second, norms=norms, pitch=self.pitch[order])
 
     @property
     def vectors(self) -> tuple[Array, Array, Array]:
@@ -76,31 +84,26 @@ class RowNumbers:
 
     def at(self, places: Sequence[UnknownPlace]) -> Array:
         """What stands at the places of a number, ``(B,)``."""
-        p = places[0]
-        if p.array == "factor":
-            return np.asarray(self.factors[p.component])
-        return np.asarray(getattr(self, p.array)[p.side, p.component, p.pair])
+        return np.asarray(getattr(self, places[0].array)[places[0].index])
 
     def moved(self, X: Array) -> RowNumbers:
         """Markers moved rigidly by poses ``X (3, 4, 2, P, B)``."""
         point, axis, second = (np.einsum("ijspb,sjpb->sipb", X[:, :3], v) for v in self.vectors)
         norms = np.broadcast_to(self.norms, (*self.norms.shape[:-1], X.shape[-1]))
-        return RowNumbers(point + X[:, 3].swapaxes(0, 1), axis, second, norms, self.factors)
+        return replace(self, point=point + X[:, 3].swapaxes(0, 1), axis=axis, second=second, norms=norms)
 
     def with_values(self, places: Sequence[Sequence[UnknownPlace]], z: Array, near: Array | None = None) -> RowNumbers:
         """The same with unknowns ``z (u, B)`` at their places, and norms nearest to others."""
-        B, out = z.shape[1], []
-        for v in self.vectors:
-            out.append(np.array(np.broadcast_to(v, (*v.shape[:-1], B)), dtype=np.result_type(v, z)))
-        factors = z[np.array([any(p.array == "factor" for p in own) for own in places], dtype=bool)]
+        sought = {p.array for own in places for p in own}
+        out = {name: np.broadcast_to(v, (*v.shape[:-1], z.shape[1])) for name, v in vars(self).items()}
+        out |= {name: np.array(out[name], dtype=np.result_type(out[name], z)) for name in sought}
         for value, own in zip(z, places, strict=True):
-            for p in (p for p in own if p.array in MARKER):
-                out[MARKER.index(p.array)][p.side, p.component, p.pair] = value
-        point, axis, second = out
-        if not any(p.turns for own in places for p in own):
-            norms = np.broadcast_to(self.norms, (*self.norms.shape[:-1], B))
-            return RowNumbers(point, axis, second, norms, factors)
-        return replace(RowNumbers.of(point, axis, second, near), factors=factors)
+            for p in own:
+                out[p.array][p.index] = value
+        if any(p.turns for own in places for p in own):
+            axis, second = (out[name].swapaxes(0, 1) for name in MARKER[1:])
+            out["norms"] = norms_of(axis, second, near)
+        return RowNumbers(**out)
 
     @property
     def poses(self) -> Array:
@@ -112,6 +115,10 @@ class RowNumbers:
         """Points, unit axes, and unit second directions across them."""
         z = self.axis / self.norms[0][:, None]
         return self.point, z, (self.second - (z * self.second).sum(axis=1, keepdims=True) * z) / self.norms[1][:, None]
+
+
+PLAIN = ("pitch", "couplings", "factors", "others")
+"""Numbers beside those of markers."""
 
 
 class FirstPoses:
@@ -246,13 +253,44 @@ class RowProblem:
             np.array([rates.get(name, rates.get(self._user_name(name), none)) for name in given.names]).T / unit / k
             for k, rates in zip(factor, self.tasks.rates, strict=False)
         ]
-        self.numbers = RowNumbers.of(
-            (numbers.point - self.origin[:, None, None]) / self.L, numbers.axis, numbers.second
+        self.coupling_units = self._coupling_units()
+        start = self.unknowns.declared[:, None]
+        others = [own[0].scale * v for own, v in zip(self.unknowns.places, start, strict=True) if own[0].array == "others"]
+        point, axis, second = (numbers.point - self.origin[:, None, None]) / self.L, numbers.axis, numbers.second
+        self.numbers = RowNumbers(
+            point,
+            axis,
+            second,
+            norms_of(axis.swapaxes(0, 1), second.swapaxes(0, 1)),
+            par.pitch,
+            numbers.couplings / self.coupling_units,
+            np.ones((len(self.tasks.scaled), 1)),
+            np.array(others).reshape(-1, 1),
         )
         self.order: Index = np.arange(len(self.whole.pairs))
-        self.closed_at_start = all(pair.on_a is None and pair.contact is None for pair in m.pairs)
+        self._built: dict[bytes, System | None] = {}
+        self.closed_at_start = self._closed_at_start()
         self.rows: Index = np.arange(self.tasks.rows)[self._row_counts :]
         self._read_declared_row()
+
+    def _closed_at_start(self) -> bool:
+        """Whether the declared configuration is closed whatever the dimensions: pairs stand by point and axis and begin at zero, no
+        coupling has a constant.
+        """
+        m, constants = self.m, {own.stop for own in coupling_places(self.m)}
+        sought = {p.component for own in self.unknowns.places for p in own if p.array == "couplings"}
+        plain = all(pair.on_a is None and pair.contact is None for pair in m.pairs)
+        return plain and not (any(m.start.values()) or any(c.constant for c in m.couplings) or sought & constants)
+
+    def _coupling_units(self) -> Array:
+        """Units ``(K, 1)`` of the numbers of couplings in which a relation is of size one where lengths are."""
+        s, out = self.system, np.ones((len(self.system.par.couplings), 1))
+        for g, own in enumerate(coupling_places(self.m)):
+            columns = s.columns_of(self.m.couplings[g].freedoms)
+            unit = np.where(s.is_length[columns], self.L, 1.0)
+            size = float(np.abs(s.par.couplings[own, 0] * unit).max(initial=0.0)) or 1.0
+            out[own, 0], out[own.stop] = size / unit, size
+        return out
 
     def with_rows(self, rows: Index) -> RowProblem:
         """The same of some rows, the declared one first."""
@@ -360,10 +398,19 @@ class RowProblem:
     @cached_property
     def _scales(self) -> tuple[Array, Array]:
         """Origins and units ``(u, 1)`` of the unknowns: points are counted in L from the origin of the problem."""
-        origin, unit = (np.full((len(self.unknowns.names), 1), value) for value in (0.0, 1.0))
-        for k, places in enumerate(self.unknowns.places):
-            if places and places[0].array == "point":
-                origin[k], unit[k] = self.origin[places[0].component], self.L
+        return self.scales_of(self.unknowns.places)
+
+    def scales_of(self, places: Sequence[Sequence[UnknownPlace]]) -> tuple[Array, Array]:
+        """The same of numbers at some places."""
+        origin, unit = (np.full((len(places), 1), value) for value in (0.0, 1.0))
+        for k, (p, *_) in enumerate(places):
+            if p.array == "point":
+                origin[k], unit[k] = self.origin[p.component], self.L
+            elif p.array == "pitch":
+                unit[k] = self.L
+            elif p.array == "couplings":
+                unit[k] = self.coupling_units[p.component]
+            origin[k], unit[k] = origin[k] / p.scale, unit[k] / p.scale
         return origin, unit
 
     def inside(self, values: Array) -> Array:
@@ -385,13 +432,58 @@ class RowProblem:
         return self.unknowns.mechanism(values)
 
     def scaled(self, places: Sequence[Sequence[UnknownPlace]], values: Array) -> Array:
-        """Values ``(n, B)`` of components of points and directions, of the user, in internal units."""
-        out = np.array(values)
-        for row, own in zip(out, places, strict=True):
-            if own[0].array == "point":
-                row -= self.origin[own[0].component]
-                row /= self.L
+        """Values ``(n, B)`` of numbers of the user in internal units."""
+        origin, unit = self.scales_of(places)
+        return np.asarray((values - origin) / unit)
+
+    @cached_property
+    def turning(self) -> dict[int, tuple[Index, Array]]:
+        """Unknown constants of couplings of which angles that are asked nowhere count whole turns: columns of these, and how far the
+        constant changes with them.
+        """
+        s, out = self.system, dict[int, tuple[Index, Array]]()
+        couplings, every = s.m.couplings, [s.columns_of(c.freedoms) for c in s.m.couplings]
+        asked = self.columns[~np.isnan(self.asked).all(axis=0)]
+        for k, (p, *_) in enumerate(self.places):
+            for g, own in enumerate(coupling_places(s.m) if p.array == "couplings" else []):
+                others = np.concatenate([asked, *(c for i, c in enumerate(every) if i != g)])
+                free = ~s.is_length[every[g]] & ~np.isin(every[g], others)
+                if own.stop == p.component and free.any():
+                    out[k] = every[g][free], np.array(couplings[g].coefficients)[free] / self.coupling_units[own.stop]
         return out
+
+    @cached_property
+    def periods(self) -> Array:
+        """By how much the unknowns ``(u,)`` may grow while nothing changes but whole turns; infinite where they may not."""
+        out = np.full(self.u, np.inf)
+        for k, (_, by) in self.turning.items():
+            # teeth of which ratios are made
+            parts = [Fraction(float(c / by[0])).limit_denominator(1000) for c in by]
+            whole = lcm(*(one.denominator for one in parts))
+            out[k] = 2 * np.pi * abs(by[0]) * gcd(*(int(one * whole) for one in parts)) / whole
+        return out
+
+    @cached_property
+    def plain_angles(self) -> tuple[list[str], Index]:
+        """Screws and couplings by which an angle that is not asked at all rows stands in the equations as a number too, not by sine and
+        cosine alone, and columns of what is asked that may not go along a line in the trace test for such reasons.
+        """
+        s, m, sought = self.system, self.system.m, {p.component for own in self.places for p in own if p.array == "couplings"}
+        given = self.columns[~np.isnan(self.asked[self.rows]).any(axis=0)]
+        told, bound = list[str](), list[int]()
+        for k, pair in enumerate(m.pairs):
+            columns = s.first_column[k] + np.flatnonzero([any(f.per_pitch) for f in pair.type.freedoms])
+            told += [f"pair {pair.name}"] if not np.isin(columns, given).all() else []
+            bound += columns.tolist()
+        for c, own in zip(m.couplings, coupling_places(m), strict=True):
+            columns = s.columns_of(c.freedoms)
+            known, length = np.isin(columns, given), s.is_length[columns]
+            ratio = bool(sought & set(range(own.start, own.stop))) or bool((length & ~known).any())
+            if (open_ := (~length & ~known).any()) and ratio:
+                told.append(f"coupling {c.name}")
+            if open_ or ratio or own.stop in sought:
+                bound += columns[known & (length if open_ else ~length)].tolist()
+        return told, np.array(bound, dtype=np.intp)
 
     @cached_property
     def loop_signs(self) -> Array:
@@ -411,9 +503,49 @@ class RowProblem:
         return [[replace(p, pair=at[p.pair]) for p in own] for own in places]
 
     def system_with(self, numbers: RowNumbers) -> System:
-        """The system with other markers."""
-        X = numbers.poses
-        return self.system.with_parameters(replace(self.system.par, marker_a=X[:, :, 0], marker_b=X[:, :, 1]))
+        """The system with other numbers; of one mechanism where it has to be built from these."""
+        X, par, s = numbers.poses, self.system.par, self.system
+        plain = {"pitch": numbers.pitch, "couplings": self.coupling_units * numbers.couplings}
+        if not len(numbers.others):
+            return s.with_parameters(replace(par, marker_a=X[:, :, 0], marker_b=X[:, :, 1], **plain))
+        # other points of links stand in free pairs
+        own = np.arange(len(self.whole.pairs)) < self.own
+        built = self._system_built(numbers)
+        markers = {
+            name: np.where(own[:, None], getattr(built.par, name), X[:, :, side])
+            for side, name in enumerate(("marker_a", "marker_b"))
+        }
+        return built.with_parameters(replace(built.par, **markers))
+
+    def is_built(self, numbers: RowNumbers) -> bool:
+        """Whether there is a mechanism with the numbers of one."""
+        return self._system_built(numbers) is not None
+
+    def _system_built(self, numbers: RowNumbers) -> System | None:
+        """The system of a mechanism built with the numbers of one; None where there is none. Those of many numbers are kept."""
+        z = np.array([numbers.at(places)[0] for places in self.places])
+        if z.tobytes() not in self._built:
+            if len(self._built) > TRACKS_TOGETHER:
+                self._built.clear()
+            try:
+                m = self.unknowns.mechanism(self.outside(z[:, None])[:, 0])
+            except DeclarationError:
+                self._built[z.tobytes()] = None
+            else:
+                pairs = [*m.pairs, *self.whole.pairs[self.own :]]
+                whole = self.whole.replace(pairs=pairs, couplings=m.couplings, gears=m.gears)
+                par, old = declared(whole), self.system.par
+                self._built[z.tobytes()] = System(whole, None, par.parameters(whole, old.offset, old.origin, old.L))
+        return self._built[z.tobytes()]
+
+    def configuration(self, numbers: RowNumbers, states: Array) -> Configuration:
+        """Mechanisms ``T`` at states ``(nx, n T)``, those of one set of ``T`` after the other."""
+        T = numbers.point.shape[-1]
+        if len(numbers.others):
+            return cast("Configuration", Apart(self, numbers, states.reshape(len(states), -1, T)))
+        system = self.system_with(numbers)
+        many = states.shape[1] > T and system.par.batch > 1
+        return Configuration(system.cases(np.tile(np.arange(T), states.shape[1] // T)) if many else system, states)
 
     @cached_property
     def asked_columns(self) -> Index:
@@ -436,6 +568,36 @@ class RowProblem:
         return ArrowRows(self, numbers, x, drive)
 
 
+class Apart:
+    """Configurations of mechanisms that differ in more than arrays, as one; of numbers of which there is no mechanism nothing closes."""
+
+    def __init__(self, problem: RowProblem, numbers: RowNumbers, states: Array) -> None:
+        self.x, self.system, self._parts = states.reshape(len(states), -1), problem.system, list[Configuration]()
+        self._built = np.ones(states.shape[2], dtype=bool)
+        for t in range(states.shape[2]):
+            one = numbers.taken(np.array([t]))
+            self._built[t] = problem.is_built(one)
+            system = problem.system_with(one) if self._built[t] else problem.system
+            self._parts.append(Configuration(system, states[:, :, t]))
+
+    @property
+    def T(self) -> int:
+        """Number of positions."""
+        return self.x.shape[1]
+
+    @property
+    def residual(self) -> Array:
+        """What is left open."""
+        return np.where(np.tile(self._built, self.T // len(self._built)), self._joined("residual"), np.inf)
+
+    def _joined(self, name: str) -> Array:
+        every = np.stack([getattr(one, name) for one in self._parts], axis=-1)
+        return every.reshape(*every.shape[:-2], -1)
+
+    def __getattr__(self, name: str) -> Array:
+        return self._joined(name)
+
+
 class ArrowRows:
     """The closure of all rows at a batch of ``T`` tracks at states ``x (R, nx, T)``: in the batch of ``here`` row by row, and of each
     row, where rates are asked, one node after the other.
@@ -443,7 +605,7 @@ class ArrowRows:
 
     def __init__(self, problem: RowProblem, numbers: RowNumbers, x: Array, drive: Array | None = None) -> None:
         self.problem, self.numbers, self.x, self.drive = problem, numbers, x, drive
-        system, s = problem.system_with(numbers), problem.system
+        s = problem.system
         self.R, _, self.T = x.shape
         # nodes of the circles on which coefficients of curves are found, and below their radius times the rates: the first coefficient of
         # the residual that is taken for another one is that of ``h^9``, below ``3^9 / 9!`` for angles that turn at 3
@@ -457,10 +619,8 @@ class ArrowRows:
             powers = h[:, None] ** np.arange(orders + 1)[:, None, None]
             self._coefficients, self._powers = 1.0 / (self.N * powers), powers
             self._steps = np.einsum("rkft,rknt->frnt", rates, powers[:, 1:])
-            states = system.advance(np.broadcast_to(states, (s.n_state, self.R, self.N, self.T)), self._steps)
-        if self.R * self.N > 1 and system.par.batch > 1:
-            system = system.cases(np.tile(np.arange(self.T), self.R * self.N))
-        self.here = Configuration(system, states.reshape(s.n_state, -1))
+            states = s.advance(np.broadcast_to(states, (s.n_state, self.R, self.N, self.T)), self._steps)
+        self.here = problem.configuration(numbers, states.reshape(s.n_state, -1))
 
     def _by_row(self, values: Array) -> Array:
         """``(n, ..., R N T) -> (R, n, ..., T)``, where rates are asked with all orders of ``n`` one after the other."""
@@ -511,10 +671,47 @@ class ArrowRows:
         for i, k in enumerate(which):
             out[:, :, k] += each[:, :, i]
         for k, (p, *_) in enumerate(places):
-            if p.array == "factor" and self.drive is not None:
-                scaled = self.problem.factor_of == p.component
-                J = self.by_coordinates[:, :, self.problem.asked_columns[scaled]]
-                out[:, :, k] += np.einsum("rndt,rdt->rnt", J, self.drive[:, scaled])
+            if p.array not in MARKER:
+                out[:, :, k] = self.by_number(p)
+        return out
+
+    def by_number(self, p: UnknownPlace) -> Array:
+        """Derivatives ``(R, n, T)`` by what stands at a place that is none of a marker."""
+        problem, here, s = self.problem, self.here, self.problem.system
+        if p.array == "factors":
+            if self.drive is None:
+                return np.zeros_like(self.residual)
+            scaled = problem.factor_of == p.component
+            J = self.by_coordinates[:, :, problem.asked_columns[scaled]]
+            return np.asarray(np.einsum("rndt,rdt->rnt", J, self.drive[:, scaled]))
+        if p.array == "pitch":
+            columns = np.arange(s.first_column[p.pair], s.first_column[p.pair + 1])
+            along = here.S[:3, columns] * (per_turn(s.m.pairs[p.pair])[:, None] * here.x[s.single_rows[columns]])
+            V = np.concatenate([np.zeros_like(along), along]).sum(axis=1)
+            return self._by_row(self.opened(np.array([0]), np.array([p.pair]), V[:, None]))[:, :, 0]
+        if p.array == "couplings":
+            return self._by_row(self._of_coupling(p.component))
+        # central differences: the third derivative times the square of the step, and rounding over it, are alike
+        step, ends = 1e-5, []
+        for side in (step, -step):
+            others = self.numbers.others.copy()
+            others[p.index] += side
+            ends.append(problem.configuration(replace(self.numbers, others=others), here.x).residual)
+        return self._by_row((ends[0] - ends[1]) / (2 * step))
+
+    def _of_coupling(self, number: int) -> Array:
+        """Derivatives ``(n, R N T)`` of all rows by a number of the couplings: the coordinate behind it, or minus one of a constant."""
+        here, s, m = self.here, self.problem.system, self.problem.m
+        g, own = next((g, own) for g, own in enumerate(coupling_places(m)) if number <= own.stop)
+        value: Array | float = -1.0
+        if number < own.stop:
+            (column,) = s.columns_of([m.couplings[g].freedoms[number - own.start]])
+            value = here.x[s.single_rows[column]] * (self.problem.L if s.is_length[column] else 1.0)
+            if m.couplings[g].constant is None:
+                value = value - s.start_coordinates(m.start)[column]
+        row = s.graph.loop_rows + g
+        out = np.zeros(here.residual.shape, dtype=here.residual.dtype)
+        out[row] = value * here.system.row_scale[row] * self.problem.coupling_units[number]
         return out
 
     def moved(self, side: Index, pair: Index, rates: Array) -> Array:
