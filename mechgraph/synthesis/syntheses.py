@@ -80,10 +80,11 @@ class Synthesis:
         seed: int,
         cache: bool,
         progress: Progress,
+        faults: list[str],
     ) -> None:
         self.problem, self.rng, self.cache, self.progress = problem, np.random.default_rng(seed), cache, progress
         self.tasks = tasks
-        p, m, faults = problem, problem.m, list[str]()
+        p, m = problem, problem.m
         faults += [f"unknown {name!r}: {NO_ARRAY}" for name in p.unknowns.others]
         faults += [
             f"function with scale='free': the output {name} turns; of angles times an unknown factor there is no finite number of "
@@ -387,7 +388,7 @@ def subset_values(
         R = problem.u // max(each, 1)
         if not 0 < R < len(alike) or R * each != problem.u:
             raise NoClass
-        of = Synthesis(problem.with_rows(np.append(0, alike[:R])), tasks, {}, seed, cache, None).of
+        of = Synthesis(problem.with_rows(np.append(0, alike[:R])), tasks, {}, seed, cache, None, []).of
     except (NoClass, DeclarationError):
         return np.zeros((0, len(problem.unknowns.names)))
     if not cache or (start := kept(of)) is None:
@@ -405,16 +406,38 @@ def subset_values(
 class FittedSynthesis:
     """What a fit asks, and its answers."""
 
-    def __init__(self, m: Mechanism, tasks: Any, unknown: Sequence[str], bounds: Mapping[str, Any], over: Any) -> None:
-        self.problem = RowProblem(m, tasks, unknown)
+    def __init__(self, problem: RowProblem, tasks: Any, over: Any, faults: list[str]) -> None:
+        self.problem, self.over = problem, over
         # exact ones come back in their own frames; the error of a place is that of the origin of its frame, which is another one here
-        if elsewhere := list(self.problem.first.poses):
+        if elsewhere := list(problem.first.poses):
             first = f"the first pose of {', '.join(map(repr, elsewhere))} is not the identity"
-            raise DeclarationError(
-                self.problem.name, [f"{first}: a fit begins there; measure its poses from the first one"]
-            )
-        self.fit, self.bounds, self.over = Fit(self.problem, tasks), bounds, over
-        self.driver, self.output = driver_of(m, tasks)
+            faults.append(f"{first}: a fit begins there; measure its poses from the first one")
+        try:
+            self.fit = Fit(problem, tasks)
+        except DeclarationError as error:
+            faults += error.faults
+        if faults:
+            raise DeclarationError(problem.name, faults)
+        self.driver, self.output = driver_of(problem.m, tasks)
+
+    def answered(
+        self,
+        fit: FitName | None,
+        bounds: Mapping[str, Any],
+        limits: Sequence[Any],
+        goals: Sequence[tuple[Measure, float]],
+        starts: int,
+        seed: int,
+        progress: Progress,
+        exact: Iterable[Array],
+    ) -> Syntheses:
+        """What comes nearest to what is asked, or meets it and is best in something else."""
+        goal = self.measured(*goals[0]) if goals else None
+        limited = [
+            (self.measured(measure, none=1e3 if least is None else -1e3, most=least is None), least, most)
+            for _, measure, least, most in limits
+        ]
+        return self.answer(fitted(self.fit, fit, starts, bounds, goal, limited, seed, progress, exact))
 
     def rows(self, here: FitPoint) -> tuple[Mechanism, Array]:
         """The mechanism of fitted rows, and its coordinates ``(rows, F)``."""
@@ -424,10 +447,9 @@ class FittedSynthesis:
         return m.replace(start=dict(zip(m.freedom_names(), q[0].tolist(), strict=True))), q
 
     def measured(
-        self, what: Any, sign: float = 1.0, none: float = 1e3, most: bool = True
+        self, measure: Measure, sign: float = 1.0, none: float = 1e3, most: bool = True
     ) -> Callable[[FitPoint], Array]:
         """A quantity of fitted rows, times a sign; ``none`` where it has no value. ``most``: that must not be large."""
-        measure = what if isinstance(what, Measure) else Measure(self.problem.m, what, self.over)
         return lambda here: np.nan_to_num(sign * measure(*self.rows(here), self.driver, most and sign > 0), nan=none)
 
     def answer(self, found: Fitted) -> Syntheses:
@@ -562,15 +584,19 @@ def synthesize(
     unknown = [unknown] if isinstance(unknown, str) else list(unknown)
     require = items_of(require, "require", faults)
     faults += [] if unknown else ["unknown: nothing is sought; name numbers or elements"]
-    limits, within = limits_of(m, conditions, over, faults), dict(bounds or {})
-    goals = [(what, sign) for what, sign in ((minimize, 1.0), (maximize, -1.0)) if what is not None]
-    fitting = fit is not None or bool(goals)
+    limits, within, goals = limits_of(m, conditions, over, faults), dict(bounds or {}), list[tuple[Measure, float]]()
+    fitting = any(one is not None for one in (fit, minimize, maximize))
+    for name, what, sign in (("minimize", minimize, 1.0), ("maximize", maximize, -1.0)):
+        try:
+            goals += [] if what is None else [(Measure(m, what, over), sign)]
+        except DeclarationError as error:
+            faults += [f"{name}: {fault}" for fault in error.faults]
     faults += [
         wrong(name, "require", ", ".join(map(repr, get_args(DefectName))))
         for name in require
         if name not in get_args(DefectName)
     ]
-    if len(goals) > 1 or (goals and fit is not None):
+    if sum(one is not None for one in (fit, minimize, maximize)) > 1:
         faults.append("fit, minimize, maximize: expected one of them")
     if fit is not None and fit not in get_args(FitName):
         faults.append(wrong(fit, "fit", " or ".join(map(repr, get_args(FitName)))))
@@ -578,25 +604,26 @@ def synthesize(
     if fitting and sweep:
         faults.append("sweep: expected for exact syntheses alone; give the numbers values in the mechanism")
     faults += _faults_of_bounds(within, fitting)
-    if faults:
-        raise DeclarationError(where, faults)
+    problem = RowProblem(m, tasks, unknown, faults)
+    faults += _other_names(problem, within)
+    of = FittedSynthesis(problem, tasks, over, faults) if fitting else None
+    found = None if fitting else Synthesis(problem, tasks, dict(sweep or {}), int(seed), cache, progress, faults)
     changed = {end for p in m.pairs if any(name.split(".")[0] == p.name for name in unknown) for end in (p.a, p.b)}
     heavy = [link.name for link in m.links if link.name in changed and link.mass]
     if heavy or m.loads:
         of = " and ".join([f"masses and mass centers of {', '.join(heavy)}"] * bool(heavy) + ["loads"] * bool(m.loads))
         warnings.warn(f"{where}: {of} stay as declared, whatever the dimensions", MechgraphWarning, stacklevel=3)
-    if fitting:
-        return _fitted(
-            m, tasks, unknown, fit, within, limits, goals, require, over, int(starts), int(seed), cache, progress
+    if found is None:
+        assert of is not None
+        exact = subset_values(RowProblem(m, tasks, unknown), tasks, int(starts), int(seed), cache, progress) if fit else ()
+        return of.answered(fit, within, limits, goals, int(starts), int(seed), progress, exact)._kept(
+            require, within, limits, of.driver
         )
-    problem = RowProblem(m, tasks, unknown)
     # a whole turn more or less changes nothing, and many take long to follow
     most = np.nan_to_num(np.abs(problem.asked[:, ~problem.system.is_length[problem.columns]])).max(initial=0.0)
     if most > 4 * np.pi:
         told = f"{where}: an angle of {most:.4g} rad is asked, {most / (2 * np.pi):.3g} turns; angles are in radians, not degrees"
         warnings.warn(told, MechgraphWarning, stacklevel=3)
-    found = Synthesis(problem, tasks, dict(sweep or {}), int(seed), cache, progress)
-    _refuse_other_names(found.problem, within)
     driver, _ = driver_of(m, tasks)
     answers = [one._kept(require, within, limits, driver) for one in found.answers()]
     if sweep:
@@ -663,36 +690,9 @@ def _stored(setup: SynthesisSetup) -> dict[str, Any]:
     }
 
 
-def _refuse_other_names(p: RowProblem, bounds: Mapping[str, Any]) -> None:
-    others = [name for name in bounds if name not in p.unknowns.names]
-    if others:
-        known = ", ".join(p.unknowns.names)
-        raise DeclarationError(p.name, [f"bounds[{name!r}]: is not unknown; unknown are {known}" for name in others])
-
-
-def _fitted(
-    m: Mechanism,
-    tasks: Any,
-    unknown: list[str],
-    fit: FitName | None,
-    bounds: Mapping[str, Any],
-    limits: Sequence[Any],
-    goals: Sequence[tuple[Any, float]],
-    require: Sequence[DefectName],
-    over: Any,
-    starts: int,
-    seed: int,
-    cache: bool,
-    progress: Progress,
-) -> Syntheses:
-    """What comes nearest to what is asked, or meets it and is best in something else."""
-    of = FittedSynthesis(m, tasks, unknown, bounds, over)
-    _refuse_other_names(of.problem, bounds)
-    exact = subset_values(RowProblem(m, tasks, unknown), tasks, starts, seed, cache, progress) if fit else ()
-    goal = of.measured(*goals[0]) if goals else None
-    limited = [
-        (of.measured(measure, none=1e3 if least is None else -1e3, most=least is None), least, most)
-        for _, measure, least, most in limits
+def _other_names(p: RowProblem, bounds: Mapping[str, Any]) -> list[str]:
+    """Bounds of what is not unknown, as faults."""
+    known = ", ".join(p.unknowns.names)
+    return [
+        f"bounds[{name!r}]: is not unknown; unknown are {known}" for name in bounds if name not in p.unknowns.names
     ]
-    found = fitted(of.fit, fit, starts, bounds, goal, limited, seed, progress, exact)
-    return of.answer(found)._kept(require, bounds, limits, of.driver)

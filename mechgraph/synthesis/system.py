@@ -203,11 +203,13 @@ class RowProblem:
     Raises
     ------
     DeclarationError
-        with all that is wrong with tasks and unknowns.
+        with all that is wrong with tasks and unknowns, behind what is ``told`` already; faults that are no reason to stop reading are
+        put there.
     """
 
-    def __init__(self, m: Mechanism, tasks: Any, unknown: Sequence[str]) -> None:
-        faults: list[str] = []
+    def __init__(self, m: Mechanism, tasks: Any, unknown: Sequence[str], told: list[str] | None = None) -> None:
+        faults = list[str]() if told is None else told
+        before = len(faults)
         self.first = FirstPoses(m, tasks, unknown, faults)
         self.m = m = self.first.m
         self.own = len(m.pairs)
@@ -233,7 +235,7 @@ class RowProblem:
             if m.start.get(name, 0.0)
         ]
         self.unknowns = Unknowns(m, self.whole, unknown, faults, self.tasks.scaled)
-        if faults:
+        if len(faults) > before:
             raise DeclarationError(self.name, faults)
         # of every column that is asked, and of its rates, the number of its factor, -1 where it has none
         factor_of = [self.tasks.scaled.index(name) if name in self.tasks.scaled else -1 for name in given.names]
@@ -271,7 +273,9 @@ class RowProblem:
         self._built: dict[bytes, System | None] = {}
         self.closed_at_start = self._closed_at_start()
         self.rows: Index = np.arange(self.tasks.rows)[self._row_counts :]
-        self._read_declared_row()
+        faults += self._read_declared_row()
+        if faults and told is None:
+            raise DeclarationError(self.name, faults)
 
     def _closed_at_start(self) -> bool:
         """Whether the declared configuration is closed whatever the dimensions: pairs stand by point and axis and begin at zero, no
@@ -326,12 +330,15 @@ class RowProblem:
         size = float(np.abs(every - middle).max(initial=0.0))
         return middle, size or 1.0
 
-    def _read_declared_row(self) -> None:
-        """What is asked at row 0 has to be so there, where that row is closed by itself; unknown points stand where they are asked."""
-        s, faults = self.system, []
+    def _read_declared_row(self) -> list[str]:
+        """What is asked at row 0 has to be so there, where that row is closed by itself; unknown points stand where they are asked.
+
+        Faults are returned.
+        """
+        s, faults = self.system, list[str]()
         self.known: dict[int, float] = {}
         if not self.closed_at_start:
-            return
+            return faults
         pinned = {
             (p.pair, p.component): k
             for k, places in enumerate(self.unknowns.places)
@@ -355,9 +362,10 @@ class RowProblem:
                     "begin there" + (", or let the point be unknown" if s.is_length[column] else "")
                 )
         if faults:
-            raise DeclarationError(self.name, faults)
+            return faults
         places = [self.unknowns.places[k] for k in self.known]
         self.numbers = self.numbers.with_values(places, np.array(list(self.known.values())).reshape(-1, 1))
+        return faults
 
     @cached_property
     def at_rest(self) -> Array:
@@ -697,7 +705,10 @@ class ArrowRows:
             others = self.numbers.others.copy()
             others[p.index] += side
             ends.append(problem.configuration(replace(self.numbers, others=others), here.x).residual)
-        return self._by_row((ends[0] - ends[1]) / (2 * step))
+        # at the end of what can be built one side is left
+        sides = sum(np.isfinite(end) for end in ends)
+        a, b = (np.where(np.isfinite(end), end, here.residual) for end in ends)
+        return self._by_row((a - b) / (step * np.maximum(sides, 1)))
 
     def _of_coupling(self, number: int) -> Array:
         """Derivatives ``(n, R N T)`` of all rows by a number of the couplings: the coordinate behind it, or minus one of a constant."""

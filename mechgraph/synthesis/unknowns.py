@@ -95,27 +95,25 @@ class Unknowns:
                     self.fields[one] = found
         faults += clashes(m, self.fields)
         self.others = [name for name, field in self.fields.items() if not self._places_of(name, field)]
-        faults += [
-            f"unknown {name!r}: stands in no equation of closure, whatever it is no position changes"
-            for name in self.others
-            if not self._closes(name)
-        ]
+        faults += [f"unknown {name!r}: {why}" for name in self.others if (why := self._why_not(name))]
 
-    def _closes(self, name: str) -> bool:
-        """Whether the mechanism closes elsewhere as a number changes."""
-        at = list(self.fields).index(name)
+    def _why_not(self, name: str) -> str:
+        """Why a number is none to be sought: no position depends on it, or it cannot change by a little; empty where it is one."""
+        at, why = list(self.fields).index(name), ""
         # a change that is seen in the last digits of what follows from the number
         for change in (1e-3, -1e-3):
             values = self.declared.copy()
             values[at] += change * (1.0 + abs(values[at]))
             try:
                 other = self.mechanism(values)
-            except DeclarationError:
+            except DeclarationError as error:
+                why = f"cannot change by a little: {error.faults[0]}"
                 continue
             a, b = (declared(one) for one in (self.m, other))
             same = all(np.array_equal(getattr(a, part), getattr(b, part)) for part in (*PLACED, "couplings"))
-            return not same or [p.type for p in self.m.pairs] != [p.type for p in other.pairs]
-        return True
+            same &= [p.type for p in self.m.pairs] == [p.type for p in other.pairs]
+            return "stands in no equation of closure; no position depends on it" if same else ""
+        return why
 
     def _expanded(self, name: str) -> list[str]:
         """The numbers of an element: of a pair, of its point or direction, of a named point; a number is itself."""
