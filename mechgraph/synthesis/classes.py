@@ -489,7 +489,9 @@ class TaskClass:
         out, p = x[: self.u], self.problem.periods[:, None]
         turning = np.isfinite(p)
         with np.errstate(over="ignore"):
-            return np.where(turning, np.exp(2j * np.pi * out / np.where(turning, p, 1.0)), out) if turning.any() else out
+            return (
+                np.where(turning, np.exp(2j * np.pi * out / np.where(turning, p, 1.0)), out) if turning.any() else out
+            )
 
     # --- equations ---------------------------------------------------------------------------------------------------
 

@@ -589,7 +589,8 @@ class Measure:
             except DeclarationError as error:
                 own = ("size", "ratio", *(f"transmission {name}" for name in m.freedom_names()))
                 faults = [
-                    f"{one}; {hint}" if (hint := did_you_mean(near_names(str(what), own))) else one for one in error.faults
+                    f"{one}; {hint}" if (hint := did_you_mean(near_names(str(what), own))) else one
+                    for one in error.faults
                 ]
                 raise DeclarationError(f"synthesis of {m.name!r}", faults) from None
 

@@ -130,7 +130,10 @@ class TaskLabelling:
         """For every unknown in canonical order its number."""
         place = np.argsort(self.pairs)
         told = [
-            sorted((int(place[q.pair]), (*MARKER, "factors", "pitch", "couplings").index(q.array), q.side, q.component) for q in own)
+            sorted(
+                (int(place[q.pair]), (*MARKER, "factors", "pitch", "couplings").index(q.array), q.side, q.component)
+                for q in own
+            )
             for own in self.of.problem.places
         ]
         return np.array(sorted(range(len(told)), key=told.__getitem__), dtype=np.intp)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextvars import copy_context
 from dataclasses import fields, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import combinations
 from typing import Any, get_args
 
@@ -29,7 +29,6 @@ from mechgraph.synthesis.answers import (
     Degenerate,
     Syntheses,
     SynthesesOver,
-    joined_answers,
 )
 from mechgraph.synthesis.certified import certificates
 from mechgraph.synthesis.classes import ClassMember, NoClass, TaskClass
@@ -44,18 +43,21 @@ from mechgraph.synthesis.solve import (
     doing_all,
     endless,
     ends,
+    finite,
     kept,
+    movable,
     real_states,
     start_of,
     unfolded,
 )
-from mechgraph.synthesis.structures import WHERE, structures
+from mechgraph.synthesis.structures import of_chains
 from mechgraph.synthesis.system import RowNumbers, RowProblem
 from mechgraph.synthesis.tasks import FunctionTask, function, path, poses, positions
 from mechgraph.synthesis.unknowns import Unknowns
 
 NO_SCREWS = "ties an angle to a length or by an unknown ratio: the equations are not algebraic, their number of solutions has no end"
 NO_ARRAY = "the equations are not algebraic in it; exact synthesis does not serve it, fits do (fit=)"
+NO_LINE = "All that is asked stands in the equations as a number beside its sine and cosine: no trace test serves."
 NO_CONTACTS = "curves and surfaces are made of pieces: solutions on one cannot be led to those on all others"
 
 
@@ -159,16 +161,41 @@ class Synthesis:
             fault = f"{counts}: {wanted - p.u} too many; leave something unasked, let more numbers be unknown, or fit (fit=)"
         raise DeclarationError(p.name, [fault])
 
-    def answers(self) -> list[Syntheses]:
-        """For every value swept."""
-        p = self.problem
-        start = start_of(self.of, self.rng, self.cache, self.progress)
-        start = replace(start, against=int((~doing_all(self.of, start.member, start.x)).sum()))
-        n, own = self.swept.shape[1], self.of.problem
-        numbers = own.numbers.taken(np.zeros(n, dtype=np.intp))
+    @cached_property
+    def goals(self) -> ClassMember:
+        """The task at hand, for every value swept."""
+        p, own = self.problem, self.of.problem
+        numbers = own.numbers.taken(np.zeros(self.swept.shape[1], dtype=np.intp))
         if self.sweep.names:
             numbers = numbers.with_values(own.placed(self.sweep.places), p.scaled(self.sweep.places, self.swept))
-        goals = self.of.goal(numbers)
+        return self.of.goal(numbers)
+
+    @cached_property
+    def foretold(self) -> list[str]:
+        """What is seen of the task before it is solved: rows that ask the same, and conditions that depend on each other there.
+
+        Where the matrix of the unknowns has a lower rank at random dimensions and positions, closed or not, it has so at all solutions.
+        """
+        p, of, n = self.problem, self.of, self.swept.shape[1]
+        asked = np.concatenate([p.asked, *p.rates], axis=1)
+        told = [
+            f"Rows {one} and {other} ask the same."
+            for one, other in combinations(range(len(asked)), 2)
+            if np.array_equal(asked[one], asked[other], equal_nan=True)
+        ]
+        at = of.leg(self.goals, self.goals, np.arange(n)).at(np.tile(of.x[:, None], n), np.ones(n), np.arange(n))
+        rank = int(np.linalg.matrix_rank(finite(at.matrix), rtol=MODES.generic).min()) if p.u else 0
+        if rank < p.u:
+            told.append(
+                f"Here {rank} of {p.u} conditions are independent: there is no solution, or there are some without end."
+            )
+        return told
+
+    def answers(self) -> list[Syntheses]:
+        """For every value swept."""
+        start = start_of(self.of, self.rng, self.cache, self.progress)
+        start = replace(start, against=int((~doing_all(self.of, start.member, start.x)).sum()))
+        n, goals = self.swept.shape[1], self.goals
         found = ends(self.of, start, goals, self.rng, self.progress)
         apart = start.x.shape[1]
         if start.each == 1:
@@ -189,13 +216,8 @@ class Synthesis:
         power = 1 if self.of.problem is p else 2
         closed_to = CLOSED_TO * np.maximum(1.0, np.abs(x[: self.of.u]).max(axis=0, initial=0.0)) ** power
         fits = error <= closed_to
-        told = [*start.evidence, self._tracks(start, found)]
-        asked = np.concatenate([p.asked, *p.rates], axis=1)
-        told += [
-            f"Rows {one} and {other} ask the same."
-            for one, other in combinations(range(len(asked)), 2)
-            if np.array_equal(asked[one], asked[other], equal_nan=True)
-        ]
+        told = [*start.evidence, self._tracks(start, found), *self.foretold]
+        told += [NO_LINE] * (not movable(self.of).any())
         told += [f"Of {start.each} mechanisms each that do the same all real ones are listed."] * (start.each > 1)
         told += [f"{missing} of these were not found."] * (missing > 0)
         condition, motions = self._conditions(goal, x[:, fits]), motions_of(self.of, goal, x[:, fits].astype(complex))
@@ -258,7 +280,7 @@ class Synthesis:
         return out if self.sweep.names else out._sorted
 
     def _near_start(self, x: Array) -> Array:
-        """Real states ``(nx, n)`` of which angles that are asked nowhere are by whole turns near to the start, and constants go with them."""
+        """Real states ``(nx, n)`` with angles that are asked nowhere by whole turns near to the start, and constants that go with them."""
         of, out = self.of, x.copy()
         s = of.problem.system
         rows, start = out[of.head :].reshape(of.R, of.nx, -1), s.start_coordinates(s.m.start)
@@ -574,7 +596,7 @@ def synthesize(
         context.run(ELSEWHERE.set, executor)
         return context.run(partial(synthesize, m, tasks, unknown, **given, seed=seed, cache=cache, progress=progress))
     if not isinstance(m, Mechanism):
-        return _of_chains(m, tasks, unknown, given, int(seed), cache, progress)
+        return of_chains(synthesize, m, tasks, unknown, given, int(seed), cache, progress)
     where, faults = f"synthesis of {m.name!r}", list[str]()
     if tasks is None and unknown is None and m.synthesis is not None:
         own = {name: value for name, value in given.items() if value != _USUAL[name]}
@@ -606,24 +628,30 @@ def synthesize(
     faults += _faults_of_bounds(within, fitting)
     problem = RowProblem(m, tasks, unknown, faults)
     faults += _other_names(problem, within)
-    of = FittedSynthesis(problem, tasks, over, faults) if fitting else None
+    fits = FittedSynthesis(problem, tasks, over, faults) if fitting else None
     found = None if fitting else Synthesis(problem, tasks, dict(sweep or {}), int(seed), cache, progress, faults)
-    changed = {end for p in m.pairs if any(name.split(".")[0] == p.name for name in unknown) for end in (p.a, p.b)}
+    moved = {m.pairs[q.pair].name for own in problem.unknowns.places for q in own if 0 <= q.pair < len(m.pairs)}
+    moved |= {name.split(".")[0] for name in unknown}
+    changed = {end for p in m.pairs if p.name in moved for end in (p.a, p.b)}
     heavy = [link.name for link in m.links if link.name in changed and link.mass]
     if heavy or m.loads:
         of = " and ".join([f"masses and mass centers of {', '.join(heavy)}"] * bool(heavy) + ["loads"] * bool(m.loads))
         warnings.warn(f"{where}: {of} stay as declared, whatever the dimensions", MechgraphWarning, stacklevel=3)
     if found is None:
-        assert of is not None
-        exact = subset_values(RowProblem(m, tasks, unknown), tasks, int(starts), int(seed), cache, progress) if fit else ()
-        return of.answered(fit, within, limits, goals, int(starts), int(seed), progress, exact)._kept(
-            require, within, limits, of.driver
+        assert fits is not None
+        exact = (
+            subset_values(RowProblem(m, tasks, unknown), tasks, int(starts), int(seed), cache, progress) if fit else ()
+        )
+        return fits.answered(fit, within, limits, goals, int(starts), int(seed), progress, exact)._kept(
+            require, within, limits, fits.driver
         )
     # a whole turn more or less changes nothing, and many take long to follow
     most = np.nan_to_num(np.abs(problem.asked[:, ~problem.system.is_length[problem.columns]])).max(initial=0.0)
     if most > 4 * np.pi:
         told = f"{where}: an angle of {most:.4g} rad is asked, {most / (2 * np.pi):.3g} turns; angles are in radians, not degrees"
         warnings.warn(told, MechgraphWarning, stacklevel=3)
+    for text in found.foretold:
+        warnings.warn(f"{where}: {text}", MechgraphWarning, stacklevel=3)
     driver, _ = driver_of(m, tasks)
     answers = [one._kept(require, within, limits, driver) for one in found.answers()]
     if sweep:
@@ -642,41 +670,6 @@ def _faults_of_bounds(bounds: Mapping[str, Any], fitting: bool) -> list[str]:
     return out
 
 
-def _of_chains(
-    chains: Iterable[Chain],
-    tasks: Any,
-    unknown: Sequence[str] | None,
-    given: Mapping[str, Any],
-    seed: int,
-    cache: bool,
-    progress: Progress,
-) -> Syntheses:
-    """Answers of all mechanisms that chains make, ranked together; those that refuse the task are told."""
-    if tasks is None or given["sweep"]:
-        raise DeclarationError(WHERE, ["expected tasks, and no sweep: give chains random numbers of another seed"])
-    exact = all(given[name] is None for name in ("fit", "minimize", "maximize"))
-    every, told = structures(chains, tasks, exact, seed)
-    found, refused = list[Syntheses](), list[str]()
-    if progress is not None:
-        for text in [*told, *(f"{one.mechanism.name}: {counted(len(one.unknown), 'unknown')}" for one in every)]:
-            progress(text)
-    for one in every:
-        say = None if progress is None else partial(_said_of, one.mechanism.name, progress)
-        try:
-            found.append(
-                synthesize(one.mechanism, tasks, unknown or one.unknown, **given, seed=seed, cache=cache, progress=say)
-            )
-        except DeclarationError as error:
-            refused += [f"{one.mechanism.name}: {fault}" for fault in error.faults]
-    if not found:
-        raise DeclarationError(WHERE, [*told, *refused])
-    return joined_answers(found, [f"{text}." for text in [*told, *refused]])
-
-
-def _said_of(name: str, progress: Callable[[str], None], text: str) -> None:
-    progress(f"{name}: {text}")
-
-
 _USUAL = {one.name: one.default for one in fields(SynthesisSetup)}
 
 
@@ -693,6 +686,4 @@ def _stored(setup: SynthesisSetup) -> dict[str, Any]:
 def _other_names(p: RowProblem, bounds: Mapping[str, Any]) -> list[str]:
     """Bounds of what is not unknown, as faults."""
     known = ", ".join(p.unknowns.names)
-    return [
-        f"bounds[{name!r}]: is not unknown; unknown are {known}" for name in bounds if name not in p.unknowns.names
-    ]
+    return [f"bounds[{name!r}]: is not unknown; unknown are {known}" for name in bounds if name not in p.unknowns.names]

@@ -24,16 +24,15 @@ import numpy as np
 
 from mechgraph.errors import DeclarationError
 from mechgraph.kinematics.prescribed import DriverMotion
-from mechgraph.kinematics.state import Configuration, close, user_poses
+from mechgraph.kinematics.state import Configuration, close
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Array, Index, cross, move_twist, rotation_exp, turn_tangent
 from mechgraph.memo import dataclass
 from mechgraph.model.gears import moving_lines
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair import Marker, Pair
 from mechgraph.model.parameters import Declared, coupling_places, declared
 from mechgraph.modes.homotopy import TRACKS_TOGETHER
-from mechgraph.synthesis.tasks import PoseTask, asked_of
+from mechgraph.synthesis.tasks import FirstPoses, asked_of
 from mechgraph.synthesis.unknowns import UnknownPlace, Unknowns, marker_twists, norms_of, per_turn, unit_rates
 from mechgraph.variants.numbers import MARKER
 
@@ -121,74 +120,6 @@ PLAIN = ("pitch", "couplings", "factors", "others")
 """Numbers beside those of markers."""
 
 
-class FirstPoses:
-    """Links that begin at other poses than the identity, ``poses (4, 4)`` by link.
-
-    Pairs by point and axis want the frames of their links on the global one at row 0. So a link with such pairs is sought in a frame of its
-    own that lies there, ``m`` and ``tasks``; what is found comes ``back`` in the frame that was declared, its pairs by markers.
-    """
-
-    def __init__(self, declared: Mechanism, tasks: Any, unknown: Sequence[str], faults: list[str]) -> None:
-        every = tasks if isinstance(tasks, list | tuple) else [tasks]
-        found = [(task.link, task.first(declared)) for task in every if isinstance(task, PoseTask)]
-        at_once = {link for pair in declared.pairs if pair.on_a is None for link in (pair.a, pair.b)}
-        known = [(link, X) for link, X in found if X is not None and link in at_once]
-        self.declared, self.poses = declared, dict(known)
-        self.m, self.tasks = declared, tasks
-        if not self.poses:
-            return
-        faults += [
-            f"unknown {name!r}: is a point of a link of which the first pose is not the identity; begin there, or give the point"
-            for name in unknown
-            for link in self.poses
-            if name.startswith(f"{link}.")
-        ]
-        faults += [
-            f"pair {pair.name!r}: is placed on each link by itself, others of its link are not, and its first pose is not the identity; "
-            "place all of them alike"
-            for pair in declared.pairs
-            if pair.on_a is not None and self.poses.keys() & {pair.a, pair.b}
-        ]
-        moved = [
-            link.replace(points={name: X[:3, :3] @ p + X[:3, 3] for name, p in link.points.items()})
-            if (X := self.poses.get(link.name)) is not None
-            else link
-            for link in declared.links
-        ]
-        self.m = declared.replace(links=moved)
-        self.tasks = [
-            task.after(declared, self.poses[task.link], faults)
-            if isinstance(task, PoseTask) and task.link in self.poses
-            else task
-            for task in every
-        ]
-
-    def back(self, m: Mechanism) -> Mechanism:
-        """A mechanism found, in the frames that were declared."""
-        if not self.poses:
-            return m
-        links = [old if old.name in self.poses else new for old, new in zip(self.declared.links, m.links, strict=True)]
-        return m.replace(links=links, pairs=[self._by_markers(pair) for pair in m.pairs])
-
-    def _by_markers(self, pair: Pair) -> Pair:
-        if pair.on_a is not None or not self.poses.keys() & {pair.a, pair.b}:
-            return pair
-        sides = []
-        for link, marker in zip((pair.a, pair.b), pair.markers, strict=True):
-            X = self.poses.get(link, np.eye(4))
-            axis, second = (np.asarray(v) @ X[:3, :3] for v in (marker.axis, marker.second))
-            sides.append(Marker((np.asarray(marker.point) - X[:3, 3]) @ X[:3, :3], axis, second))
-        return pair.replace(point=None, axis=None, second=None, on_a=sides[0], on_b=sides[1])
-
-    def poses_of(self, here: Configuration) -> Array:
-        """Poses ``(T, N, 4, 4)`` of the links as declared."""
-        X = np.moveaxis(user_poses(here), 1, 0)
-        for link, X0 in self.poses.items():
-            k = self.declared.link_names().index(link)
-            X[:, k] = X[:, k] @ X0
-        return X
-
-
 class RowProblem:
     """What is asked of a mechanism, what is unknown, and the equations of both.
 
@@ -257,7 +188,9 @@ class RowProblem:
         ]
         self.coupling_units = self._coupling_units()
         start = self.unknowns.declared[:, None]
-        others = [own[0].scale * v for own, v in zip(self.unknowns.places, start, strict=True) if own[0].array == "others"]
+        others = [
+            own[0].scale * v for own, v in zip(self.unknowns.places, start, strict=True) if own[0].array == "others"
+        ]
         point, axis, second = (numbers.point - self.origin[:, None, None]) / self.L, numbers.axis, numbers.second
         self.numbers = RowNumbers(
             point,
@@ -476,7 +409,11 @@ class RowProblem:
         """Screws and couplings by which an angle that is not asked at all rows stands in the equations as a number too, not by sine and
         cosine alone, and columns of what is asked that may not go along a line in the trace test for such reasons.
         """
-        s, m, sought = self.system, self.system.m, {p.component for own in self.places for p in own if p.array == "couplings"}
+        s, m, sought = (
+            self.system,
+            self.system.m,
+            {p.component for own in self.places for p in own if p.array == "couplings"},
+        )
         given = self.columns[~np.isnan(self.asked[self.rows]).any(axis=0)]
         told, bound = list[str](), list[int]()
         for k, pair in enumerate(m.pairs):
@@ -512,18 +449,14 @@ class RowProblem:
 
     def system_with(self, numbers: RowNumbers) -> System:
         """The system with other numbers; of one mechanism where it has to be built from these."""
-        X, par, s = numbers.poses, self.system.par, self.system
-        plain = {"pitch": numbers.pitch, "couplings": self.coupling_units * numbers.couplings}
-        if not len(numbers.others):
-            return s.with_parameters(replace(par, marker_a=X[:, :, 0], marker_b=X[:, :, 1], **plain))
+        X, plain = numbers.poses, {"pitch": numbers.pitch, "couplings": self.coupling_units * numbers.couplings}
+        markers = {"marker_a": X[:, :, 0], "marker_b": X[:, :, 1]}
+        if not len(numbers.others) or (built := self._system_built(numbers)) is None:
+            return self.system.with_parameters(replace(self.system.par, **cast("Any", markers | plain)))
         # other points of links stand in free pairs
-        own = np.arange(len(self.whole.pairs)) < self.own
-        built = self._system_built(numbers)
-        markers = {
-            name: np.where(own[:, None], getattr(built.par, name), X[:, :, side])
-            for side, name in enumerate(("marker_a", "marker_b"))
-        }
-        return built.with_parameters(replace(built.par, **markers))
+        own = np.arange(len(self.whole.pairs))[:, None] < self.own
+        markers = {name: np.where(own, getattr(built.par, name), value) for name, value in markers.items()}
+        return built.with_parameters(replace(built.par, **cast("Any", markers)))
 
     def is_built(self, numbers: RowNumbers) -> bool:
         """Whether there is a mechanism with the numbers of one."""
@@ -585,8 +518,7 @@ class Apart:
         for t in range(states.shape[2]):
             one = numbers.taken(np.array([t]))
             self._built[t] = problem.is_built(one)
-            system = problem.system_with(one) if self._built[t] else problem.system
-            self._parts.append(Configuration(system, states[:, :, t]))
+            self._parts.append(Configuration(problem.system_with(one), states[:, :, t]))
 
     @property
     def T(self) -> int:

@@ -183,9 +183,12 @@ class Unknowns:
             return []
         if not side or along == 0:
             return [UnknownPlace("point", side, along, pair, 1.0 - 2.0 * side)]
-        twist, varies = numbers[0, field.index], any(
-            isinstance(other, ChainField) and not other.kind and other.index == field.index
-            for other in self.fields.values()
+        twist, varies = (
+            numbers[0, field.index],
+            any(
+                isinstance(other, ChainField) and not other.kind and other.index == field.index
+                for other in self.fields.values()
+            ),
         )
         return [] if np.sin(twist) or varies else [UnknownPlace("point", side, along, pair, -np.cos(twist))]
 
