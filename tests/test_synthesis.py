@@ -124,9 +124,22 @@ def test_faults_of_tasks_and_unknowns_are_told_together() -> None:
     assert len(caught.value.faults) == 2
     with pytest.raises(mg.DeclarationError, match="is asked, and is"):
         mg.synthesize(four_bar(), mg.path("coupler.tip", [[0, 0], [1, 1]]), ["B.point"])
+    everything = {
+        "bounds": {"A.point.x": (0, 1), "B.point.x": (2, 1)},
+        "sweep": {"C.point.z": [1]},
+        "conditions": {"siz": (0, 1)},
+    }
+    with pytest.raises(mg.DeclarationError) as caught:
+        mg.synthesize(four_bar(), mg.path("coupler.tip", [[0, 0], [1, 1]]), ["B.point"], **everything)
+    of = ["'siz'", "bounds['B.point.x']", "row 0", "row 0", "bounds['A.point.x']", "unknown 'C.point.z'", "sweep"]
+    assert [fault for fault, start in zip(caught.value.faults, of, strict=True) if not fault.startswith(start)] == []
+    with pytest.raises(
+        mg.DeclarationError, match=r"synthesis of 'four-bar': 1 fault\n  minimize: 'siz': .*did you mean size"
+    ):
+        mg.synthesize(four_bar(), mg.function("A", "D", [[0, 0], [1, 1]]), ["B.point"], minimize="siz")
     links = [mg.Link("frame"), mg.Link("crank"), mg.Link("coupler", mass=1, center=(0, 0)), mg.Link("rocker")]
     heavy = four_bar().replace(links=links)
-    with pytest.raises(mg.DeclarationError, match="coupler.mass': stands in no equation of closure"):
+    with pytest.raises(mg.DeclarationError, match=r"coupler.mass': stands in no equation of closure"):
         mg.synthesize(heavy, mg.function("A", "D", [[0, 0], [1, 1]]), ["coupler.mass"])
 
 

@@ -204,7 +204,9 @@ def slide(constant: float = 0.7) -> mg.Mechanism:
         mg.Pair("A", "R", "frame", "crank", on_a=mg.Marker((0, 0, 0)), on_b=mg.Marker((0, 0, 0))),
         mg.Pair("B", "R", "crank", "rod", on_a=arm, on_b=mg.Marker((0, 0, 0))),
         mg.Pair("C", "R", "rod", "slider", on_a=mg.Marker((3, 0, 0)), on_b=mg.Marker((0, 0, 0))),
-        mg.Pair("D", "P", "frame", "slider", on_a=mg.Marker((0, 0, 0), (1, 0, 0)), on_b=mg.Marker((0, 0, 0), (1, 0, 0))),
+        mg.Pair(
+            "D", "P", "frame", "slider", on_a=mg.Marker((0, 0, 0), (1, 0, 0)), on_b=mg.Marker((0, 0, 0), (1, 0, 0))
+        ),
         mg.Pair("F", "P", "frame", "gauge", on_a=mg.Marker((0, 1, 0), (1, 0, 0)), on_b=mg.Marker((0, 0, 0), (1, 0, 0))),
     ]
     off = mg.Coupling({"F": 1, "D": -1}, name="g", constant=constant)
@@ -277,3 +279,100 @@ def test_lengths_of_a_chain_are_those_of_freudensteins_equation() -> None:
         assert np.abs(mg.kinematics(one, {"O1": A})["O4"].position[:, 0] - D).max() < 1e-10
         # lengths of both signs do the same
         assert np.abs(np.abs(s.values) - np.abs(values)).max(axis=1).min() == 0
+
+
+def screwed() -> tuple[mg.Mechanism, mg.Mechanism, object, dict[str, float]]:
+    angles = np.linspace(0, 1.5, 6)
+    turned = mg.kinematics(press(), {"A": angles})["D"].position[:, 0]
+    return (
+        press(0.3, 1.0),
+        press(),
+        mg.function("A", "D", np.column_stack([angles, turned])),
+        {"A.pitch": 0.2, "C.point.x": 0.9},
+    )
+
+
+def of_gears() -> tuple[mg.Mechanism, mg.Mechanism, object, dict[str, float]]:
+    angles = np.linspace(0, -0.7, 6)
+    tip = mg.kinematics(geared(), {"A": angles}).link("rod").at("tip").position[:, :2]
+    return geared(0.3, 1.9), geared(), mg.path("rod.tip", tip, at={"A": angles}), {"g.E": 2.0, "g.constant": 0.4}
+
+
+def twisted(*twist: float) -> mg.Mechanism:
+    """A closed RCCC chain."""
+    start = {"O1": 0.7, "O2.Rz": 1.35, "O2.Tz": -0.07, "O3.Rz": 1.79, "O3.Tz": -1.67, "O4.Rz": 1.78, "O4.Tz": -1.67}
+    return mg.chain("RCCC", twist=twist, length=[1, 2, 1.5, 1.8], offset=[0, 0, 0, 0.3]).replace(start=start)
+
+
+def of_twists() -> tuple[mg.Mechanism, mg.Mechanism, object, dict[str, float]]:
+    own, angles = twisted(0.5, 0.9, 1.1, 0.7), np.linspace(0.7, 1.5, 5)
+    turned = mg.kinematics(own, {"O1": angles})["O4"].position[:, 0]
+    rows = [{"O1": a, "O4.Rz": turn} for a, turn in zip(angles, turned, strict=True)]
+    return twisted(0.5, 0.95, 1.1, 0.75), own, mg.positions(rows), {"twist[1]": 0.9, "twist[3]": 0.7}
+
+
+@pytest.mark.parametrize("made", [screwed, of_gears, of_twists])
+@pytest.mark.parametrize("fit", ["least_squares", "minimax"])
+def test_a_mechanism_is_found_again_by_numbers_that_are_no_places(made, fit) -> None:
+    declared, own, task, truth = made()
+    s = mg.synthesize(declared, task, list(truth), fit=fit, starts=1)
+    assert s.values[0] == pytest.approx(list(truth.values()), abs=1e-7)
+    drive, last = own.drives[0].freedom, own.pairs[-1].name
+    begin = s[0].start.get(drive, 0.0)
+    a, b = (mg.kinematics(m, {drive: begin + np.array([0.0, 0.1])})[last].position for m in (own, s[0]))
+    assert a == pytest.approx(b, abs=1e-6)
+
+
+def test_beside_the_best_pitch_and_radius_a_function_that_none_has_is_missed_by_more() -> None:
+    """A gradient that is wrong stops beside the optimum."""
+    angles = np.linspace(0, 1.5, 6)
+    pairs = np.column_stack(
+        [angles, mg.kinematics(press(), {"A": angles})["D"].position[:, 0] + 0.01 * np.cos(9 * angles)]
+    )
+    s = mg.synthesize(press(0.3), mg.function("A", "D", pairs - pairs[0]), ["A.pitch"], fit="least_squares", starts=1)
+    pitch = s.values[0, 0]
+    least, below, above = (
+        np.linalg.norm(mg.kinematics(press(p), {"A": angles})["D"].position[:, 0] - (pairs[:, 1] - pairs[0, 1]))
+        for p in (pitch, pitch - 1e-4, pitch + 1e-4)
+    )
+    assert least < below
+    assert least < above
+    # of a parabola, so that half of the gap in slope is what the optimum is off by
+    assert abs(above - below) < 1e-3 * (above + below - 2 * least)
+
+
+def test_a_sweep_goes_over_pitches() -> None:
+    angles = np.array([0.0, 0.6])
+    turned = mg.kinematics(press(), {"A": angles})["D"].position[:, 0]
+    task = mg.function("A", "D", np.column_stack([angles, turned]))
+    for s, pitch in zip(
+        mg.synthesize(press(C=1.0), task, ["C.point.x"], sweep={"A.pitch": [0.2, 0.3]}), (0.2, 0.3), strict=True
+    ):
+        assert s[0].pair("A").pitch == pytest.approx(pitch, abs=1e-14)
+        assert does(s[0], task) < 1e-10
+
+
+def test_a_start_that_is_not_zero_is_a_row_like_the_others() -> None:
+    """Where pairs are placed by points the mechanism is closed at zero alone, whatever the points are."""
+    m = geared_five_bar().replace(couplings=[mg.Coupling({"A": -1, "E": 2}, constant=0.4)])
+    begin = mg.kinematics(m, {"A": 0.3})
+    start = {name: begin[name].position.item() for name in "ABCDE"}
+    rows = [{"A": 0.3, "C": start["C"]}, {"A": 0.5, "C": mg.kinematics(m, {"A": 0.5})["C"].position.item()}]
+    s = mg.synthesize(m.replace(start=start), mg.positions(rows), ["D.point.x", "D.point.y"])
+    assert np.abs(s.values - [2.8, 1.1]).max(axis=1).min() < 1e-9
+    for one in s:
+        for row in rows:
+            assert mg.kinematics(one, {"A": row["A"]})["C"].position.item() == pytest.approx(row["C"], abs=1e-10)
+
+
+def test_numbers_that_cannot_be_sought_are_told_with_their_reason() -> None:
+    spur = geared_five_bar().replace(couplings=[mg.SpurGears("g", "A", "E", teeth=(20, 40), internal=True)])
+    path = mg.path("rod.tip", [[1.5, 1.5], [1.4, 1.6]], at={"A": [0, -0.2]})
+    with pytest.raises(mg.DeclarationError) as caught:
+        mg.synthesize(spur, path, ["g.teeth.b", "g.helix_angle"], fit="least_squares")
+    assert [fault.split(":")[1].split(";")[0] for fault in caught.value.faults] == [
+        " cannot change by a little",
+        " stands in no equation of closure",
+    ]
+    with pytest.raises(mg.DeclarationError, match="coupling g: ties an angle to a length or by an unknown ratio"):
+        mg.synthesize(geared(), mg.positions([{"A": 0.0}, {"A": 0.2, "C": -0.4}]), ["g.E"])

@@ -322,7 +322,9 @@ class Synthesis:
 
     def _merged(self, goal: ClassMember, x: Array) -> Mask:
         """Which solutions ``(n,)`` have elements of a link that fall together, where those of a random mechanism do not."""
-        of, pairs = self.of.full, _neighbors(self.problem.m)
+        # how elements that are known lie to each other was declared
+        changed = {q.pair for own in (*self.problem.places, *self.sweep.places) for q in own}
+        of, pairs = self.of.full, [ends for ends in _neighbors(self.problem.m) if changed.intersection(ends)]
         here, there = of.at(of.start, of.x[:, None]).here, of.at(goal, x.astype(complex)).here
         s, out = here.system, np.zeros(x.shape[1], dtype=bool)
         for i, j in pairs:
@@ -536,7 +538,8 @@ def synthesize(
         ``poses``, ``path``, ``function``, ``positions``; row 0 is the declared configuration. Default: all that ``m.synthesis``
         holds, but for what is given here.
     unknown : list of str
-        Numbers as ``study`` names them (``"B.point.x"``), or elements: ``"B.point"``, ``"B.axis"``, ``"coupler.tip"``, ``"B"``. Default,
+        Numbers as ``study`` names them on which positions depend (``"B.point.x"``, ``"A.pitch"``, ``"g.constant"``, ``"length[2]"``,
+        in fits ``"K.curve.radius"``), or elements: ``"B.point"``, ``"B.axis"``, ``"coupler.tip"``, ``"B"``. Default,
         of chains: as many numbers of pins as there are conditions, moving pins first, the others at random; of fits all pins.
     fit : {"least_squares", "minimax"}, optional
         Make the sum of the squares of the errors of all positions least, or the largest of them. Default: all are met exactly.
