@@ -249,6 +249,7 @@ def _label(problem: RowProblem, k: int) -> str:
                 for i in range(3)
                 if name != "second"
             ]
+    known.append(f"{problem.numbers.pitch[k, 0]:.9g}")
     s = problem.system
     own = slice(s.first_column[k], s.first_column[k + 1])
     pair = problem.whole.pairs[k]

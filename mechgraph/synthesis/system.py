@@ -58,8 +58,7 @@ class RowNumbers:
     def with_vectors(self, point: Array, axis: Array, second: Array, near: Array | None = None) -> RowNumbers:
         """The same with other points and directions, the norms of these nearest to others."""
         norms = norms_of(axis.swapaxes(0, 1), second.swapaxes(0, 1), near)
-        rest = {n: np.broadcast_to(v, (len(v), norms.shape[-1])) for n in PLAIN if len(v := getattr(self, n)) >= 0}
-        return RowNumbers(point, axis, second, norms, **rest)
+        return RowNumbers(point, axis, second, norms, *(_many(getattr(self, n), norms.shape[-1]) for n in PLAIN))
 
     @staticmethod
     def joined(numbers: Sequence[RowNumbers]) -> RowNumbers:
@@ -93,9 +92,9 @@ class RowNumbers:
 
     def with_values(self, places: Sequence[Sequence[UnknownPlace]], z: Array, near: Array | None = None) -> RowNumbers:
         """The same with unknowns ``z (u, B)`` at their places, and norms nearest to others."""
-        sought = {p.array for own in places for p in own}
-        out = {name: np.broadcast_to(v, (*v.shape[:-1], z.shape[1])) for name, v in vars(self).items()}
-        out |= {name: np.array(out[name], dtype=np.result_type(out[name], z)) for name in sought}
+        out = {name: _many(v, z.shape[1]) for name, v in vars(self).items()}
+        for name in {p.array for own in places for p in own}:
+            out[name] = np.array(out[name], dtype=np.result_type(out[name], z))
         for value, own in zip(z, places, strict=True):
             for p in own:
                 out[p.array][p.index] = value
@@ -114,6 +113,11 @@ class RowNumbers:
         """Points, unit axes, and unit second directions across them."""
         z = self.axis / self.norms[0][:, None]
         return self.point, z, (self.second - (z * self.second).sum(axis=1, keepdims=True) * z) / self.norms[1][:, None]
+
+
+def _many(values: Array, B: int) -> Array:
+    """One for all ``B`` as one for each."""
+    return values if values.shape[-1] == B else np.broadcast_to(values, (*values.shape[:-1], B))
 
 
 PLAIN = ("pitch", "couplings", "factors", "others")
@@ -232,6 +236,7 @@ class RowProblem:
     def with_rows(self, rows: Index) -> RowProblem:
         """The same of some rows, the declared one first."""
         out = copy(self)
+        vars(out).pop("turning", None), vars(out).pop("plain_angles", None)
         out.asked, out.rates = self.asked[rows], [rates[rows] for rates in self.rates]
         out.rows = np.arange(len(rows))[out._row_counts :]
         return out
@@ -530,6 +535,12 @@ class Apart:
         """What is left open."""
         return np.where(np.tile(self._built, self.T // len(self._built)), self._joined("residual"), np.inf)
 
+    @property
+    def row_scale(self) -> Array:
+        """See ``System.row_scale``."""
+        every = np.concatenate([one.system.row_scale for one in self._parts], axis=1)
+        return np.tile(every, self.T // len(self._built))
+
     def _joined(self, name: str) -> Array:
         every = np.stack([getattr(one, name) for one in self._parts], axis=-1)
         return every.reshape(*every.shape[:-2], -1)
@@ -654,7 +665,8 @@ class ArrowRows:
                 value = value - s.start_coordinates(m.start)[column]
         row = s.graph.loop_rows + g
         out = np.zeros(here.residual.shape, dtype=here.residual.dtype)
-        out[row] = value * here.system.row_scale[row] * self.problem.coupling_units[number]
+        scale = here.row_scale if isinstance(here, Apart) else here.system.row_scale
+        out[row] = value * scale[row] * self.problem.coupling_units[number]
         return out
 
     def moved(self, side: Index, pair: Index, rates: Array) -> Array:
