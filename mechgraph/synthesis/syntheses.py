@@ -631,8 +631,6 @@ def synthesize(
     faults += _faults_of_bounds(within, fitting)
     problem = RowProblem(m, tasks, unknown, faults)
     faults += _other_names(problem, within)
-    fits = FittedSynthesis(problem, tasks, over, faults) if fitting else None
-    found = None if fitting else Synthesis(problem, tasks, dict(sweep or {}), int(seed), cache, progress, faults)
     moved = {m.pairs[q.pair].name for own in problem.unknowns.places for q in own if 0 <= q.pair < len(m.pairs)}
     moved |= {name.split(".")[0] for name in unknown}
     changed = {end for p in m.pairs if p.name in moved for end in (p.a, p.b)}
@@ -640,19 +638,17 @@ def synthesize(
     if heavy or m.loads:
         of = " and ".join([f"masses and mass centers of {', '.join(heavy)}"] * bool(heavy) + ["loads"] * bool(m.loads))
         warnings.warn(f"{where}: {of} stay as declared, whatever the dimensions", MechgraphWarning, stacklevel=3)
-    if found is None:
-        assert fits is not None
-        exact = (
-            subset_values(RowProblem(m, tasks, unknown), tasks, int(starts), int(seed), cache, progress) if fit else ()
-        )
-        return fits.answered(fit, within, limits, goals, int(starts), int(seed), progress, exact)._kept(
-            require, within, limits, fits.driver
-        )
     # a whole turn more or less changes nothing, and many take long to follow
     most = np.nan_to_num(np.abs(problem.asked[:, ~problem.system.is_length[problem.columns]])).max(initial=0.0)
-    if most > 4 * np.pi:
+    if not fitting and most > 4 * np.pi:
         told = f"{where}: an angle of {most:.4g} rad is asked, {most / (2 * np.pi):.3g} turns; angles are in radians, not degrees"
         warnings.warn(told, MechgraphWarning, stacklevel=3)
+    if fitting:
+        fits, numbers = FittedSynthesis(problem, tasks, over, faults), (int(starts), int(seed))
+        exact = subset_values(RowProblem(m, tasks, unknown), tasks, *numbers, cache, progress) if fit else ()
+        answer = fits.answered(fit, within, limits, goals, *numbers, progress, exact)
+        return answer._kept(require, within, limits, fits.driver)
+    found = Synthesis(problem, tasks, dict(sweep or {}), int(seed), cache, progress, faults)
     for text in found.foretold:
         warnings.warn(f"{where}: {text}", MechgraphWarning, stacklevel=3)
     driver, _ = driver_of(m, tasks)
