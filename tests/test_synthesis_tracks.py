@@ -8,8 +8,8 @@ import pytest
 from ladder import LADDER, four_bar
 
 import mechgraph as mg
+from mechgraph.modes import compiled_tracks
 from mechgraph.modes.homotopy import Ways
-from mechgraph.synthesis import legs
 from mechgraph.synthesis.classes import TaskClass
 from mechgraph.synthesis.legs import Arrow, CompiledArrow, TaskLeg
 from mechgraph.synthesis.system import RowProblem
@@ -85,7 +85,7 @@ def test_the_kernel_corrects_as_numpy_does(name: str, compiled: None) -> None:
     leg, x, t, tracks = leg_of(name)
     idle, dt = np.zeros((3, 0, 0)), np.full(3, 0.5 + 0.1j)
     fast = leg.corrected(x, t, dt, tracks, idle)
-    rows, vars(leg.equations)["compiled"] = leg.equations.compiled, None
+    rows, vars(leg)["compiled"] = leg.compiled, None
     plain = Ways.corrected(leg, x, t, dt, tracks, idle)
     assert rows is not None
     assert near(fast.x, plain.x, 1e-9)
@@ -102,7 +102,7 @@ def test_curves_of_rates_are_led_by_numpy() -> None:
 def test_without_a_kernel_the_same_is_found(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     m, task, unknown, _ = LADDER[name]()
     fast = mg.synthesize(m, task, unknown)
-    monkeypatch.setattr(legs.build, "installed", lambda: None)
+    monkeypatch.setattr(compiled_tracks.build, "installed", lambda: None)
     plain = mg.synthesize(m, task, unknown)
     assert np.allclose(np.sort_complex(plain.values.ravel()), np.sort_complex(fast.values.ravel()), atol=1e-10)
     assert plain.total == fast.total
