@@ -202,7 +202,7 @@ class Circuits:
         self.dead = (rate <= MOTIONS.dependent * np.abs(last.t).max(axis=0))[::2]
         last.t *= sense * np.where(last.t[self.column] < 0, -1.0, 1.0)
         low, high = self.ends[:, case]
-        h, wide, going, out = np.full(2 * self.V, 0.1), np.zeros(2 * self.V), ~self.dead[case], list[Nodes]()
+        h, wide, going, out = np.full(2 * self.V, 0.25), np.zeros(2 * self.V), ~self.dead[case], list[Nodes]()
         before, closing = last.taken(np.arange(2 * self.V)), np.zeros(self.V, dtype=bool)
         ending = np.zeros(2 * self.V, dtype=bool)
 
@@ -235,14 +235,14 @@ class Circuits:
             turn = (new.t * here.t).sum(axis=0)
             new.t *= np.where(turn < 0, -1.0, 1.0)
             size, straight = np.abs(one).max(axis=0), here.leads_to(new)
-            good = (size <= np.where(leap, 1e-5, 0.06)) & (np.abs(two).max(axis=0) <= 0.1 * size + 1e-9)
-            good &= (np.abs(turn) > 0.8) & np.isfinite(new.x).all(axis=0) & (leap | straight)
+            good = (size <= np.where(leap, 1e-5, 0.1)) & (np.abs(two).max(axis=0) <= 0.1 * size + 1e-9)
+            good &= (np.abs(turn) > 0.7) & np.isfinite(new.x).all(axis=0) & (leap | straight)
             # ends of ranges are come to by shorter steps, each to where the last one tells
             left, over = -beyond_end(here.x, at), beyond_end(new.x, at)
             cut = good & (over > BEYOND_END)
             ending[at[cut]], good = True, good & ~cut
-            longest = 0.7 * np.maximum(1.0, np.abs(new.x[lengths]).max(axis=0, initial=0.0))
-            grown = ahead * np.clip((0.02 / np.maximum(size, 1e-12)) ** 0.25, 0.5, 2.0)
+            longest = 1.0 * np.maximum(1.0, np.abs(new.x[lengths]).max(axis=0, initial=0.0))
+            grown = ahead * np.clip((0.03 / np.maximum(size, 1e-12)) ** 0.25, 0.5, 2.0)
             h[at] = np.where(good, np.minimum(grown, longest), 0.4 * ahead)
             h[at[cut]] = ahead[cut] * np.clip(left[cut] / (left[cut] + over[cut]), 0.0, 0.9)
             going[at[(~good & leap) | (good & (over >= -BEYOND_END)) | (cut & (left <= BEYOND_END))]] = False
@@ -261,11 +261,12 @@ class Circuits:
 
     def _meet(self, last: Nodes, h: Array, going: Mask, closing: Mask) -> None:
         """See which of both ways come together, and let the first one end at the other."""
-        p, m = last.taken(slice(0, None, 2)), last.taken(slice(1, None, 2))
-        y = self.s.difference(m.x, p.x)
+        px, mx = last.x[:, ::2], last.x[:, 1::2]
+        y = self.s.difference(mx, px)
         y[self.back] -= self.s.rounds(self.back, y[self.back])
         # of what no passive motion changes: the way between both, and how far it leads on along each of unit size
-        y, (a, b) = y[self.settled], ((n.t[self.settled]) for n in (p, m))
+        y, t = y[self.settled], last.t[self.settled]
+        a, b = t[:, ::2], t[:, 1::2]
         size = np.sqrt(np.sqrt((a * a).sum(axis=0) * (b * b).sum(axis=0)))
         y, a, b = y / size, a / size, b / size
         d, ahead, behind = np.sqrt((y * y).sum(axis=0)), (a * y).sum(axis=0), (b * y).sum(axis=0)
@@ -275,9 +276,10 @@ class Circuits:
         lost = there & ~done & ((ahead <= 0) | (d > self.gap))
         self.closes |= done
         if np.isfinite(self.period):
-            self.turns[done] = np.abs(np.round((p.x - m.x)[self.row, done] / self.period))
+            self.turns[done] = np.abs(np.round((px - mx)[self.row, done] / self.period))
         going[::2][done], going[1::2][lost], closing[lost] = False, True, False
-        near = going[::2] & going[1::2] & (ahead > 0) & (behind < 0) & (d < h[::2] + h[1::2])
+        # steps are longer than they were meant to be by what they are off
+        near = going[::2] & going[1::2] & (ahead > 0) & (behind < 0) & (d < 1.2 * (h[::2] + h[1::2]))
         # steps that are short beside what is left still go round a corner, which may lead elsewhere
         met = near & ((a * b).sum(axis=0) < -0.8) & (ahead > 0.9 * d) & (d <= 3.01 * np.minimum(h[::2], h[1::2]))
         going[1::2][met], closing[met] = False, True

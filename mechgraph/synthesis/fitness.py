@@ -160,8 +160,8 @@ def _least_between(
     some = np.flatnonzero(np.isin(case, cases))
     k = np.searchsorted(cases, case[some])
     some = some[(places[some] > low[k]) & (places[some] < high[k])]
-    own = np.append(np.repeat(cases, 91), case[some])
-    values = np.append(np.linspace(low, high, 91, axis=1), places[some])
+    own = np.append(np.repeat(cases, 45), case[some])
+    values = np.append(np.linspace(low, high, 45, axis=1), places[some])
     for _ in range(3):
         if not own.size:
             break
@@ -178,8 +178,8 @@ def _least_between(
         before, behind = (np.where(own[at] == own, at, np.arange(len(own))) for at in (before, behind))
         dips = (found <= found[before]) & (found <= found[behind]) & (found <= 8.0 * least[own])
         own, values = (
-            np.repeat(own[dips], 45),
-            np.linspace(values[before[dips]], values[behind[dips]], 45, axis=1).ravel(),
+            np.repeat(own[dips], 21),
+            np.linspace(values[before[dips]], values[behind[dips]], 21, axis=1).ravel(),
         )
     return least[cases]
 
