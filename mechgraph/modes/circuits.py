@@ -261,27 +261,23 @@ class Circuits:
 
     def _meet(self, last: Nodes, h: Array, going: Mask, closing: Mask) -> None:
         """See which of both ways come together, and let the first one end at the other."""
-        px, mx = last.x[:, ::2], last.x[:, 1::2]
-        y = self.s.difference(mx, px)
-        y[self.back] -= self.s.rounds(self.back, y[self.back])
-        # of what no passive motion changes: the way between both, and how far it leads on along each of unit size
-        y, t = y[self.settled], last.t[self.settled]
-        a, b = t[:, ::2], t[:, 1::2]
-        size = np.sqrt(np.sqrt((a * a).sum(axis=0) * (b * b).sum(axis=0)))
-        y, a, b = y / size, a / size, b / size
-        d, ahead, behind = np.sqrt((y * y).sum(axis=0)), (a * y).sum(axis=0), (b * y).sum(axis=0)
+        d, ahead, behind, facing = self._apart(last)
         # the last step leads to the end of the other way, or straight over it, or these were parts of a circuit that pass each other
         there = closing & going[::2]
+        at = np.flatnonzero(np.repeat(there & (ahead <= 0), 2))
+        if at.size:
+            last.x[:, at] = self.closed(last.x[:, at], last.case[at], last.t[:, at])[0].x
+            d, ahead, behind, facing = self._apart(last)
         done = there & (ahead <= 0) & ((d < 1e-5) | (-ahead > (1.0 - 1e-4) * d))
         lost = there & ~done & ((ahead <= 0) | (d > self.gap))
         self.closes |= done
         if np.isfinite(self.period):
-            self.turns[done] = np.abs(np.round((px - mx)[self.row, done] / self.period))
+            self.turns[done] = np.abs(np.round((last.x[self.row, ::2] - last.x[self.row, 1::2])[done] / self.period))
         going[::2][done], going[1::2][lost], closing[lost] = False, True, False
         # steps are longer than they were meant to be by what they are off
         near = going[::2] & going[1::2] & (ahead > 0) & (behind < 0) & (d < 1.2 * (h[::2] + h[1::2]))
         # steps that are short beside what is left still go round a corner, which may lead elsewhere
-        met = near & ((a * b).sum(axis=0) < -0.8) & (ahead > 0.9 * d) & (d <= 3.01 * np.minimum(h[::2], h[1::2]))
+        met = near & (facing < -0.8) & (ahead > 0.9 * d) & (d <= 3.01 * np.minimum(h[::2], h[1::2]))
         going[1::2][met], closing[met] = False, True
         self.gap[closing] = d[closing]
         # a little more than what is left, or less, by what a step may be off
@@ -290,6 +286,16 @@ class Circuits:
         apart = near & ~met
         for way in (h[::2], h[1::2]):
             way[apart] = np.minimum(way, np.maximum(d / 3.0, 1e-5))[apart]
+
+    def _apart(self, last: Nodes) -> tuple[Array, Array, Array, Array]:
+        """How far the ends of both ways are from each other, how far that leads on along each of them, and the cosine between these."""
+        y, t = self.s.difference(last.x[:, 1::2], last.x[:, ::2]), last.t[self.settled]
+        y[self.back] -= self.s.rounds(self.back, y[self.back])
+        # of what no passive motion changes, along ways of unit size
+        y, a, b = y[self.settled], t[:, ::2], t[:, 1::2]
+        size = np.sqrt(np.sqrt((a * a).sum(axis=0) * (b * b).sum(axis=0)))
+        y, a, b = y / size, a / size, b / size
+        return np.sqrt((y * y).sum(axis=0)), (a * y).sum(axis=0), (b * y).sum(axis=0), (a * b).sum(axis=0)
 
     def _way(self, a: Nodes, b: Nodes) -> tuple[Array, Array]:
         """Increments ``(F, T)`` between nodes, without passive motions, and lengths of the arcs."""
