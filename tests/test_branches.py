@@ -67,13 +67,33 @@ def test_circuits_are_what_solve_runs_through() -> None:
 
 
 @pytest.mark.slow
-def test_a_fold_at_which_no_other_branch_ends_leaves_the_map_open() -> None:
-    """The branches that it meets begin between two samples, so that circuits are not told; with samples on them they are one."""
+def test_branches_between_samples_are_found_behind_folds() -> None:
+    """Two of four branches begin between two samples, and are those of samples that lie on them."""
     m = spatial(("RSSR", "frame", "frame"), ("SSP", "03", "frame"), seed=3)
     coarse, fine = (mg.branches(m, "O0", over=(0.0, 0.09), samples=n, points=20) for n in (3, 20))
-    assert (len(coarse), len(coarse.circuits), coarse.open_ends) == (2, 2, 2)
-    assert (len(fine), len(fine.circuits), fine.open_ends) == (4, 1, 0)
-    assert "2 ends of branches unresolved" in " ".join(str(coarse).split())
+    for b in (coarse, fine):
+        assert (len(b), len(b.circuits), b.open_ends) == (4, 1, 0)
+    assert np.allclose(coarse.intervals, fine.intervals, rtol=0, atol=1e-8)
+    assert np.allclose([f.value for f in coarse.folds], [f.value for f in fine.folds], rtol=0, atol=1e-8)
+
+
+def test_an_end_that_is_not_told_is_none_and_leaves_the_map_open() -> None:
+    """A slot ends where nothing else begins."""
+    x = np.linspace(-0.5, 0.6, 12)
+    slot = mg.Curve.through(points=np.stack([x, 0.3 * x * x, 0.0 * x], axis=1))
+    m = mg.Mechanism(
+        "pin in a slot",
+        pairs=[
+            mg.Pair("X", "P", "frame", "carriage", point=(0, 0, 0), axis=(1, 0, 0)),
+            mg.Pair("Y", "P", "carriage", "pin", point=(0, 0, 0), axis=(0, 1, 0)),
+            mg.Pair("G", "Sg", "frame", "pin", point=(0, 0, 0), curve=slot),
+        ],
+        drives=["X"],
+    )
+    b = mg.branches(m, "X", samples=3, points=6)
+    assert (b.full_turn, b.open_ends) == ((None,), 2)
+    assert b.intervals[0] == pytest.approx((-0.5, 0.6), abs=1e-8)
+    assert "not told" in str(b)
 
 
 def test_branch_circuit_and_order_defects_are_told() -> None:
@@ -148,12 +168,19 @@ def test_whether_the_driver_turns_right_round_does_not_depend_on_the_samples(sam
 
 
 @pytest.mark.slow
-def test_samples_that_lie_on_double_points_are_moved_and_ends_that_are_not_told_are_no_ends(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_samples_that_lie_on_double_points_change_nothing() -> None:
     m = linked_four_bar(1.0, 2.0, 1.0, 2.0, np.pi - 2 * np.pi / 12 * (2 + (3 - 5**0.5) / 2))
-    assert mg.branches(m, "O0", samples=12, points=60).full_turn == (True, True)
-    monkeypatch.setattr("mechgraph.modes.branches.SPREADS", 1)
-    b = mg.branches(m, "O0", samples=12, points=60)
-    assert (set(b.full_turn), b.open_ends > 0) == ({None}, True)
-    assert "not told" in str(b)
+    b = mg.branches(m, "O0", samples=12, points=24)
+    assert (b.full_turn, b.circuits, b.open_ends) == ((True, True), ((0, 1),), 0)
+
+
+def test_circuits_of_two_loops_that_meet_at_one_place_are_one() -> None:
+    """Cranks of two parallelograms in a row are in line with their ground together, where four branches cross."""
+    ends = [("frame", "first"), ("first", "rod"), ("rod", "middle"), ("frame", "middle")]
+    ends += [("middle", "other rod"), ("other rod", "last"), ("frame", "last")]
+    points = [(0, 0), (0.6, 0.8), (2.6, 0.8), (2, 0), (2.6, 0.8), (5.6, 0.8), (5, 0)]
+    pairs = [mg.Pair(n, "R", *of, point=at) for n, of, at in zip("ABCDEFG", ends, points, strict=True)]
+    b = mg.branches(mg.Mechanism("parallelograms", pairs=pairs, drives=["A"], planar=True), "A", samples=4, points=8)
+    assert (b.circuits, b.full_turn, b.open_ends) == (((0, 1, 2, 3),), (True,) * 4, 0)
+    assert [at.branches for at in b.bifurcations] == [(0, 1, 2, 3)] * 2
+    assert np.allclose(np.sin([at.value + np.arctan2(0.8, 0.6) for at in b.bifurcations]), 0.0, atol=1e-5)

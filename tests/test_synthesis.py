@@ -372,6 +372,20 @@ def test_tracks_may_be_followed_by_others() -> None:
         mg.synthesize(m, task, unknown, executor="two")  # type: ignore[arg-type]
 
 
+def test_what_is_found_is_told_by_tables_of_whole_words_and_by_how_many_there_are() -> None:
+    m, task, unknown, _ = LADDER["four-bar path, 5 points, timed"]()
+    s = mg.synthesize(m, task, unknown)
+    assert all(name in str(s) for name in ("D.point.y", "transmission [deg]"))
+    rows = str(s.fitness).splitlines()
+    assert all(word in rows[3] for word in ("branch", "circuit", "order", "full turn", "size", "ratio"))
+    assert [row.split()[0] for row in rows[6:]] == ["0", "1"]
+    assert rows[6].split()[1] == ("yes" if s.fitness[0].branch else "no")
+    assert "proved" in str(s.certificates)
+    for of in (s, s.fitness):
+        with pytest.raises(IndexError, match="9: there are 2 mechanisms"):
+            of[9]
+
+
 def test_where_no_solution_is_real_none_is_returned_and_all_are_counted() -> None:
     pairs = np.deg2rad([[0, 0], [15, 11], [30, 23], [45, 38], [60, 56]])
     s = mg.synthesize(four_bar(), mg.function("A", "D", pairs), ["B.point", "C.point"])

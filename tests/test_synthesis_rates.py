@@ -163,6 +163,19 @@ def test_what_is_asked_of_rates_is_the_limit_of_rows_that_come_together(name: st
     assert np.max(apart[1]) < 0.02
 
 
+def test_a_crank_on_whose_path_an_acceleration_is_asked_has_its_pivot_in_the_center_of_curvature() -> None:
+    """To which the center of the circle through rows tends that come together."""
+    x, v, a = np.array([1.0, 0.5]), np.array([0.7, -0.4]), np.array([0.3, 1.1])
+    links = [mg.Link("frame"), mg.Link("crank", points={"tip": tuple(x)})]
+    m = mg.Mechanism("crank", links, [mg.Pair("A", "R", "frame", "crank", point=(0, 0))], drives=["A"], planar=True)
+    s = mg.synthesize(m, mg.path("crank.tip", [x], velocities=[v], accelerations=[a]), ["A.point"])
+    assert s.total == 1
+    for h in (1e-2, 1e-3):
+        first, *rows = beside(x, h, v, a)
+        center = np.linalg.solve(2 * (np.array(rows) - first), [row @ row - first @ first for row in rows])
+        assert s.values[0] == pytest.approx(center, abs=h * h)
+
+
 def test_what_is_wrong_with_rates_is_told() -> None:
     points = [[1.5, 1.2], [1.0, 1.3]]
     with pytest.raises(mg.DeclarationError, match="beside velocities"):

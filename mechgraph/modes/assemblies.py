@@ -608,10 +608,6 @@ class Finder:
         found = Product(self.family, self.groups, self.starts, self.form.drive).ends(self.rng, self.progress)
         return [self._tracked(one, i) for i, one in enumerate(found)]
 
-    def singular(self, found: _Solutions, i: int) -> bool:
-        """Whether a real assembly of those found at a position is, or nearly so, or can move."""
-        return bool(found.continua or irregular(self.family, Configuration(self.form.at(i), found.solved)).any())
-
     def positions(self, guesses: int, turns: float) -> list[Assemblies]:
         """The assemblies at all positions."""
         return [self._result(found, i) for i, found in enumerate(self.solutions(guesses, turns))]

@@ -1,10 +1,7 @@
 """Branches of a mechanism over the range of one driver.
 
-Every assembly followed over the range of one driver, all in one batch: pieces between samples, joined into branches and circuits.
-
-At evenly spread samples of the driver all assemblies are known; from each, the engine's path follower goes to both neighbors, or out to
-the rim of the range. A piece that arrives meets an assembly there; a piece that ends at a fold meets the other one that ends there; pieces
-that pass the same crossing meet in it. Pieces that arrive, one after the other, are a branch; branches that meet are a circuit.
+At evenly spread samples of the driver all assemblies are known. The circuits through them are followed, until every assembly lies on one
+(see ``modes.circuits``); between its folds a circuit is a branch, and circuits that meet are one.
 """
 
 from __future__ import annotations
@@ -20,15 +17,9 @@ from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, counted
 from mechgraph.files import plain
 from mechgraph.graph.linkgraph import components_of_edges, members
-from mechgraph.kinematics.assembly import led
-from mechgraph.kinematics.motion_path import DriverPath, Positions, Request, Status
-from mechgraph.kinematics.reach import follow
-from mechgraph.kinematics.solver import closure_solver, engine_for
+from mechgraph.kinematics.reach import BEYOND_END
 from mechgraph.kinematics.state import CLOSED, Configuration, close
-from mechgraph.maths.se3 import Index
-from mechgraph.maths.singular_point import passed
 from mechgraph.maths.tolerances import MODES
-from mechgraph.maths.tracker import End
 from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.assemblies import (
@@ -43,209 +34,34 @@ from mechgraph.modes.assemblies import (
     values_text,
     weakest,
 )
-from mechgraph.modes.family import Array, Family
+from mechgraph.modes.circuits import Circuits, Nodes
+from mechgraph.modes.family import Array
 from mechgraph.quantities import Index as Seed
 from mechgraph.quantities import at_least, door, is_numeric, wrong
 
-Node = tuple[int, int]
-"""An assembly: the number of its sample, and its own there."""
+GOLDEN = 0.5 * (3.0 - 5.0**0.5)
+"""Place of the first sample, as part of the distance of two: double points are likely at whole parts of a turn."""
 
 
-@dataclass
-class BranchPiece:
-    """The way of assembly ``mode`` of sample ``sample`` in one ``sense``: states ``x (nx, n)`` at driver values, and its end.
+@dataclass(eq=False)
+class Stretch:
+    """A branch of some circuits by its number ``run`` there, which comes back after ``turns`` of the driver; 0 where it does not.
 
-    ``arrives`` is the assembly of the next sample, or -1; ``end`` the driver value where the piece ends at a ``fold``; ``rim`` says that it
-    leads out to the end of the range.
+    ``told`` counts its ends that are folds or lie at an end of the range; ``key``, by which branches are ordered, is the place of its first
+    assembly, and ``begin`` the driver value there (internal units).
     """
 
-    sample: int
-    mode: int
-    sense: int
-    values: Array
-    x: Array
-    arrives: int = -1
-    rim: bool = False
-    fold: bool = False
-    end: float = np.nan
-    last: Array = field(default_factory=lambda: np.zeros(0))
-    crossings: tuple[tuple[float, Array], ...] = ()
+    of: Circuits
+    run: int
+    turns: int
+    key: tuple[float, ...]
+    begin: float
+    told: int = 0
 
-
-class Tracer:
-    """Follows assemblies ``states[i] (nx, M_i)`` at ``samples (S,)`` of a driver to the neighbors, with ``points`` values between.
-
-    ``rims`` are the ends of the range of the driver, None where it goes right round.
-    """
-
-    def __init__(
-        self,
-        question: Question,
-        family: Family,
-        samples: Array,
-        states: list[Array],
-        points: int,
-        rims: tuple[float, float] | None,
-        place: int,
-    ) -> None:
-        self.question, self.family, self.samples, self.states, self.place = question, family, samples, states, place
-        self.points, self.rims = points, rims
-        self.system = question.system
-        self.prints = [self._prints(x) for x in states]
-
-    def _prints(self, x: Array) -> Array:
-        return self.family.prints(Configuration(self.system, x))
-
-    def pieces(self) -> list[BranchPiece]:
-        """All pieces."""
-        step, total, requests, out = self.samples[1] - self.samples[0], 0, [], []
-        part = np.linspace(0.0, 1.0, self.points + 1)[1:]
-        for i, x in enumerate(self.states):
-            for mode in range(x.shape[1]):
-                for sense in (1, -1):
-                    rim = self.rims is not None and not 0 <= i + sense < len(self.states)
-                    way = self.rims[sense > 0] - self.samples[i] if rim and self.rims else sense * step
-                    values = self.samples[i] + way * part
-                    others = np.repeat(x[self.family.rows, mode][:, None], len(part), axis=1)
-                    others[self.place] = values
-                    requests.append(Request(x[:, mode], 0, others, np.arange(total, total + len(part))))
-                    out.append(BranchPiece(i, mode, sense, values, np.zeros(0), rim=rim))
-                    total += len(part)
-        if not requests:
-            return []
-        q = self.question
-        solver = closure_solver(engine_for(self.system.n_rows, total, "auto"), q.columns, q.freedoms.hold)
-        found = follow(DriverPath(self.system, solver, self.system.cases), requests, total)
-        reach = self._ends(found)
-        for piece, request in zip(out, requests, strict=True):
-            self._read(piece, request.places, found, reach)
-        return out
-
-    def _ends(self, found: Positions) -> dict[int, tuple[float, Array]]:
-        """Driver value and state at the last node of every track."""
-        nodes = found.tracks.nodes
-        last = np.flatnonzero(np.append(nodes.track[1:] != nodes.track[:-1], True))
-        return {int(nodes.track[k]): (float(nodes.drive[self.place, k]), nodes.x[:, k]) for k in last}
-
-    def _read(self, piece: BranchPiece, places: Index, found: Positions, reach: dict[int, tuple[float, Array]]) -> None:
-        good = found.moved[places]
-        stop = int(np.argmin(good)) if not good.all() else len(good)
-        piece.values, piece.x = piece.values[:stop], found.x[:, places[:stop]]
-        track = int(found.track[places[0]])
-        piece.crossings = tuple(
-            (
-                float(found.follower.paths.drive(np.array([t]), np.array([at]))[self.place, 0]),
-                self._beside(found, t, at),
-            )
-            for t, at in found.tracks.crossings
-            if t == track
-        )
-        if stop == len(good):
-            if piece.rim:
-                return
-            j = (piece.sample + piece.sense) % len(self.states)
-            here = self._prints(piece.x[:, -1:])
-            gaps = np.abs(self.prints[j] - here).max(axis=0, initial=0.0)
-            if gaps.size and gaps.min() < MODES.arrives * max(1.0, float(np.abs(here).max())):
-                piece.arrives = int(np.argmin(gaps))
-            return
-        piece.end, state = reach[track]
-        piece.last = self._prints(state[:, None])[:, 0]
-        piece.values, piece.x = np.append(piece.values, piece.end), np.append(piece.x, state[:, None], axis=1)
-        piece.fold = found.tracks.end[track] is End.FOLD or found.status[places[stop]] is Status.OUT_OF_REACH
-
-    def _beside(self, found: Positions, track: int, place: float) -> Array:
-        """What tells assemblies apart at a crossing on a track: interpolated on the branch that passes it, else at the nearest node."""
-        crossing = passed(found.follower, found.tracks.nodes, track, place)
-        if crossing is not None:
-            return self._prints(crossing.states(np.array([place])))[:, 0]
-        nodes = found.nodes_of(track)
-        return self._prints(nodes.x[:, [int(np.argmin(np.abs(nodes.place - place)))]])[:, 0]
-
-
-class Map:
-    """Pieces joined: branches as chains of (sample, assembly) in the sense of the driver, folds as pairs of pieces, and what meets."""
-
-    def __init__(self, pieces: list[BranchPiece], states: list[Array]) -> None:
-        self.piece = {(p.sample, p.mode, p.sense): p for p in pieces}
-        n = len(states)
-        self.after: dict[Node, Node] = {}
-        for p in pieces:
-            if p.arrives >= 0:
-                here, there = (p.sample, p.mode), ((p.sample + p.sense) % n, p.arrives)
-                self.after.setdefault(*((here, there) if p.sense > 0 else (there, here)))
-        before = {there: here for here, there in self.after.items()}
-        nodes = [(i, mode) for i, x in enumerate(states) for mode in range(x.shape[1])]
-        self.chains: list[list[Node]] = []
-        taken: set[Node] = set()
-        for first in [*(node for node in nodes if node not in before), *nodes]:
-            chain: list[Node] = []
-            node: Node | None = first
-            while node is not None and node not in taken:
-                taken.add(node)
-                chain.append(node)
-                node = self.after.get(node)
-            if chain:
-                self.chains.append(chain)
-        self.of = {node: number for number, chain in enumerate(self.chains) for node in chain}
-        self.folds = self._folds([p for p in pieces if p.fold])
-        self.crossings = self._crossings([(p, *at) for p in pieces for at in p.crossings])
-        self._told = {(p.sample, p.mode, p.sense) for pair in self.folds for p in pair}
-        self._told |= {at for at, p in self.piece.items() if p.rim and not p.fold}
-        self.open = sum(self.untold(number) for number in range(len(self.chains)))
-
-    def cyclic(self, number: int) -> bool:
-        """Whether a branch comes back to where it begins."""
-        chain = self.chains[number]
-        return self.after.get(chain[-1]) == chain[0]
-
-    def untold(self, number: int) -> int:
-        """How many ends of a branch are neither folds at which another one ends nor at the rim of the range."""
-        if self.cyclic(number):
-            return 0
-        chain = self.chains[number]
-        return sum((*node, sense) not in self._told for node, sense in ((chain[0], -1), (chain[-1], 1)))
-
-    def branch(self, piece: BranchPiece) -> int:
-        """The branch of a piece."""
-        return self.of[piece.sample, piece.mode]
-
-    @staticmethod
-    def _folds(ended: list[BranchPiece]) -> list[tuple[BranchPiece, BranchPiece]]:
-        out = []
-        for i, a in enumerate(ended):
-            for b in ended[i + 1 :]:
-                apart = np.abs(a.last - b.last).max() / max(1.0, float(np.abs(a.last).max()))
-                # difference of driver values up to which pieces end at the same fold
-                if (a.sample, a.sense) == (b.sample, b.sense) and abs(a.end - b.end) < 1e-6 and apart < MODES.touches:
-                    out.append((a, b))
-        return out
-
-    @staticmethod
-    def _crossings(crossed: list[tuple[BranchPiece, float, Array]]) -> list[tuple[float, list[BranchPiece]]]:
-        out: list[tuple[float, list[BranchPiece], Array]] = []
-        for piece, value, at in crossed:
-            for known, pieces, there in out:
-                turns = (value - known) / (2 * np.pi)
-                if abs(turns - round(turns)) < MODES.touches and np.abs(at - there).max() < MODES.touches * max(
-                    1.0, float(np.abs(at).max())
-                ):
-                    pieces.append(piece)
-                    break
-            else:
-                out.append((value, [piece], at))
-        return [(value, pieces) for value, pieces, _ in out]
-
-    def circuits(self) -> list[list[int]]:
-        """Branches that folds and crossings join."""
-        meets = [(self.branch(a), self.branch(b)) for a, b in self.folds]
-        for _, pieces in self.crossings:
-            meets += [(self.branch(pieces[0]), self.branch(other)) for other in pieces[1:]]
-        return members(components_of_edges(len(self.chains), meets))
-
-
-GOLDEN, SPREADS = 0.5 * (3.0 - 5.0**0.5), 3
-"""Place of the first sample, as part of the distance of two; how many such places are tried where samples lie on double points."""
+    @property
+    def ends(self) -> Array:
+        """Driver values at both ends, in the sense in which the circuit is followed."""
+        return self.of.values(self.run)[[0, -1]]
 
 
 @dataclass(frozen=True)
@@ -262,7 +78,7 @@ class Branch:
     full_turn: bool | None
     turns: int
     circuit: int
-    prints: Array = field(repr=False)
+    stretch: Stretch = field(repr=False)
 
 
 @dataclass(frozen=True)
@@ -338,7 +154,7 @@ class Branches(Shown):
     def defects(self, positions: Iterable[Mechanism | Mapping[str, float]]) -> Defects:
         """Report branch, circuit and order defects of a sequence of positions.
 
-        From each position, mechgraph tracks the path to the next point of the map.
+        A position lies on a branch if mechgraph comes to it along the circuit.
 
         Parameters
         ----------
@@ -363,13 +179,13 @@ class Branches(Shown):
         >>> b.defects(places).branches
         (0, 1)
         """
-        places, faults, q = [], [], Question(self.mechanism, _at(self.mechanism, self.driver, [0.0]))
+        places, faults = [], []
         for number, position in enumerate(positions):
             start = position.start if isinstance(position, Mechanism) else position
             if not isinstance(start, Mapping) or not all(is_numeric(value, ()) for value in start.values()):
                 wanted = "an assembly, or coordinates of freedoms"
                 raise DeclarationError(f"defects of {self.mechanism.name!r}", [wrong(position, "position", wanted)])
-            place = self._place(q, {self.mechanism.full_name(k): float(v) for k, v in start.items()})
+            place = self._place({self.mechanism.full_name(k): float(v) for k, v in start.items()})
             places.append(place or (-1, 0.0))
             if place is None:
                 faults.append(
@@ -381,41 +197,28 @@ class Branches(Shown):
         circuits = tuple(self.branches[number].circuit for number in numbers)
         return Defects(numbers, circuits, len(set(numbers)) > 1, len(set(circuits)) > 1, self._disordered(places))
 
-    def _place(self, q: Question, start: Mapping[str, float]) -> tuple[int, float] | None:
-        """The branch that leads to a position, and the driver value there; None where none does."""
-        s, place, turns = q.system, q.names.index(self.driver), self.mechanism.turns(self.driver)
-        given = s.state_of(s.start_coordinates(start)[:, None])[:, 0]
-        x, error = close(s, given, q.columns)
-        if error > CLOSED or np.abs(s.difference(x[:, None], given[:, None])).max() > MODES.touches:
-            return None
-        goal = x[s.single_rows[q.columns]]
-        value = float(goal[place] * q.unit[place])
-        for sense in (1.0, -1.0):
-            ways = [sense * (b.values - value) for b in self.branches]
-            ways = [np.mod(way, 2 * np.pi) if turns else np.where(way < 0, np.inf, way) for way in ways]
-            for way, b in zip(ways, self.branches, strict=True):
-                if not b.full_turn:
-                    way[[0, -1]] = np.inf  # singular where they are folds
-            ahead = min(float(way.min()) for way in ways)
-            if not np.isfinite(ahead):
-                continue
-            goal[place] = (value + sense * ahead) / q.unit[place]
-            there, came = led(s, x, q.columns, goal)
-            prints = q.family.prints(Configuration(s, there[:, None]))
-            for number, (b, way) in enumerate(zip(self.branches, ways, strict=True)):
-                at = int(np.argmin(way))
-                near = np.abs(b.prints[:, [at]] - prints).max() < MODES.arrives * max(1.0, float(np.abs(prints).max()))
-                # difference of driver values (radians, or lengths) up to which points of several branches lie at the same one
-                if came and near and way[at] - ahead < 1e-9:
-                    return number, float(b.values[at] - sense * ahead)
-        return None
+    def _place(self, start: Mapping[str, float]) -> tuple[int, float] | None:
+        """The branch on which a position lies, and the driver value there; None where it lies on none, or on several."""
+        found, every = dict[int, float](), [b.stretch for b in self.branches]
+        for of in {id(one.of): one.of for one in every}.values():
+            given = of.s.state_of(of.s.start_coordinates(start)[:, None])
+            x, error = close(of.s, given[:, 0], np.append(of.held, of.column))
+            if error > CLOSED or np.abs(of.s.difference(x[:, None], given)).max() > MODES.touches:
+                return None
+            step, _, value = of.placed(np.arange(of.V), np.repeat(x[:, None], of.V, axis=1))
+            at = dict(zip(of.run[step].tolist(), value.tolist(), strict=True))
+            found |= {i: at[one.run] for i, one in enumerate(every) if one.of is of and one.run in at}
+        return next(iter(found.items())) if len(found) == 1 else None
 
     def _disordered(self, places: list[tuple[int, float]]) -> bool:
         """Whether the driver would have to turn back between positions of one branch."""
         if len({number for number, _ in places}) != 1:
             return False
         branch = self.branches[places[0][0]]
-        return in_order(np.array([value for _, value in places]), _period(branch)) is None
+        return (
+            in_order(np.array([value for _, value in places]), branch.stretch.of.period * (branch.turns or np.inf))
+            is None
+        )
 
     def plot(self, output: str | None = None, *, ax: Any = None, current: int | None = None) -> Any:
         """Draw a freedom over the driver on all branches, with the folds.
@@ -510,10 +313,6 @@ def _turns(b: Branch) -> str:
     return "yes" if b.turns == 1 else f"yes, back after {b.turns} turns"
 
 
-def _period(b: Branch) -> float:
-    return 2 * np.pi * b.turns if b.full_turn else np.inf
-
-
 def in_order(values: Array, period: float) -> Array | None:
     """Driver values ``(n,)`` of a branch, with whole periods such that they rise or fall; None where the driver has to turn back."""
     steps, ways = np.diff(values), []
@@ -541,8 +340,8 @@ def branches(
 ) -> Branches:
     """Map every assembly mode over the range of a driver: branches, folds, bifurcations, circuits, full turns.
 
-    ``assemblies`` finds all modes at ``samples`` values of the driver; from each, the path tracker of ``solve`` goes to both
-    neighbors, so a fold is where ``solve`` stops.
+    ``assemblies`` finds all modes at ``samples`` values of the driver; the curves of positions through these are tracked by their length,
+    through folds, at which ``solve`` stops.
 
     Parameters
     ----------
@@ -587,104 +386,172 @@ class _Mapper:
 
     def __init__(self, m: Mechanism, driver: str, over: tuple[float, float] | None, samples: int, points: int) -> None:
         probe = Question(m, _at(m, driver, [0.0]))
-        place, L = probe.names.index(driver), probe.system.par.L
-        self.begin = float(probe.declared.x[probe.family.rows[place], 0] * probe.unit[place])
+        self.place, L = probe.names.index(driver), probe.system.par.L
+        self.unit = float(probe.unit[self.place])
+        self.begin = float(probe.declared.x[probe.family.rows[self.place], 0] * self.unit)
         self.closed = over is None and m.turns(driver)
         around = (self.begin - MODES.slide_stroke * L, self.begin + MODES.slide_stroke * L)
         self.low, self.high = (self.begin, self.begin + 2 * np.pi) if self.closed else over or around
-        self.count = samples
-        self.between = max(1, round(points / samples))
+        self.rims = None if self.closed else (self.low / self.unit, self.high / self.unit)
+        self.count, self.between = samples, max(1, round(points / samples))
         self.m, self.driver = m, driver
 
     def mapped(self, seed: int, cache: bool, progress: Callable[[str], None] | None) -> Branches:
         """The map."""
         step = (self.high - self.low) / self.count
-        # no sample may lie on a double point: which branch leads there is open
-        for again in range(1, SPREADS + 1):
-            self.samples = self.low + (np.arange(self.count) + again * GOLDEN % 1.0) * step
-            q = Question(self.m, _at(self.m, self.driver, self.samples.tolist()))
-            finder = Finder(q, seed, cache, progress)
-            solutions = finder.solutions()
-            if not any(finder.singular(found, i) for i, found in enumerate(solutions)):
-                break
+        self.samples = self.low + (np.arange(self.count) + GOLDEN) * step
+        self.q = q = Question(self.m, _at(self.m, self.driver, self.samples.tolist()))
+        self.column = int(q.columns[self.place])
+        solutions = Finder(q, seed, cache, progress).solutions()
         states = [found.x for found in solutions]
         if progress is not None:
             progress(f"following {sum(x.shape[1] for x in states)} assemblies")
-        place = q.names.index(self.driver)
-        self.q, self.unit = q, float(q.unit[place])
-        rims = None if self.closed else (self.low / self.unit, self.high / self.unit)
-        tracer = Tracer(q, q.family, q.drive[place], states, self.between, rims, place)
-        self.found, self.states, self.family = Map(tracer.pieces(), states), states, q.family
-        circuits = sorted(sorted(c) for c in self.found.circuits())
+        every, pairs, open_ends = self._stretches(states)
+        every.sort(key=lambda one: one.key)
+        place = {one: i for i, one in enumerate(every)}
+        meets = self._meetings(every)
+        both = [(place[a], place[b]) for a, b in pairs] + [(one, n) for _, (one, *more), _ in meets for n in more]
+        circuits = sorted(sorted(c) for c in members(components_of_edges(len(every), both)))
         number = {branch: i for i, c in enumerate(circuits) for branch in c}
+        folds = [self._fold(a, sorted((place[a], place[b]))) for a, b in pairs]
         return Branches(
             self.m,
             self.driver,
-            tuple(self._branch(i, number[i]) for i in range(len(self.found.chains))),
-            tuple(sorted((self._fold(a, b) for a, b in self.found.folds), key=lambda f: (f.value, f.branches))),
-            tuple(self._bifurcation(value, pieces) for value, pieces in self.found.crossings),
+            tuple(self._branch(one, number[i]) for i, one in enumerate(every)),
+            tuple(sorted(folds, key=lambda f: (f.value, f.branches))),
+            tuple(Bifurcation(self._within(value), tuple(sorted(set(numbers)))) for value, numbers, _ in meets),
             tuple(tuple(c) for c in circuits),
             weakest(found.word for found in solutions),
             step,
-            self.found.open,
+            open_ends + sum(2 - one.told for one in every),
         )
 
-    def _branch(self, i: int, circuit: int) -> Branch:
-        """The states of a branch, one after the other, with the driver rising."""
-        found, chain = self.found, self.found.chains[i]
-        step, cyclic = self.samples[1] - self.samples[0], self.found.cyclic(i)
-        first = found.piece.get((*chain[0], -1))
-        values, states = [], []
-        if first is not None and first.arrives < 0:
-            values.append(self.unit * first.values[::-1])
-            states.append(first.x[:, ::-1])
-        for k, node in enumerate(chain):
-            begin = self.samples[chain[0][0]] + k * step
-            values.append(np.array([begin]))
-            states.append(self.states[node[0]][:, [node[1]]])
-            piece = found.piece.get((*node, 1))
-            if piece is not None:
-                ahead = self.unit * piece.values - self.samples[node[0]] + begin
-                # where it arrives the next assembly stands already
-                stop = len(ahead) - (piece.arrives >= 0 and (k + 1 < len(chain)))
-                values.append(ahead[:stop])
-                states.append(piece.x[:, :stop])
-        x, along = np.concatenate(states, axis=1), np.concatenate(values)
-        s = self.q.system
-        q = s.coordinates_of(x, s.start_coordinates(self.m.start)).T
-        period = self.q.periods
-        back = np.isfinite(period)
-        q[:, back] = np.unwrap(q[:, back] * (2 * np.pi / period[back]), axis=0) * (period[back] / (2 * np.pi))
-        # whole rounds such that the place nearest to the declared value of the driver is nearest to the start
-        back[self.q.columns[self.q.names.index(self.driver)]] = False
-        near = (q[np.argmin(np.abs(along - self.begin))] - s.start_coordinates(self.m.start))[back]
-        q[:, back] -= period[back] * np.round(near / period[back])
-        prints = self.family.prints(Configuration(s, x))
-        turns = round(len(chain) / len(self.samples)) if cyclic else 0
-        if self.closed and not cyclic:
-            # whole turns of the driver such that the middle of the interval is nearest to the start
-            shift = 2 * np.pi * np.round((0.5 * (along[0] + along[-1]) - self.begin) / (2 * np.pi))
-            along = along - shift
-            q[:, self.q.columns[self.q.names.index(self.driver)]] -= shift
-        full_turn = None if found.untold(i) else cyclic
-        return Branch(along, q, (float(along[0]), float(along[-1])), full_turn, turns, circuit, prints)
+    def _within(self, value: float) -> float:
+        """A driver value, internal units, as one of the range."""
+        value *= self.unit
+        return float(self.low + np.mod(value - self.low, 2 * np.pi)) if self.closed else value
 
-    def _fold(self, a: Any, b: Any) -> Fold:
-        s = self.q.system
-        gone = (
-            np.abs(s.difference(a.x[:, -1:], b.x[:, -1:]))[:, 0]
-            if a.x.shape[1] and b.x.shape[1]
-            else np.zeros(s.n_freedoms)
-        )
-        value = 0.5 * (a.end + b.end) * self.unit
+    def _stretches(self, states: list[Array]) -> tuple[list[Stretch], list[tuple[Stretch, Stretch]], int]:
+        """The branches on which assemblies ``states[i] (nx, M_i)`` at samples lie, pairs that meet in folds, open ends of those on none."""
+        q, s, family, S = self.q, self.q.system, self.q.family, self.count
+        prints = [family.prints(Configuration(s, x)) for x in states]
+        left, rank = [np.ones(x.shape[1], dtype=bool) for x in states], s.n_freedoms - 1 - family.idle.shape[1]
+        out, pairs, still, passed = list[Stretch](), list[tuple[Stretch, Stretch]](), list[Array](), list[Array]()
+        while any(some.any() for some in left):
+            i = int(np.argmax([some.sum() for some in left]))
+            start = np.flatnonzero(left[i])
+            others = np.delete(q.columns, self.place)
+            of = Circuits(family, s, self.column, rank, states[i][:, start], others, self.rims)
+            step, k, value = of.steps_at(np.repeat(np.arange(of.V), S), np.tile(q.drive[self.place], of.V))
+            x, met = of.states(step, value)
+            there = family.prints(Configuration(s, x))
+            for case in range(of.V):
+                if not left[i][start[case]]:
+                    continue
+                left[i][start[case]] = False
+                still += [prints[i][:, [start[case]]]] * bool(of.dead[case])
+                places: dict[int, list[tuple[int, int, float]]] = {}
+                for j in np.flatnonzero(met & (k // S == case)).tolist():
+                    sample = int(k[j]) % S
+                    gaps = np.abs(prints[sample] - there[:, [j]]).max(axis=0, initial=0.0)
+                    if gaps.min(initial=np.inf) < MODES.arrives * max(1.0, float(np.abs(there[:, j]).max())):
+                        mode = int(np.argmin(gaps))
+                        left[sample][mode] = False
+                        places.setdefault(int(of.run[step[j]]), []).append((sample, mode, float(value[j])))
+                more = self._of(of, case, places)
+                out += more
+                ring = of.closes[case] and not of.turns[case]
+                pairs += zip(more, more[1:] + more[: int(ring)], strict=False)
+            passed += [family.prints(Configuration(s, x)) for x in (of.a.x, of.b.x)]
+        # folds and double points, at which nothing is followed, lie on circuits through other samples
+        near = [np.abs(np.hstack(passed) - at).max(axis=0).min(initial=np.inf) < MODES.touches for at in still]
+        folds = [one for pair in pairs for one in pair]
+        for one in out:
+            one.told = 2 if one.turns else folds.count(one) + sum(self._at_rim(end) is not None for end in one.ends)
+        return out, pairs, 2 * near.count(False)
+
+    @staticmethod
+    def _of(of: Circuits, case: int, places: dict[int, list[tuple[int, int, float]]]) -> list[Stretch]:
+        """The branches of a circuit; of each the ``places`` of assemblies: number of the sample and its own there, driver value."""
+        out, turns = [], int(of.turns[case])
+        for run in np.unique(of.run[of.a.case == case]).tolist():
+            at = places.get(run, [(len(of.run), 0, 0.0)])
+            sample, mode, begin = min(at) if turns else min(at, key=lambda one: one[2])
+            out.append(Stretch(of, run, turns, (turns > 0, sample, mode), begin))
+        return out
+
+    def _fold(self, a: Stretch, branches: list[int]) -> Fold:
+        """The fold at the end of a branch."""
+        of, last = a.of, np.flatnonzero(a.of.run == a.run)[-1]
+        value = float(of.b.x[of.row, last]) * self.unit
         if self.closed:
             value -= 2 * np.pi * np.round((value - self.begin) / (2 * np.pi))
-        fastest = self.m.freedom_names()[int(np.argmax(gone))]
-        one, other = sorted((self.found.branch(a), self.found.branch(b)))
-        return Fold(value, a.sense, (one, other), fastest)
+        fastest = self.m.freedom_names()[int(np.argmax(np.abs(of.b.t[:, last])))]
+        return Fold(value, int(of.rises[last]), (branches[0], branches[1]), fastest)
 
-    def _bifurcation(self, value: float, pieces: list[Any]) -> Bifurcation:
-        return Bifurcation(value * self.unit, tuple(sorted({self.found.branch(p) for p in pieces})))
+    def _meetings(self, every: list[Stretch]) -> list[tuple[float, list[int], Array]]:
+        """Where circuits meet: driver values, numbers of branches, and what tells assemblies apart."""
+        out: list[tuple[float, list[int], Array]] = []
+        for i, one in enumerate(every):
+            mine = one.of.run == one.run
+            nodes = Nodes.joined(part.taken(mine & part.meets) for part in (one.of.a, one.of.b))
+            prints = self.q.family.prints(Configuration(self.q.system, nodes.x))
+            for value, at in zip(nodes.x[one.of.row].tolist(), prints.T, strict=True):
+                for known, numbers, there in out:
+                    gap = value - known - (2 * np.pi * np.round((value - known) / (2 * np.pi)) if self.closed else 0.0)
+                    if max(abs(gap), np.abs(at - there).max() / max(1.0, float(np.abs(at).max()))) < MODES.touches:
+                        numbers.append(i)
+                        break
+                else:
+                    out.append((value, [i], at))
+        return out
+
+    def _at_rim(self, value: float) -> float | None:
+        """The end of the range at which a driver value lies."""
+        return next((rim for rim in self.rims or () if abs(value - rim) <= 2 * BEYOND_END), None)
+
+    def _grid(self, one: Stretch) -> Array:
+        """Driver values on a branch, internal units: its ends, all samples and values between."""
+        s, n = self.q.drive[self.place], self.between
+        step = (s[1] - s[0]) / n
+        if one.turns:
+            return np.asarray(one.begin + step * np.arange(one.turns * self.count * n + 1))
+        low, high = np.sort(one.ends)
+        if self.rims is None:
+            grid = s[0] + step * np.arange(np.ceil((low - s[0]) / step), np.floor((high - s[0]) / step) + 1)
+        else:
+            low, high = (end if (rim := self._at_rim(end)) is None else rim for end in (low, high))
+            begin, end = np.linspace(self.rims[0], s[0], n + 1), np.linspace(s[-1], self.rims[1], n + 1)
+            grid = np.concatenate([begin[:-1], s[0] + step * np.arange((len(s) - 1) * n), end])
+        # rounding of driver values
+        return np.concatenate([[low], grid[(grid > low + 1e-9) & (grid < high - 1e-9)], [high]])
+
+    def _branch(self, one: Stretch, circuit: int) -> Branch:
+        """The states of a branch, one after the other, with the driver rising."""
+        of, s, value = one.of, self.q.system, self._grid(one)
+        step, there = of.along(one.run, value)
+        x, met = of.states(step, there)
+        if not one.turns:
+            # folds, at which equations are singular
+            ends = [of.a.x[:, step.min()], of.b.x[:, step.max()]]
+            x[:, 0], x[:, -1] = ends[:: int(of.rises[step[0]])]
+            met[[0, -1]] = True
+        x, along = x[:, met], self.unit * value[met]
+        # whole turns of the driver such that it begins at the first sample, or the middle of the interval is nearest to the start
+        middle, near = (along[0], self.samples[0]) if one.turns else (0.5 * (along[0] + along[-1]), self.begin)
+        along -= 2 * np.pi * np.round((middle - near) / (2 * np.pi)) if self.closed else 0.0
+        start = s.start_coordinates(self.m.start)
+        q = s.coordinates_of(x, start).T
+        period = self.q.periods
+        back = np.isfinite(period)
+        back[self.column] = False
+        q[:, back] = np.unwrap(q[:, back] * (2 * np.pi / period[back]), axis=0) * (period[back] / (2 * np.pi))
+        # whole rounds such that the place nearest to the declared value of the driver is nearest to the start
+        beside = (q[np.argmin(np.abs(along - self.begin))] - start)[back]
+        q[:, back] -= period[back] * np.round(beside / period[back])
+        q[:, self.column] = along
+        full_turn = None if one.told < 2 else one.turns > 0
+        return Branch(along, q, (float(along[0]), float(along[-1])), full_turn, one.turns, circuit, one)
 
 
 def _at(m: Mechanism, driver: str, values: list[float]) -> dict[str, Any]:

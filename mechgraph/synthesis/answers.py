@@ -45,8 +45,10 @@ class Degenerate:
     text: str
 
 
-class Deferred(Sequence[Any]):
+class Deferred(Shown, Sequence[Any]):
     """What is found of mechanisms when it is first asked for: fitness, certificates."""
+
+    _every_method_is_a_door = False
 
     def __init__(self, makers: Sequence[Callable[[], Any]]) -> None:
         self._makers = tuple(makers)
@@ -55,7 +57,21 @@ class Deferred(Sequence[Any]):
         return len(self._makers)
 
     def __getitem__(self, i: int | slice) -> Any:
-        return tuple(make() for make in self._makers[i]) if isinstance(i, slice) else self._makers[i]()
+        return Deferred(self._makers[i]) if isinstance(i, slice) else _one_of(self._makers, i)()
+
+    def document(self) -> Document:
+        """A table, a row per mechanism, of verdicts and numbers, without what is as usual of all."""
+        every = tuple(self)
+        kind = next((type(one) for one in every if one is not None), None)
+        named = [f for f in fields(kind) if str(f.type) not in ("int", "str")] if kind else []
+        named = [f for f in named if any(getattr(one, f.name, None) != f.default for one in every)]
+        turns = ["radians" in str(f.type) for f in named]
+        header = [f.name.replace("_", " ") + " [deg]" * turn for f, turn in zip(named, turns, strict=True)]
+        rows = [
+            [_cell(getattr(one, f.name, None), turn) for f, turn in zip(named, turns, strict=True)] for one in every
+        ]
+        title = f"{kind.__name__ if kind else 'Nothing'} of {counted(len(self), 'mechanism')}"
+        return Document(title, (Table(("", *header), tuple((str(i), *row) for i, row in enumerate(rows))),))
 
     @classmethod
     def at_once(cls, find: Callable[[], Sequence[Any]], count: int) -> Deferred:
@@ -63,9 +79,13 @@ class Deferred(Sequence[Any]):
         found = cache(find)
         return cls([partial(lambda k: found()[k], i) for i in range(count)])
 
+    @classmethod
+    def known(cls, found: Sequence[Any]) -> Deferred:
+        """Those that are known."""
+        return cls([partial(found.__getitem__, i) for i in range(len(found))])
+
     def __reduce__(self) -> tuple[Any, ...]:
-        found = tuple(self)  # before they go elsewhere
-        return Deferred, ([partial(found.__getitem__, i) for i in range(len(found))],)
+        return Deferred.known, (tuple(self),)  # before they go elsewhere
 
 
 @dataclass(frozen=True)
@@ -205,7 +225,7 @@ class Syntheses(Shown, Sequence[Mechanism]):
         return len(self.mechanisms)
 
     def __getitem__(self, i: int | slice) -> Any:
-        return self.mechanisms[i]
+        return _one_of(self.mechanisms, i)
 
     def __iter__(self) -> Iterator[Mechanism]:
         return iter(self.mechanisms)
@@ -342,9 +362,8 @@ class Syntheses(Shown, Sequence[Mechanism]):
 
     def document(self) -> Document:
         """A table of the mechanisms, and how sure it is that these are all."""
-        verdict = {True: "yes", False: "no", None: "-"}
         fits: list[tuple[str, ...]] = [
-            (verdict[fit.good if fit.branch is not None else None], _degrees(fit.transmission), f"{fit.size:.4g}")
+            (_cell(fit.good if fit.branch is not None else None), _cell(fit.transmission, True), _cell(fit.size))
             for fit in self.fitness
         ]
         judged: tuple[str, ...] = ("good", "transmission [deg]", "size")
@@ -359,7 +378,7 @@ class Syntheses(Shown, Sequence[Mechanism]):
             # columns for which a terminal is wide enough
             parts = [(self.unknown[i : i + 5], [v[i : i + 5] for v in own]) for i in range(0, len(self.unknown), 5)]
             parts += [(judged, fits)]
-            if len(parts) == 2:
+            if len(self.unknown) + len(judged) < 8:
                 parts = [((*self.unknown, *judged), [(*a, *b) for a, b in zip(own, fits, strict=True)])]
         tables = [
             Table(("mechanism", *header), tuple((str(i), *row) for i, row in enumerate(rows))) for header, rows in parts
@@ -511,8 +530,20 @@ def joined_answers(found: Sequence[Syntheses], told: Sequence[str]) -> Syntheses
     return out._sorted
 
 
-def _degrees(angle: float) -> str:
-    return f"{np.rad2deg(angle):.4g}" if np.isfinite(angle) else "-"
+def _one_of(items: Sequence[Any], i: int | slice) -> Any:
+    try:
+        return items[i]
+    except IndexError:
+        raise IndexError(f"{i}: there are {counted(len(items), 'mechanism')}, counted from 0") from None
+
+
+def _cell(value: Any, turns: bool = False) -> str:
+    """A number, an angle in degrees, yes or no; a dash where nothing is known."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if value is None or not np.isfinite(value):
+        return "-"
+    return f"{np.rad2deg(value) if turns else value:.4g}"
 
 
 def _rank(fit: Fitness, k: int) -> tuple[Any, ...]:

@@ -499,7 +499,9 @@ class FittedSynthesis:
             "searched",
             found.evidence,
             np.array([1.0 / self.fit.margins(here).min() for here in points]),
-            tuple(fitnesses([m for m, _ in made], np.array([q for _, q in made]), self.driver, self.output, errors)),
+            Deferred.known(
+                fitnesses([m for m, _ in made], np.array([q for _, q in made]), self.driver, self.output, errors)
+            ),
             driver=self.driver,
         )
 
