@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import copy
 from functools import cached_property
-from typing import TYPE_CHECKING, cast
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 
@@ -25,9 +25,8 @@ from mechgraph.synthesis.system import ArrowRows, RowNumbers
 from mechgraph.synthesis.unknowns import UnknownPlace
 from mechgraph.variants.numbers import MARKER
 
-if TYPE_CHECKING:
-    from mechgraph.modes.form import RodSystem
-    from mechgraph.synthesis.classes import TaskClass
+TaskClass: TypeAlias = Any
+"""See ``synthesis.classes``, which stands on this module."""
 
 
 @dataclass(frozen=True)
@@ -284,7 +283,7 @@ def compiled_tracks(of: TaskClass) -> CompiledTracks | None:
     if p.rates or not known:
         return None
     places = [(k, q) for k, own in enumerate(p.places) for q in own if q.array in MARKER]
-    rods, ways = (p.rods, cast("RodSystem", s).ways) if isinstance(p, RodProblem) else ([], np.zeros(0))
+    rods, ways = (p.rods, cast("Any", s).ways) if isinstance(p, RodProblem) else ([], np.zeros(0))
     height = s.graph.loop_rows + len(p.whole.couplings) + len(rods)
     rows = list[LedRow]()
     for i in range(of.R):
