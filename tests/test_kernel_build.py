@@ -139,7 +139,7 @@ def test_pip_installs_with_a_compiler_and_without_one(version, found, compiled, 
     root = tmp_path / "clone"
     (root / FOLDER).mkdir(parents=True)
     made = {"calls.c": compiler.SOURCES[0], "compiler.py": Path(compiler.__file__)}
-    for name in ("calls.c", "derivative.c", "kernel.c", "kernel.h", "motion.c", "compiler.py"):
+    for name in ("calls.c", "derivative.c", "kernel.c", "kernel.h", "motion.c", "tracks.c", "compiler.py"):
         (root / FOLDER / name).write_text(
             made[name].read_text(encoding="utf-8") if name in made else "typedef int none;\n"
         )
@@ -164,6 +164,7 @@ def test_pip_installs_with_a_compiler_and_without_one(version, found, compiled, 
         for what in ("SOURCES", "INCLUDED"):
             files = [root / FOLDER / file.name for file in REAL[what]]
             monkeypatch.setattr(compiler, what, files)
+        monkeypatch.setattr(compiler, "TRACKS", root / FOLDER / "tracks.c")
         build.installed.cache_clear()
         assert build.installed().answer() == 42
     else:

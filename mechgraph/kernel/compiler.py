@@ -19,6 +19,9 @@ from pathlib import Path
 SOURCES = tuple(Path(__file__).with_name(name) for name in ("calls.c", "derivative.c"))
 """What is compiled."""
 INCLUDED = tuple(Path(__file__).with_name(name) for name in ("kernel.c", "kernel.h", "motion.c"))
+"""What that includes, and written controllers too."""
+TRACKS = Path(__file__).with_name("tracks.c")
+"""What derivatives include beside it."""
 FLAGS = ("-O3", "-std=c99", "-ffp-contract=off", "-shared", "-fPIC")
 """No -march and no -ffast-math: the same bits from one build, and from one source the same on every machine to rounding."""
 LONGEST_BUILD = 600.0
@@ -57,7 +60,7 @@ def suffix(target: str = "") -> str:
 
 def key() -> str:
     """What a library is made of: the texts of the kernel, and the options."""
-    return _digest(*(file.read_bytes() for file in (*SOURCES, *INCLUDED)), " ".join(FLAGS).encode())
+    return _digest(*(file.read_bytes() for file in (*SOURCES, *INCLUDED, TRACKS)), " ".join(FLAGS).encode())
 
 
 def platform() -> str:

@@ -77,3 +77,5 @@ int mgk_derivative(const int *I, const double *P, const double *dP, int count, v
   }
   return MGK_OK;
 }
+
+#include "tracks.c"

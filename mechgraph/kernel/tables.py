@@ -183,7 +183,7 @@ def layout(system: System, drives: Index, passive: Sequence[PassiveMotion]) -> L
     place[unknown] = np.arange(len(unknown))
     tree = g.steps.copy()
     tree[:, 1] = tree[:, 1] > 0
-    loop, pair, sign = _fundamental(s)
+    loop, pair, sign = fundamental(s)
     rows = _coupling_rows(s)
     term_rows, term_columns = (rows[0].term_rows, rows[0].term_columns) if rows else np.zeros((2, 0), dtype=np.intp)
     K = len(s.m.couplings)
@@ -238,7 +238,7 @@ def _factors(s: System) -> tuple[list[tuple[int, _Step]], list[int], tuple[list[
     return steps, first, (frames, at_b)
 
 
-def _fundamental(s: System) -> tuple[Index, Index, Index]:
+def fundamental(s: System) -> tuple[Index, Index, Index]:
     """Loop, pair and sign of all steps of the loops that each chord closes with the tree."""
     ways: list[dict[int, int]] = [{} for _ in s.m.links]
     for k, sign, parent, child in s.graph.tree:

@@ -10,12 +10,12 @@ the size wanted (Allgower and Georg, Introduction to Numerical Continuation Meth
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from contextlib import suppress
 from contextvars import ContextVar
 from dataclasses import field, replace
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,7 +109,35 @@ class Equations:
         return np.asarray(size.max(axis=0, initial=0.0))
 
 
-class Leg:
+class Corrected(NamedTuple):
+    """Predictions corrected by two Newton steps: states, rates of these, sizes of both steps, their noise, and idle motions."""
+
+    x: Array
+    v: Array
+    sizes: Sequence[Array]
+    noise: Array
+    idle: Array
+
+
+class Ways:
+    """What ways of all kinds have in common."""
+
+    equations: Any
+    at: Callable[..., Any]
+
+    def corrected(self, x: Array, t: Array, dt: Array, tracks: Index, idle: Array) -> Corrected:
+        """Predictions ``x (nx, T)`` at ``t (T,)`` corrected, with rates ``dt`` times those with ``t``."""
+        eq = self.equations
+        here = self.at(eq.normal(x), t, tracks)
+        one = here.newton(idle)
+        here = here.again(eq.advance(here.x, one))
+        two = here.newton(idle)
+        sizes = [eq.size(here.x, d) for d in (one, two)]
+        rates, idle = here.rates(idle)
+        return Corrected(eq.advance(here.x, two), eq.state_rates(here.x, rates) * dt, sizes, here.noise, idle)
+
+
+class Leg(Ways):
     """The ways between members ``begin`` and ``end``, one or several; ``which (V,)`` says which of them a track follows."""
 
     def __init__(self, equations: Equations, begin: Member, end: Member, which: Index | None = None) -> None:
@@ -367,24 +395,13 @@ class _March:
 
     def step(self, care: Care) -> tuple[Mask, Mask]:
         """One step of all tracks; which have ended, and which are on their way to infinity."""
-        leg, eq = self.leg, self.leg.equations
         s = np.minimum(self.s[0] + self.h, 1.0)
         h = s - self.s[0]
         tracks = self.every[self.who] + self.lap * self.stride
         with np.errstate(all="ignore"):
-            x = eq.normal(self.x + self._ahead(h))
             t, dt = self.way(s)
-            here = leg.at(x, t, tracks)
-            one = here.newton(self.idle)
-            x = eq.advance(here.x, one)
-            here = here.again(x)
-            two = here.newton(self.idle)
-            sizes = [eq.size(x, d) for d in (one, two)]
-            noise = here.noise
+            x, v, sizes, noise, idle = self.leg.corrected(self.x + self._ahead(h), t, dt, tracks, self.idle)
             good = (sizes[0] <= care.most) & (sizes[1] <= 0.1 * sizes[0] + np.clip(noise, 1e-10, care.aim))
-            rates, idle = here.rates(self.idle)
-            v = eq.state_rates(here.x, rates) * dt
-            x = eq.advance(here.x, two)
         good &= np.isfinite(v).all(axis=0)
         order = 1.0 / (1.0 + np.minimum(self.known + 1, RATES_KEPT))
         grown = h * np.clip((care.aim / np.maximum(sizes[0], 1e-12)) ** order, 0.4, 2.0)
@@ -398,7 +415,7 @@ class _March:
             newest[..., at] = new[..., at]
         self.known[at] += 1
         self.x[:, at], self.idle[at] = x[:, at], idle[at]
-        return self.s[0] >= 1.0, eq.far(self.x)
+        return self.s[0] >= 1.0, self.leg.equations.far(self.x)
 
     def _ahead(self, h: Array) -> Array:
         """Increments ``(nx, T)`` of the states over steps ``h``: the polynomial through the rates of the last nodes, integrated.

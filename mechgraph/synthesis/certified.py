@@ -16,7 +16,8 @@ from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import MODES
 from mechgraph.modes.certificate import UP, Ball, Certificate, MovedMarker, Open, curvature, exact, root_near, rows
-from mechgraph.synthesis.classes import ClassMember, TaskClass
+from mechgraph.synthesis.classes import TaskClass
+from mechgraph.synthesis.legs import ClassMember
 from mechgraph.synthesis.system import RowNumbers, RowProblem
 
 

@@ -3,15 +3,11 @@
 Known dimensions move as in ``modes.family``, such that loops keep the groups in which they move; what is asked is whatever a random
 mechanism does at random positions, so that a class holds tasks which can be done. Of every row of the task as many equations count as
 the closure has independent ones in its coordinates and the unknowns; beyond the coordinates that it settles these are its conditions.
-
-A step of Newton's method eliminates row by row: with ``J_i dq_i + B_i dz = b_i`` and ``N_i`` the left null space of ``J_i``, at last
-
-    (N_i B_i) dz = N_i b_i,    dq_i = J_i^+ (b_i - B_i dz).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from copy import copy
 from functools import cached_property
 
@@ -25,45 +21,11 @@ from mechgraph.maths.linear import complement, rank_of, singular_values
 from mechgraph.maths.newton import least_norm_steps
 from mechgraph.maths.se3 import Index, cross, finite_twist, inverse, move_twist, pose_exp, rotation_exp
 from mechgraph.maths.tolerances import MODES
-from mechgraph.memo import dataclass
 from mechgraph.modes.family import Array, Family, common, generated
-from mechgraph.modes.homotopy import ENDLESS_STATE, Equations, Mask, rounding, solved
+from mechgraph.modes.homotopy import ENDLESS_STATE, Equations, Mask
+from mechgraph.synthesis.legs import ClassMember, CompiledRows, RowBlock, TaskLeg
 from mechgraph.synthesis.rods import RodProblem, rods_of
 from mechgraph.synthesis.system import ArrowRows, RowNumbers, RowProblem
-from mechgraph.synthesis.unknowns import UnknownPlace
-from mechgraph.variants.numbers import MARKER
-
-
-@dataclass(frozen=True)
-class ClassMember:
-    """Mechanisms, their ``numbers`` of markers, and the values asked of them ``drive (R, d, n)``; what is not asked is ignored."""
-
-    numbers: RowNumbers
-    drive: Array
-
-    def taken(self, which: Index) -> ClassMember:
-        """Some of them; one serves for all."""
-        return self if self.drive.shape[-1] == 1 else ClassMember(self.numbers.taken(which), self.drive[..., which])
-
-    @staticmethod
-    def joined(members: Sequence[ClassMember]) -> ClassMember:
-        """Several, one after the other."""
-        drive = np.concatenate([m.drive for m in members], axis=-1)
-        return ClassMember(RowNumbers.joined([m.numbers for m in members]), drive)
-
-
-@dataclass(frozen=True)
-class RowBlock:
-    """Rows ``rows (G,)`` of equal shape.
-
-    Of their equations the combinations ``mixing (G, rank, n)`` are independent, of their coordinates ``ways (G, F, f)`` are free, and so
-    many combinations are ``settled``: along passive motions, which the equations leave free, nothing moves.
-    """
-
-    rows: Index
-    settled: int
-    ways: Array
-    mixing: Array | None
 
 
 class NoClass(Exception):
@@ -141,6 +103,7 @@ class TaskClass:
         if self.problem is self.whole and not self.followed.any():
             return self
         out = copy(self)
+        vars(out)["compiled"] = None
         out._lay_out(self.whole)
         out._of_rows(Configuration(self.whole.system, self.whole.at_rest[:, None]))
         # what is lifted needs places in states alone
@@ -485,15 +448,21 @@ class TaskClass:
         return self.told(x)
 
     def told(self, x: Array) -> Array:
-        """Unknowns ``(u, T)`` at states, those that count whole turns too as ``exp(2 pi i z / p)`` of their periods ``p``."""
-        out, p = x[: self.u], self.problem.periods[:, None]
-        turning = np.isfinite(p)
-        with np.errstate(over="ignore"):
-            return (
-                np.where(turning, np.exp(2j * np.pi * out / np.where(turning, p, 1.0)), out) if turning.any() else out
-            )
+        """Unknowns ``(u, T)`` at states; those that whole turns change as what is the same for all of these."""
+        turns, out = self.problem.turns, x[: self.u]
+        if turns.whole:
+            told = turns.told @ out[turns.which]
+            told[: turns.whole] = np.exp(2j * np.pi * told[: turns.whole])
+            out = out.astype(complex)
+            out[turns.which] = told
+        return out
 
     # --- equations ---------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def compiled(self) -> CompiledRows | None:
+        """The rows for the kernel, where it serves them."""
+        return CompiledRows.of_class(self)
 
     def leg(self, begin: ClassMember, end: ClassMember, which: Index | None = None) -> TaskLeg:
         """The ways between members."""
@@ -555,175 +524,3 @@ def _closed(system: System, x: Array) -> tuple[Array, Array]:
 
 def _rank(A: Array) -> int:
     return rank_of(singular_values(A), MODES.generic) if A.size else 0
-
-
-def _beneath(values: Array, T: int) -> Array:
-    """``(G, T, n, k)`` of rows, one beneath the other ``(T, G n, k)``."""
-    return values.swapaxes(0, 1).reshape(T, -1, values.shape[3])
-
-
-class TaskLeg:
-    """Straight ways between members ``begin`` and ``end``, one or several; ``which (V,)`` says which of them a track follows."""
-
-    def __init__(self, of: TaskClass, begin: ClassMember, end: ClassMember, which: Index | None = None) -> None:
-        self.equations, self.begin, self.end, self._which = of, begin, end, which
-        M0, M1 = begin.numbers.poses, end.numbers.poses
-        R = np.einsum("ijspb,kjspb->ikspb", M1[:, :3], M0[:, :3])
-        turned = np.einsum("ijspb,jspb->ispb", R, M0[:, 3])
-        eta = finite_twist(R, M1[:, 3] - turned, np.zeros_like(turned))
-        eta[:, of.turning.reshape(2, -1)] = 0.0
-        # rounding of a pose that stands still
-        self._eta = np.where(np.abs(eta).max(axis=(0, 3), keepdims=True) > MODES.slide, eta, 0.0)
-        self._change = [
-            np.where(of.turning.reshape(2, 1, -1, 1), b - a, 0.0)
-            for a, b in zip(begin.numbers.vectors, end.numbers.vectors, strict=True)
-        ]
-        sought = {(p.array, *p.index) for own in of.problem.places for p in own}
-        plain = {name: getattr(end.numbers, name) - getattr(begin.numbers, name) for name in ("pitch", "couplings")}
-        self.plain = {
-            UnknownPlace(name, 0, i, i if name == "pitch" else -1): change
-            for name, changes in plain.items()
-            for i, change in enumerate(changes)
-            if change.any() and (name, i) not in sought
-        }
-        moves = (self._eta != 0).any(axis=(0, 3)) | np.any([(c != 0).any(axis=(1, 3)) for c in self._change], axis=0)
-        self.moving = np.flatnonzero(moves.ravel())
-
-    def prints(self, x: Array, t: Array, tracks: Index) -> Array:
-        """What tells mechanisms apart."""
-        return self.equations.told(x)
-
-    def at(self, x: Array, t: Array, tracks: Index) -> Arrow:
-        """The equations at states of tracks at ``t (T,)``."""
-        return Arrow(self, t, tracks, x)
-
-    def member(self, t: Array, tracks: Index) -> tuple[ClassMember, Array, Array, dict[UnknownPlace, Array]]:
-        """Members on the way, with the rates of what is asked ``(R, d, T)``, of all vectors ``(3, 3, 2, P, T)``, and of other numbers."""
-        if self._which is None:
-            begin, last, eta, change = self.begin, self.end.drive, self._eta, [*self._change, *self.plain.values()]
-        else:
-            which, moved = self._which[tracks], (self.end.drive, self._eta, *self._change, *self.plain.values())
-            begin, (last, eta, *change) = (
-                self.begin.taken(which),
-                (v[..., which] if v.shape[-1] > 1 else v for v in moved),
-            )
-        change, plain = change[:3], dict(zip(self.plain, change[3:], strict=True))
-        X = pose_exp(t * eta)
-        vectors = begin.numbers.moved(X).vectors
-        w, (point, axis, second) = eta[:3], (v.swapaxes(0, 1) for v in vectors)
-        rates = np.stack([cross(w, point) + eta[3:], cross(w, axis), cross(w, second)])
-        rates = rates + np.stack([c.swapaxes(0, 1) for c in change])
-        numbers = begin.numbers.with_vectors(*(v + t * c for v, c in zip(vectors, change, strict=True)))
-        if plain:
-            values = np.array([begin.numbers.at([p]) + t * c for p, c in plain.items()])
-            numbers = numbers.with_values([[p] for p in plain], values)
-        drive = last - begin.drive
-        return ClassMember(numbers, begin.drive + t * drive), drive, rates, plain
-
-
-class Arrow:
-    """The equations linearized at a batch of states, row by row."""
-
-    def __init__(self, leg: TaskLeg, t: Array, tracks: Index, x: Array) -> None:
-        self.leg, self.of = leg, leg.equations
-        self.member, self._change, self._rates, self._plain = leg.member(t, tracks)
-        self.rows = self.of.at(self.member, x)
-
-    @cached_property
-    def x(self) -> Array:
-        """The states."""
-        return self.of.state(self.rows)
-
-    def again(self, x: Array) -> Arrow:
-        """The equations of the same members at other states."""
-        out = copy(self)
-        for name in ("x", "_factored"):
-            vars(out).pop(name, None)
-        out.rows = self.of.at(self.member, x)
-        return out
-
-    def idle(self) -> Array:
-        """None: what equations leave free stays at rest in the least norm."""
-        return np.zeros((self.rows.T, 0, 0))
-
-    @property
-    def noise(self) -> Array:
-        """Rounding ``(T,)`` to be expected of a Newton step."""
-        size = np.abs(self.rows.here.poses).max(axis=(0, 1, 2)).reshape(-1, self.rows.T).max(axis=0)
-        lengths = np.maximum(size, np.abs(self.x[: self.of.u]).max(axis=0, initial=1.0))
-        # of rows in squares of lengths; seen at tracks on which these are thousands
-        return 6.0 * rounding(np.cbrt(size * lengths**2))
-
-    def _mixed(self, block: RowBlock, values: Array) -> Array:
-        """``(R, n, k, T)`` as the combinations of every row of a block, ``(G, T, rank, k)``."""
-        own = values[block.rows].transpose(0, 3, 1, 2)
-        mixed = own if block.mixing is None else block.mixing[:, None] @ own
-        return np.where(np.isfinite(mixed), mixed, 0.0)
-
-    @cached_property
-    def _factored(self) -> tuple[list[tuple[Array, Array, Array]], Array]:
-        """``N_i``, ``J_i^+`` and ``B_i`` ``(G, T, ., .)`` of the rows of all blocks, and the matrix of the unknowns."""
-        out, T = [], self.rows.T
-        for block in self.of.blocks:
-            J, B = (self._mixed(block, v) for v in (self.rows.by_coordinates, self.rows.by_unknowns))
-            J, n = J @ block.ways[:, None], block.settled
-            if n < J.shape[3]:
-                # of passive motions, which a moving frame of the states turns, only the least norm is never led astray
-                Q, sigma, V = np.linalg.svd(J)
-                back = V[..., :n, :].conj().swapaxes(2, 3) / np.maximum(sigma[..., None, :n], 1e-300)
-            else:
-                Q, upper = np.linalg.qr(J, mode="complete")
-                back = np.linalg.inv(
-                    upper[:, :, :n] + np.where(np.eye(n, dtype=bool) & (upper[:, :, :n] == 0), 1e-300, 0.0)
-                )
-            back = block.ways[:, None] @ back @ Q[..., :n].conj().swapaxes(2, 3)
-            out.append((Q[..., n:].conj().swapaxes(2, 3), back, B))
-        return out, np.concatenate([_beneath(N @ B, T) for N, _, B in out], axis=1)
-
-    @property
-    def matrix(self) -> Array:
-        """The matrix of the unknowns ``(T, u, u)``, all else eliminated."""
-        return self._factored[1]
-
-    def solve(self, right: Array, by: Callable[[Array, Array], Array] = solved) -> Array:
-        """Increments ``(head + R F, T)`` for a right side ``(R, n, T)``; NaN where singular, unless ``by`` knows more."""
-        of, (parts, S) = self.of, self._factored
-        T, b = self.rows.T, [self._mixed(block, right[:, :, None]) for block in of.blocks]
-        dz = by(S, np.concatenate([_beneath(N @ own, T) for (N, _, _), own in zip(parts, b, strict=True)], axis=1))
-        dq = np.zeros((of.R, of.F, T), dtype=complex)
-        for block, (_, back, B), own in zip(of.blocks, parts, b, strict=True):
-            dq[block.rows] = (back @ (own - B @ dz))[..., 0].swapaxes(1, 2)
-        return np.concatenate([dz[:, :, 0].T, np.zeros((of.W, T)), dq.reshape(of.R * of.F, T)])
-
-    def newton(self, idle: Array) -> Array:
-        """The Newton step."""
-        return self.solve(-self.rows.residual)
-
-    def rates(self, idle: Array) -> tuple[Array, Array]:
-        """Rates of increments with ``t``."""
-        of, columns = self.of, self.of.columns
-        change = np.where(of.given[:, :, None], self._change * of.problem.factors(self.rows.numbers), 0.0)
-        J = self.rows.by_coordinates
-        opened = np.einsum("rndt,rdt->rnt", J[:, :, columns], np.broadcast_to(change, (*change.shape[:2], self.rows.T)))
-        if (moving := self.leg.moving).size:
-            P = len(of.problem.order)
-            side, pair = moving // P, moving % P
-            opened = opened + self.rows.moved(side, pair, self._known_rates()[:, :, side, pair]).sum(axis=2)
-        for place, change_of in self._plain.items():
-            opened = opened + self.rows.by_number(place) * change_of
-        out = self.solve(-opened)
-        whole, factor_of = out[of.head :].reshape(of.R, of.F, -1), of.problem.factor_of
-        if (scaled := factor_of >= 0).any() and self.rows.drive is not None:
-            first = of.u - 1 - factor_of.max()
-            change[:, scaled] += self.rows.drive[:, scaled] * out[first + factor_of[scaled]]
-        for i, given in enumerate(of.given):
-            whole[i][columns[given]] = change[i, given]
-        return out, idle
-
-    def _known_rates(self) -> Array:
-        """Rates ``(3, 3, 2, P, T)`` of points, axes and second directions that are known."""
-        out = self._rates.copy()
-        for places in self.of.problem.places:
-            for p in (p for p in places if p.array in MARKER):
-                out[MARKER.index(p.array), p.component, p.side, p.pair] = 0.0
-        return out

@@ -26,7 +26,8 @@ from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
 from mechgraph.modes.family import Array, same_back
 from mechgraph.modes.homotopy import polished
-from mechgraph.synthesis.classes import ClassMember, TaskClass
+from mechgraph.synthesis.classes import TaskClass
+from mechgraph.synthesis.legs import ClassMember
 from mechgraph.synthesis.system import RowProblem
 from mechgraph.variants.numbers import MARKER
 
