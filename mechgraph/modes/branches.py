@@ -433,7 +433,10 @@ class _Mapper:
 
     def _stretches(self, states: list[Array]) -> tuple[list[Stretch], list[tuple[Stretch, Stretch]], int]:
         """The branches on which assemblies ``states[i] (nx, M_i)`` at samples lie, pairs that meet in folds, open ends of those on none."""
-        q, s, family, S = self.q, self.q.system, self.q.family, self.count
+        q, s, family = self.q, self.q.system, self.q.family
+        # the position beside the start counts as that of a further sample, which may be the only one on its circuit
+        states = [*states, q.start.x]
+        values, S = np.append(q.drive[self.place], q.start.x[s.single_rows[self.column]]), len(states)
         prints = [family.prints(Configuration(s, x)) for x in states]
         left, rank = [np.ones(x.shape[1], dtype=bool) for x in states], s.n_freedoms - 1 - family.idle.shape[1]
         out, pairs, still, passed = list[Stretch](), list[tuple[Stretch, Stretch]](), list[Array](), list[Array]()
@@ -442,7 +445,7 @@ class _Mapper:
             start = np.flatnonzero(left[i])
             others = np.delete(q.columns, self.place)
             of = Circuits(family, s, self.column, rank, states[i][:, start], others, self.rims)
-            step, k, value = of.steps_at(np.repeat(np.arange(of.V), S), np.tile(q.drive[self.place], of.V))
+            step, k, value = of.steps_at(np.repeat(np.arange(of.V), S), np.tile(values, of.V))
             x, met = of.states(step, value)
             there = family.prints(Configuration(s, x))
             for case in range(of.V):
@@ -457,7 +460,8 @@ class _Mapper:
                     if gaps.min(initial=np.inf) < MODES.arrives * max(1.0, float(np.abs(there[:, j]).max())):
                         mode = int(np.argmin(gaps))
                         left[sample][mode] = False
-                        places.setdefault(int(of.run[step[j]]), []).append((sample, mode, float(value[j])))
+                        at = [(sample, mode, float(value[j]))] * (sample < self.count)
+                        places.setdefault(int(of.run[step[j]]), []).extend(at)
                 more = self._of(of, case, places)
                 out += more
                 ring = of.closes[case] and not of.turns[case]
@@ -475,7 +479,7 @@ class _Mapper:
         """The branches of a circuit; of each the ``places`` of assemblies: number of the sample and its own there, driver value."""
         out, turns = [], int(of.turns[case])
         for run in np.unique(of.run[of.a.case == case]).tolist():
-            at = places.get(run, [(len(of.run), 0, 0.0)])
+            at = places.get(run) or [(len(of.run), 0, 0.0)]
             sample, mode, begin = min(at) if turns else min(at, key=lambda one: one[2])
             out.append(Stretch(of, run, turns, (turns > 0, sample, mode), begin))
         return out
