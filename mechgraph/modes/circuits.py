@@ -31,7 +31,7 @@ from mechgraph.modes.family import NO_NUMBERS, Family
 
 
 @dataclass
-class Nodes:
+class CircuitNodes:
     """States ``x (nx, T)`` of mechanisms ``case (T,)`` at places along their circuits, and what is known there.
 
     ``t (F, T)``: the motion, of unit size; ``J = U diag(S) V^T``, there or at a neighbor, of which the last columns of ``U (m, m, T)`` are
@@ -48,16 +48,16 @@ class Nodes:
     V: Array
     meets: Mask
 
-    def taken(self, which: Any) -> Nodes:
+    def taken(self, which: Any) -> CircuitNodes:
         """Some of them."""
-        return Nodes(*(v[..., which] for v in vars(self).values()))
+        return CircuitNodes(*(v[..., which] for v in vars(self).values()))
 
-    def put(self, which: Index, new: Nodes) -> None:
+    def put(self, which: Index, new: CircuitNodes) -> None:
         """Put others in the places of some."""
         for mine, other in zip(vars(self).values(), vars(new).values(), strict=True):
             mine[..., which] = other
 
-    def leads_to(self, other: Nodes) -> Mask:
+    def leads_to(self, other: CircuitNodes) -> Mask:
         """Whether the closure is singular nowhere between: ``D = S^-1 U^T J V``, 1 here, has no eigenvalue there beyond zero.
 
         One changes its sign where a step leads from one of two circuits that nearly meet straight on to the other, and where they meet.
@@ -71,10 +71,10 @@ class Nodes:
         return np.asarray(out)
 
     @staticmethod
-    def joined(parts: Iterable[Nodes]) -> Nodes:
+    def joined(parts: Iterable[CircuitNodes]) -> CircuitNodes:
         """All of them, one circuit after the other, in the order of their places."""
         columns = zip(*(vars(part).values() for part in parts), strict=True)
-        out = Nodes(*(np.concatenate(column, axis=-1) for column in columns))
+        out = CircuitNodes(*(np.concatenate(column, axis=-1) for column in columns))
         return out.taken(np.lexsort((out.place, out.case)))
 
 
@@ -86,7 +86,7 @@ class Circuits:
 
     Attributes
     ----------
-    a, b : Nodes
+    a, b : nodes
         Ends of all steps, one circuit after the other; closed circuits with folds are laid out from one of these to itself.
     run, of_branch, rises (steps,)
         The branch of every step: its number among all; on its circuit, 0 that through ``x``; 1 where the driver rises, else -1.
@@ -137,7 +137,7 @@ class Circuits:
         """Mechanisms at states ``(nx, T)``."""
         return Configuration(self.s.cases(case), x)
 
-    def at(self, x: Array, case: Index, beside: Nodes | None = None) -> tuple[Array, Nodes]:
+    def at(self, x: Array, case: Index, beside: CircuitNodes | None = None) -> tuple[Array, CircuitNodes]:
         """Least Newton steps ``(F, T)`` at states, and what is known there.
 
         With nodes ``beside`` them motions are those with ``[[J, U], [N^T, 0]]``, bordered by what no motion meets and by motions there.
@@ -171,11 +171,11 @@ class Circuits:
         else:
             U, S, V = beside.U, beside.S, beside.V
         nothing = np.zeros(T)
-        return step[:, :, 0].T, Nodes(case, nothing, x, N[:, :, 0].T.copy(), J, U, S, V, nothing > 0)
+        return step[:, :, 0].T, CircuitNodes(case, nothing, x, N[:, :, 0].T.copy(), J, U, S, V, nothing > 0)
 
     def closed(
-        self, x: Array, case: Index, ahead: Array, goal: Array | None = None, beside: Nodes | None = None
-    ) -> tuple[Nodes, Array]:
+        self, x: Array, case: Index, ahead: Array, goal: Array | None = None, beside: CircuitNodes | None = None
+    ) -> tuple[CircuitNodes, Array]:
         """Nodes near states ``(nx, T)``, with motions that lead ``ahead (F, T)``, where the driver has the values of a ``goal (T,)``; and
         the last Newton steps.
         """
@@ -193,7 +193,7 @@ class Circuits:
         node.t *= np.where((node.t * ahead).sum(axis=0) < 0, -1.0, 1.0)
         return node, last
 
-    def _followed(self) -> Nodes:
+    def _followed(self) -> CircuitNodes:
         """Nodes along all circuits, by steps both ways until these meet or end; places count them."""
         s, lengths = self.s, self.s.single_rows[self.s.is_length]
         case, sense = np.repeat(np.arange(self.V), 2), np.tile([1.0, -1.0], self.V)
@@ -202,7 +202,7 @@ class Circuits:
         self.dead = (rate <= MOTIONS.dependent * np.abs(last.t).max(axis=0))[::2]
         last.t *= sense * np.where(last.t[self.column] < 0, -1.0, 1.0)
         low, high = self.ends[:, case]
-        h, wide, going, out = np.full(2 * self.V, 0.25), np.zeros(2 * self.V), ~self.dead[case], list[Nodes]()
+        h, wide, going, out = np.full(2 * self.V, 0.25), np.zeros(2 * self.V), ~self.dead[case], list[CircuitNodes]()
         before, closing = last.taken(np.arange(2 * self.V)), np.zeros(self.V, dtype=bool)
         ending = np.zeros(2 * self.V, dtype=bool)
 
@@ -238,15 +238,19 @@ class Circuits:
             good = (size <= np.where(leap, 1e-5, 0.1)) & (np.abs(two).max(axis=0) <= 0.1 * size + 1e-9)
             good &= (np.abs(turn) > 0.7) & np.isfinite(new.x).all(axis=0) & (leap | straight)
             # ends of ranges are come to by shorter steps, each to where the last one tells
-            left, over = -beyond_end(here.x, at), beyond_end(new.x, at)
+            over = beyond_end(new.x, at)
             cut = good & (over > BEYOND_END)
             ending[at[cut]], good = True, good & ~cut
             longest = 1.0 * np.maximum(1.0, np.abs(new.x[lengths]).max(axis=0, initial=0.0))
             grown = ahead * np.clip((0.03 / np.maximum(size, 1e-12)) ** 0.25, 0.5, 2.0)
             h[at] = np.where(good, np.minimum(grown, longest), 0.4 * ahead)
-            h[at[cut]] = ahead[cut] * np.clip(left[cut] / (left[cut] + over[cut]), 0.0, 0.9)
-            going[at[(~good & leap) | (good & (over >= -BEYOND_END)) | (cut & (left <= BEYOND_END))]] = False
-            out += [replace(here, t=here.t * sense[at], meets=~straight).taken(leap & good)]
+            going[at[(~good & leap & ~cut) | (good & (over >= -BEYOND_END))]] = False
+            if cut.any():
+                left = -beyond_end(here.x[:, cut], at[cut])
+                h[at[cut]] = ahead[cut] * np.clip(left / (left + over[cut]), 0.0, 0.9)
+                going[at[cut]] = left > BEYOND_END
+            if (leap & good).any():
+                out.append(replace(here, t=here.t * sense[at], meets=~straight).taken(leap & good))
             on, new, here = at[good], new.taken(good), here.taken(good)
             long = self._way(here, new)[1] > 1e-4
             before.put(on[long], here.taken(long))
@@ -254,12 +258,12 @@ class Circuits:
             wide[on] = self._way(before.taken(on), new)[1]
             out.append(replace(new, t=new.t * sense[on]))
             going &= np.abs(last.x[lengths]).max(axis=0, initial=0.0) <= FARTHEST
-        nodes = Nodes.joined(out)
+        nodes = CircuitNodes.joined(out)
         # of nodes that are told twice the second one says whether circuits meet
         again = (np.diff(nodes.case, append=-1) == 0) & (np.diff(nodes.place, append=0) == 0)
         return nodes.taken(~again)
 
-    def _meet(self, last: Nodes, h: Array, going: Mask, closing: Mask) -> None:
+    def _meet(self, last: CircuitNodes, h: Array, going: Mask, closing: Mask) -> None:
         """See which of both ways come together, and let the first one end at the other."""
         d, ahead, behind, facing = self._apart(last)
         # the last step leads to the end of the other way, or straight over it, or these were parts of a circuit that pass each other
@@ -287,7 +291,7 @@ class Circuits:
         for way in (h[::2], h[1::2]):
             way[apart] = np.minimum(way, np.maximum(d / 3.0, 1e-5))[apart]
 
-    def _apart(self, last: Nodes) -> tuple[Array, Array, Array, Array]:
+    def _apart(self, last: CircuitNodes) -> tuple[Array, Array, Array, Array]:
         """How far the ends of both ways are from each other, how far that leads on along each of them, and the cosine between these."""
         y, t = self.s.difference(last.x[:, 1::2], last.x[:, ::2]), last.t[self.settled]
         y[self.back] -= self.s.rounds(self.back, y[self.back])
@@ -297,19 +301,19 @@ class Circuits:
         y, a, b = y / size, a / size, b / size
         return np.sqrt((y * y).sum(axis=0)), (a * y).sum(axis=0), (b * y).sum(axis=0), (a * b).sum(axis=0)
 
-    def _way(self, a: Nodes, b: Nodes) -> tuple[Array, Array]:
+    def _way(self, a: CircuitNodes, b: CircuitNodes) -> tuple[Array, Array]:
         """Increments ``(F, T)`` between nodes, without passive motions, and lengths of the arcs."""
         y, idle = self.s.difference(b.x, a.x), a.V[:, len(a.S) + 1 :]
         y = y - np.einsum("fkt,gkt,gt->ft", idle, idle, y)
         half = 0.5 * np.arccos(np.clip((a.t * b.t).sum(axis=0), -1.0, 1.0))
         return y, np.sqrt((y * y).sum(axis=0)) / np.sinc(half / np.pi)
 
-    def _between(self, a: Nodes, b: Nodes, part: Array) -> Array:
+    def _between(self, a: CircuitNodes, b: CircuitNodes, part: Array) -> Array:
         """States at parts of the arcs between nodes."""
         y, w = self._way(a, b)
         return self.s.advance(a.x, cubic(y, a.t, self.s.tangent(y, b.t), w, part * w))
 
-    def _whole(self, nodes: Nodes) -> Nodes:
+    def _whole(self, nodes: CircuitNodes) -> CircuitNodes:
         """The nodes closed to rounding; a circuit that comes back ends with its beginning, whole turns further."""
         places, meets, (nodes, _) = nodes.place, nodes.meets, self.closed(nodes.x, nodes.case, nodes.t)
         nodes.place, nodes.meets = places, meets
@@ -322,11 +326,11 @@ class Circuits:
         return nodes
 
     @staticmethod
-    def _ends(nodes: Nodes, case: Index) -> tuple[Index, Index]:
+    def _ends(nodes: CircuitNodes, case: Index) -> tuple[Index, Index]:
         """Places of the first and the last node of some circuits."""
         return np.searchsorted(nodes.case, case), np.searchsorted(nodes.case, case, side="right") - 1
 
-    def _with_folds(self, nodes: Nodes) -> Nodes:
+    def _with_folds(self, nodes: CircuitNodes) -> CircuitNodes:
         """The nodes, with others at folds, between which the driver rises or falls."""
         # times that nodes are put where the rate of the driver vanishes, or is least
         for _ in range(8):
@@ -349,16 +353,16 @@ class Circuits:
             part = np.where(fold[some], np.where((one >= 0) & (one <= 1), one, other), least[some])
             more, _ = self.closed(self._between(a, b, part), a.case, a.t + b.t)
             more.place = a.place + part * (b.place - a.place)
-            nodes = Nodes.joined([nodes, more])
+            nodes = CircuitNodes.joined([nodes, more])
         return nodes
 
     @staticmethod
-    def _steps(nodes: Nodes) -> tuple[Nodes, Nodes]:
+    def _steps(nodes: CircuitNodes) -> tuple[CircuitNodes, CircuitNodes]:
         """Neighbors on the same circuit."""
         left = np.flatnonzero(nodes.case[1:] == nodes.case[:-1])
         return nodes.taken(left), nodes.taken(left + 1)
 
-    def _unrolled(self, nodes: Nodes) -> Nodes:
+    def _unrolled(self, nodes: CircuitNodes) -> CircuitNodes:
         """Closed circuits with folds from the last of these before the first state on, or to the first one behind it, to the same again."""
         a, b = self._steps(nodes)
         rises = np.sign((b.x - a.x)[self.row])
@@ -381,7 +385,7 @@ class Circuits:
         sense = np.where(up, 1.0, -1.0)[again.case]
         again.x[rows] += sense * gained[:, again.case]
         again.place = again.place + sense * length[again.case]
-        return Nodes.joined([kept, again])
+        return CircuitNodes.joined([kept, again])
 
     def steps_at(self, case: Index, value: Array) -> tuple[Index, Index, Array]:
         """On which steps drivers of mechanisms have some values, but for whole turns; the number of each, and its value there."""
@@ -419,7 +423,7 @@ class Circuits:
                 ends_.put(np.flatnonzero(some), middle.taken(some))
         return x, met
 
-    def _met(self, a: Nodes, b: Nodes, value: Array) -> tuple[Nodes, Array]:
+    def _met(self, a: CircuitNodes, b: CircuitNodes, value: Array) -> tuple[CircuitNodes, Array]:
         """Nodes next to the arcs between others where the driver has some values, and the last Newton steps."""
         y, w = (b.x - a.x)[self.row], self._way(a, b)[1]
         ra, rb, off = a.t[self.column], b.t[self.column], a.x[self.row] - value
