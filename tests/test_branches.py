@@ -47,6 +47,17 @@ def test_a_double_rocker_turns_back_where_coupler_and_follower_are_in_line_and_i
     assert abs(caught.value.value["O0.Rz"] - upper) < 1e-8
 
 
+def test_the_circuit_of_the_start_is_found_between_samples_and_what_moves_most_at_its_folds() -> None:
+    """The crank swings by some 3 degrees, while coupler and follower fold through their line."""
+    a, coupler, c, d = 2.0, 0.5, 0.505, 3.0
+    m = linked_four_bar(a, coupler, c, d, 0.01)
+    b = mg.branches(m, "O0", samples=3, points=9)
+    fold = angle_at(a, d, coupler + c)
+    assert (b.circuits, b.full_turn, b.open_ends) == (((0, 1),), (False, False), 0)
+    assert np.allclose([f.value for f in b.folds], [-fold, fold], rtol=0, atol=1e-8)
+    assert {f.fastest for f in b.folds} == {"O2.Rz"}  # in line the coupler turns against the follower
+
+
 def test_a_parallelogram_has_its_branches_cross_and_all_are_one_circuit() -> None:
     b = mg.branches(linked_four_bar(1.0, 2.0, 1.0, 2.0, 0.5), "O0", samples=12, points=120)
     assert len(b.circuits) == 1

@@ -44,7 +44,7 @@ GOLDEN = 0.5 * (3.0 - 5.0**0.5)
 
 
 @dataclass(eq=False)
-class BranchStretch:
+class BranchRun:
     """A branch of some circuits by its number ``run`` there, which comes back after ``turns`` of the driver; 0 where it does not.
 
     ``told`` counts its ends that are folds or lie at an end of the range; ``key``, by which branches are ordered, is the place of its first
@@ -78,7 +78,7 @@ class Branch:
     full_turn: bool | None
     turns: int
     circuit: int
-    stretch: BranchStretch = field(repr=False)
+    stretch: BranchRun = field(repr=False)
 
 
 @dataclass(frozen=True)
@@ -431,25 +431,21 @@ class _Mapper:
         value *= self.unit
         return float(self.low + np.mod(value - self.low, 2 * np.pi)) if self.closed else value
 
-    def _stretches(
-        self, states: list[Array]
-    ) -> tuple[list[BranchStretch], list[tuple[BranchStretch, BranchStretch]], int]:
+    def _stretches(self, states: list[Array]) -> tuple[list[BranchRun], list[tuple[BranchRun, BranchRun]], int]:
         """The branches on which assemblies ``states[i] (nx, M_i)`` at samples lie, pairs that meet in folds, open ends of those on none."""
-        q, s, family, S = self.q, self.q.system, self.q.family, self.count
+        q, s, family = self.q, self.q.system, self.q.family
+        # the position beside the start counts as that of a further sample, which may be the only one on its circuit
+        states = [*states, q.start.x]
+        values, S = np.append(q.drive[self.place], q.start.x[s.single_rows[self.column]]), len(states)
         prints = [family.prints(Configuration(s, x)) for x in states]
         left, rank = [np.ones(x.shape[1], dtype=bool) for x in states], s.n_freedoms - 1 - family.idle.shape[1]
-        out, pairs, still, passed = (
-            list[BranchStretch](),
-            list[tuple[BranchStretch, BranchStretch]](),
-            list[Array](),
-            list[Array](),
-        )
+        out, pairs, still, passed = list[BranchRun](), list[tuple[BranchRun, BranchRun]](), list[Array](), list[Array]()
         while any(some.any() for some in left):
             i = int(np.argmax([some.sum() for some in left]))
             start = np.flatnonzero(left[i])
             others = np.delete(q.columns, self.place)
             of = Circuits(family, s, self.column, rank, states[i][:, start], others, self.rims)
-            step, k, value = of.steps_at(np.repeat(np.arange(of.V), S), np.tile(q.drive[self.place], of.V))
+            step, k, value = of.steps_at(np.repeat(np.arange(of.V), S), np.tile(values, of.V))
             x, met = of.states(step, value)
             there = family.prints(Configuration(s, x))
             for case in range(of.V):
@@ -464,7 +460,8 @@ class _Mapper:
                     if gaps.min(initial=np.inf) < MODES.arrives * max(1.0, float(np.abs(there[:, j]).max())):
                         mode = int(np.argmin(gaps))
                         left[sample][mode] = False
-                        places.setdefault(int(of.run[step[j]]), []).append((sample, mode, float(value[j])))
+                        at = [(sample, mode, float(value[j]))] * (sample < self.count)
+                        places.setdefault(int(of.run[step[j]]), []).extend(at)
                 more = self._of(of, case, places)
                 out += more
                 ring = of.closes[case] and not of.turns[case]
@@ -478,16 +475,16 @@ class _Mapper:
         return out, pairs, 2 * near.count(False)
 
     @staticmethod
-    def _of(of: Circuits, case: int, places: dict[int, list[tuple[int, int, float]]]) -> list[BranchStretch]:
+    def _of(of: Circuits, case: int, places: dict[int, list[tuple[int, int, float]]]) -> list[BranchRun]:
         """The branches of a circuit; of each the ``places`` of assemblies: number of the sample and its own there, driver value."""
         out, turns = [], int(of.turns[case])
         for run in np.unique(of.run[of.a.case == case]).tolist():
-            at = places.get(run, [(len(of.run), 0, 0.0)])
+            at = places.get(run) or [(len(of.run), 0, 0.0)]
             sample, mode, begin = min(at) if turns else min(at, key=lambda one: one[2])
-            out.append(BranchStretch(of, run, turns, (turns > 0, sample, mode), begin))
+            out.append(BranchRun(of, run, turns, (turns > 0, sample, mode), begin))
         return out
 
-    def _fold(self, a: BranchStretch, branches: list[int]) -> Fold:
+    def _fold(self, a: BranchRun, branches: list[int]) -> Fold:
         """The fold at the end of a branch."""
         of, last = a.of, np.flatnonzero(a.of.run == a.run)[-1]
         value = float(of.b.x[of.row, last]) * self.unit
@@ -496,7 +493,7 @@ class _Mapper:
         fastest = self.m.freedom_names()[int(np.argmax(np.abs(of.b.t[:, last])))]
         return Fold(value, int(of.rises[last]), (branches[0], branches[1]), fastest)
 
-    def _meetings(self, every: list[BranchStretch]) -> list[tuple[float, list[int], Array]]:
+    def _meetings(self, every: list[BranchRun]) -> list[tuple[float, list[int], Array]]:
         """Where circuits meet: driver values, numbers of branches, and what tells assemblies apart."""
         out: list[tuple[float, list[int], Array]] = []
         for i, one in enumerate(every):
@@ -517,7 +514,7 @@ class _Mapper:
         """The end of the range at which a driver value lies."""
         return next((rim for rim in self.rims or () if abs(value - rim) <= 2 * BEYOND_END), None)
 
-    def _grid(self, one: BranchStretch) -> Array:
+    def _grid(self, one: BranchRun) -> Array:
         """Driver values on a branch, internal units: its ends, all samples and values between."""
         s, n = self.q.drive[self.place], self.between
         step = (s[1] - s[0]) / n
@@ -533,7 +530,7 @@ class _Mapper:
         # rounding of driver values
         return np.concatenate([[low], grid[(grid > low + 1e-9) & (grid < high - 1e-9)], [high]])
 
-    def _branch(self, one: BranchStretch, circuit: int) -> Branch:
+    def _branch(self, one: BranchRun, circuit: int) -> Branch:
         """The states of a branch, one after the other, with the driver rising."""
         of, s, value = one.of, self.q.system, self._grid(one)
         step, there = of.along(one.run, value)

@@ -86,7 +86,7 @@ class Circuits:
 
     Attributes
     ----------
-    a, b : CircuitNodes
+    a, b : nodes
         Ends of all steps, one circuit after the other; closed circuits with folds are laid out from one of these to itself.
     run, of_branch, rises (steps,)
         The branch of every step: its number among all; on its circuit, 0 that through ``x``; 1 where the driver rises, else -1.
@@ -176,8 +176,8 @@ class Circuits:
     def closed(
         self, x: Array, case: Index, ahead: Array, goal: Array | None = None, beside: CircuitNodes | None = None
     ) -> tuple[CircuitNodes, Array]:
-        """Nodes near states ``(nx, T)``, with motions that lead ``ahead (F, T)``, where the driver has the values of a ``goal (T,)``; and the
-        last Newton steps.
+        """Nodes near states ``(nx, T)``, with motions that lead ``ahead (F, T)``, where the driver has the values of a ``goal (T,)``; and
+        the last Newton steps.
         """
         # Newton steps, of which each doubles the digits
         for _ in range(4):
@@ -238,15 +238,19 @@ class Circuits:
             good = (size <= np.where(leap, 1e-5, 0.1)) & (np.abs(two).max(axis=0) <= 0.1 * size + 1e-9)
             good &= (np.abs(turn) > 0.7) & np.isfinite(new.x).all(axis=0) & (leap | straight)
             # ends of ranges are come to by shorter steps, each to where the last one tells
-            left, over = -beyond_end(here.x, at), beyond_end(new.x, at)
+            over = beyond_end(new.x, at)
             cut = good & (over > BEYOND_END)
             ending[at[cut]], good = True, good & ~cut
             longest = 1.0 * np.maximum(1.0, np.abs(new.x[lengths]).max(axis=0, initial=0.0))
             grown = ahead * np.clip((0.03 / np.maximum(size, 1e-12)) ** 0.25, 0.5, 2.0)
             h[at] = np.where(good, np.minimum(grown, longest), 0.4 * ahead)
-            h[at[cut]] = ahead[cut] * np.clip(left[cut] / (left[cut] + over[cut]), 0.0, 0.9)
-            going[at[(~good & leap) | (good & (over >= -BEYOND_END)) | (cut & (left <= BEYOND_END))]] = False
-            out += [replace(here, t=here.t * sense[at], meets=~straight).taken(leap & good)]
+            going[at[(~good & leap & ~cut) | (good & (over >= -BEYOND_END))]] = False
+            if cut.any():
+                left = -beyond_end(here.x[:, cut], at[cut])
+                h[at[cut]] = ahead[cut] * np.clip(left / (left + over[cut]), 0.0, 0.9)
+                going[at[cut]] = left > BEYOND_END
+            if (leap & good).any():
+                out.append(replace(here, t=here.t * sense[at], meets=~straight).taken(leap & good))
             on, new, here = at[good], new.taken(good), here.taken(good)
             long = self._way(here, new)[1] > 1e-4
             before.put(on[long], here.taken(long))
