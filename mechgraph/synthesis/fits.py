@@ -38,13 +38,35 @@ Bounds = Mapping[str, tuple[float | None, float | None]]
 @dataclass(frozen=True)
 class FitPoint:
     """Rows of ``T`` mechanisms: unknowns ``z (u, T)`` and drivers ``theta (n, d, T)`` in internal units, states ``x (nx, n, T)``, and their
-    equations.
+    equations, of ``rank`` in the coordinates ``free`` that no driver has.
     """
 
     z: Array
     theta: Array
     x: Array
     at: ArrowRows
+    free: Index
+    rank: int
+
+    @cached_property
+    def matrix(self) -> Array:
+        """``F_q (n, T, m, f)``."""
+        return np.moveaxis(self.at.by_coordinates[:, :, self.free], 3, 1)
+
+    @cached_property
+    def square(self) -> bool:
+        """Whether as many rows as coordinates are independent."""
+        return self.matrix.shape[2] == self.matrix.shape[3] == self.rank
+
+    @cached_property
+    def inverse(self) -> Array:
+        """That of ``F_q``."""
+        if self.square:
+            try:
+                return np.asarray(np.linalg.inv(self.matrix))
+            except np.linalg.LinAlgError:  # one of them is singular to the last digit
+                pass
+        return np.asarray(np.linalg.pinv(self.matrix, 1e-9), dtype=float)
 
 
 class Fit:
@@ -59,6 +81,9 @@ class Fit:
     wanted : (n, k) array
         Values of the other coordinates asked ``others (k,)``, NaN where nothing is; times ``factors`` where these are unknown.
     """
+
+    wide = 1.25 * LEAST_MARGIN
+    """Margin below which optima are led to wider ones."""
 
     def __init__(self, problem: RowProblem, tasks: Any) -> None:
         self.p, self.tasks, s = problem, tasks, problem.system
@@ -133,7 +158,7 @@ class Fit:
     def point(self, z: Array, theta: Array, x: Array) -> FitPoint:
         """Rows at states, and their equations."""
         numbers = self.p.numbers.with_values(self.p.places, z)
-        return FitPoint(z, theta, x, self.p.equations(numbers, x.swapaxes(0, 1)))
+        return FitPoint(z, theta, x, self.p.equations(numbers, x.swapaxes(0, 1)), self.free, self.rank)
 
     def taken(self, here: FitPoint, which: Index) -> FitPoint:
         """Some of the mechanisms."""
@@ -144,51 +169,42 @@ class Fit:
         parts = ((one.z, other.z), (one.theta, other.theta), (one.x, other.x))
         return one if first.all() else self.point(*(np.where(first, a, b) for a, b in parts))
 
-    def closed(self, z: Array, theta: Array, x: Array, longest: float = 1.0) -> tuple[FitPoint, Mask]:
-        """Rows closed from states near by; at which ``(n, T)`` Newton's method comes to an end there, by steps below the ``longest``."""
+    def closed(
+        self, z: Array, theta: Array, x: Array, longest: float = 1.0, to: float = 1e-12
+    ) -> tuple[FitPoint, Mask]:
+        """Rows closed from states near by, but for an error; at which ``(n, T)`` Newton's method comes to an end there, the first step
+        of which is shorter than the ``longest``.
+        """
         s, x = self.p.system, x.copy()
         x[s.single_rows[self.drivers]] = theta.swapaxes(0, 1)
-        came = np.ones(x.shape[1:], dtype=bool)
-        # steps of Newton's method, and what may be left open
+        came, last = np.ones(x.shape[1:], dtype=bool), np.full(x.shape[1:], 2 * longest)
+        # steps of Newton's method, each at most half as long as the one before
         for _ in range(12):
             here = self.point(z, theta, x)
             left = here.at.residual.swapaxes(1, 2)
-            going = came & ~(np.abs(left).max(axis=2, initial=0.0) < 1e-12)
+            going = came & ~(np.abs(left).max(axis=2, initial=0.0) < to)
             if not going.any():
                 return here, came
-            step = -(self._inverse(here) @ left[..., None])[..., 0]
-            came &= ~going | (np.abs(step).max(axis=2, initial=0.0) < longest)
-            dq = np.zeros((s.n_freedoms, *came.shape))
+            step = -(here.inverse @ left[..., None])[..., 0]
+            size = np.abs(step).max(axis=2, initial=0.0)
+            came &= ~going | (size < 0.5 * last)
+            last, dq = size, np.zeros((s.n_freedoms, *came.shape))
             dq[self.free] = np.where((came & going)[..., None], step, 0.0).transpose(2, 0, 1)
             x = s.advance(x, dq)
         return here, came & ~going
 
-    def _matrix(self, here: FitPoint) -> Array:
-        """``F_q (n, T, m, f)``."""
-        return np.moveaxis(here.at.by_coordinates[:, :, self.free], 3, 1)
-
-    def _inverse(self, here: FitPoint) -> Array:
-        J = self._matrix(here)
-        if J.shape[2] == J.shape[3] == self.rank:
-            try:
-                return np.asarray(np.linalg.inv(J))
-            except np.linalg.LinAlgError:  # one of them is singular to the last digit
-                pass
-        return np.asarray(np.linalg.pinv(J, 1e-9), dtype=float)
-
-    def by_drivers(self, here: FitPoint, inverse: Array) -> Array:
+    def by_drivers(self, here: FitPoint) -> Array:
         """``dq/dtheta (n, T, F, d)``."""
-        out = np.zeros((*inverse.shape[:2], self.p.system.n_freedoms, len(self.drivers)))
-        out[:, :, self.free] = -inverse @ np.moveaxis(here.at.by_coordinates[:, :, self.drivers], 3, 1)
+        out = np.zeros((*here.x.shape[1:], self.p.system.n_freedoms, len(self.drivers)))
+        out[:, :, self.free] = -here.inverse @ np.moveaxis(here.at.by_coordinates[:, :, self.drivers], 3, 1)
         out[:, :, self.drivers] = np.eye(len(self.drivers))
         return out
 
     def rates(self, here: FitPoint) -> tuple[Array, Array]:
         """``dq/dz (n, T, F, u)`` and ``dq/dtheta (n, T, F, d)``."""
-        inverse = self._inverse(here)
-        by_z = np.zeros((*inverse.shape[:2], self.p.system.n_freedoms, len(here.z)))
-        by_z[:, :, self.free] = -inverse @ np.moveaxis(here.at.by_unknowns, 3, 1)
-        return by_z, self.by_drivers(here, inverse)
+        by_z = np.zeros((*here.x.shape[1:], self.p.system.n_freedoms, len(here.z)))
+        by_z[:, :, self.free] = -here.inverse @ np.moveaxis(here.at.by_unknowns, 3, 1)
+        return by_z, self.by_drivers(here)
 
     def stepped(self, here: FitPoint, rates: tuple[Array, Array], z: Array, theta: Array) -> tuple[FitPoint, Mask]:
         """Rows carried to other dimensions and drivers in one step; which mechanisms ``(T,)`` come there, all rows on their branches."""
@@ -196,9 +212,10 @@ class Fit:
         dq = (rates[0] @ dz.T[:, :, None] + rates[1] @ dtheta[..., None])[..., 0].transpose(2, 0, 1)
         # the longest step (radians, lengths over L) of a row that may be predicted
         near = np.abs(dq).max(axis=(0, 1)) < 1.0
-        new, came = self.closed(z, theta, self.p.system.advance(here.x, np.where(near, dq, 0.0)))
+        x = np.broadcast_to(here.x, (len(here.x), *dq.shape[1:]))
+        new, came = self.closed(z, theta, self.p.system.advance(x, np.where(near, dq, 0.0)))
         whole = near & came.all(axis=0) & (self._sides(new) == self._sides(here)).all(axis=0)
-        return new, whole & (self.margins(new).min(axis=0) > LEAST_MARGIN / 20)
+        return new, whole & (self.margins(new, LEAST_MARGIN / 20).min(axis=0) > LEAST_MARGIN / 20)
 
     def moved(self, here: FitPoint, z: Array, theta: Array) -> tuple[FitPoint, bool]:
         """Rows of one mechanism carried to other dimensions and drivers, in one step or in several; where a row would leave its branch as
@@ -219,30 +236,41 @@ class Fit:
 
     def _sides(self, here: FitPoint) -> Array:
         """Signs ``(n, T)`` of the determinants of ``F_q`` at the rows, where it has one."""
-        J = self._matrix(here)
-        return np.asarray(np.linalg.slogdet(J)[0] if J.shape[2] == J.shape[3] else np.ones(J.shape[:2]))
+        return np.asarray(np.linalg.slogdet(here.matrix)[0] if here.square else np.ones(here.x.shape[1:]))
 
-    def margins(self, here: FitPoint) -> Array:
-        """How far rows ``(n, T)`` are from folds, and links from having no length: least singular value of ``F_q`` over its largest."""
-        size = np.linalg.svd(self._matrix(here), compute_uv=False)
-        return np.asarray(size[..., self.rank - 1] / size[..., 0])
-
-    def margin_slopes(self, here: FitPoint, rows: Index) -> Array:
-        """Derivatives ``(r, v)`` of margins of some rows of a mechanism by its vector: central differences along tangents."""
-        by_z, by_theta = self.rates(here)
-        u, h = len(here.z), 1e-5
-        ways = np.concatenate([by_z, by_theta if self.open.any() else by_theta[..., :0]], axis=3)[rows, 0]
-        n = ways.shape[2]
-        dz = np.eye(u, n)
-        z = here.z + h * np.concatenate([dz, -dz], axis=1)
-        dq = h * np.concatenate([ways, -ways], axis=2).swapaxes(0, 1)
-        x = self.p.system.advance(np.repeat(here.x[:, rows], 2 * n, axis=2), dq)
-        m = self.margins(self.point(z, np.zeros(0), x))
-        slope, out = (m[:, :n] - m[:, n:]) / (2 * h), np.zeros((len(rows), u + int(self.open.sum())))
-        out[:, :u] = slope[:, :u]
-        for j, row in enumerate(np.nonzero(self.open)[0]):
-            out[rows == row, u + j] = slope[rows == row, u]
+    def margins(self, here: FitPoint, below: float = np.inf) -> Array:
+        """How far rows ``(n, T)`` are from folds, and links from having no length: least singular value of ``F_q`` over its largest. Where
+        these lie above what is of interest ``below``, so do numbers that are less than they.
+        """
+        J, near = here.matrix, np.ones(here.x.shape[1:], dtype=bool)
+        out = np.ones(near.shape)
+        if here.square and np.isfinite(below):
+            # norms of Frobenius are no less than the largest singular values
+            out = 1.0 / np.maximum(np.linalg.norm(J, axis=(2, 3)) * np.linalg.norm(here.inverse, axis=(2, 3)), 1.0)
+            near = ~(out > below)
+        if near.any():
+            size = np.linalg.svd(J[near], compute_uv=False)
+            out[near] = size[:, self.rank - 1] / size[:, 0]
         return out
+
+    def margin_slopes(self, here: FitPoint, rows: Index, which: Index, rates: tuple[Array, Array]) -> tuple[Array, Array]:
+        """Derivatives of the margins of some rows of mechanisms by the unknowns ``(r, u)`` and their drivers ``(r, d)``.
+
+        With singular vectors ``ds_i = u_i^T dF_q v_i``; the matrix changes along tangents, by central differences.
+        """
+        by_z, by_theta = (v[rows, which] for v in rates)
+        n, h = by_z.shape[2] + by_theta.shape[2], 1e-5
+        ways, dz = np.concatenate([by_z, by_theta], axis=2), np.zeros((len(here.z), len(rows), 2 * n))
+        dz[np.arange(len(dz)), :, np.arange(len(dz))], dz[np.arange(len(dz)), :, n + np.arange(len(dz))] = h, -h
+        z = (here.z[:, which, None] + dz).reshape(len(dz), -1)
+        dq = h * np.concatenate([ways, -ways], axis=2).swapaxes(0, 1).reshape(ways.shape[1], 1, -1)
+        x = self.p.system.advance(np.repeat(here.x[:, rows, which], 2 * n, axis=1)[:, None], dq)
+        J = self.point(z, np.zeros(0), x).matrix[0].reshape(len(rows), 2, n, *here.matrix.shape[2:])
+        U, sigma, V = np.linalg.svd(here.matrix[rows, which])
+        some = [0, self.rank - 1]
+        d = np.einsum("rmi,rwmf,rif->riw", U[:, :, some], (J[:, 0] - J[:, 1]) / (2 * h), V[:, some])
+        out = d[:, 1] / sigma[:, :1] - d[:, 0] * (sigma[:, self.rank - 1] / sigma[:, 0] ** 2)[:, None]
+        return out[:, : len(dz)], out[:, len(dz) :]
 
     # --- where rows begin ------------------------------------------------------------------------------------------------
 
@@ -296,10 +324,10 @@ class Fit:
         here, alive = self.closed(z, values(0), rest, np.inf)
         states, came, sides = [here.x], [alive], self._sides(here)
         for k in range(1, len(ways)):
-            by_theta = self.by_drivers(here, self._inverse(here))
-            dq = (by_theta @ np.moveaxis(values(k) - here.theta, 1, 2)[..., None])[..., 0].transpose(2, 0, 1)
+            dq = (self.by_drivers(here) @ np.moveaxis(values(k) - here.theta, 1, 2)[..., None])[..., 0].transpose(2, 0, 1)
             near = alive & (np.abs(dq).max(axis=0) < 1.0)
-            here, closed = self.closed(z, values(k), s.advance(here.x, np.where(near, dq, 0.0)))
+            # what is left open on the way is closed where the rows are
+            here, closed = self.closed(z, values(k), s.advance(here.x, np.where(near, dq, 0.0)), to=1e-3)
             alive = near & closed & (self._sides(here) == sides)
             states.append(here.x)
             came.append(alive)

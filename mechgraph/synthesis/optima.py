@@ -6,34 +6,49 @@ the end on all rows.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import scipy
 
-from mechgraph.errors import counted
-from mechgraph.maths.se3 import Array
+from mechgraph.errors import DeclarationError, MechgraphWarning, counted
+from mechgraph.kinematics.prescribed import driven
+from mechgraph.kinetostatics import transmission_index, with_unit_effort
+from mechgraph.maths.se3 import Array, Mask
 from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
-from mechgraph.synthesis.fitness import keeps
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.outcome import Options
+from mechgraph.synthesis.answers import ComplexSyntheses, Syntheses
+from mechgraph.synthesis.fitness import Measure, fitnesses, keeps
 from mechgraph.synthesis.fits import LEAST_MARGIN, Bounds, Fit, FitPoint
+from mechgraph.synthesis.system import RowProblem
+from mechgraph.variants.numbers import ItemField, varied
+from mechgraph.variants.work import quantity, solve_together
 
 
-def descended(fit: Fit, here: FitPoint, low: Array, high: Array, steps: int) -> tuple[FitPoint, Array]:
+def descended(
+    fit: Fit, here: FitPoint, low: Array, high: Array, steps: int, weight: Array | None = None
+) -> tuple[FitPoint, Array]:
     """The rows of mechanisms on their way to the least sums of squares, some steps on; and these sums ``(T,)``.
 
     With ``J = [Z Y]`` by the unknowns and the drivers ``Y^T Y`` is diagonal, as a driver acts on its own row: the unknowns are those of
     ``(Z^T Z + m D - Z^T Y (Y^T Y)^-1 Y^T Z) dz``, ``D`` the diagonal of ``Z^T Z``, the damping ``m`` one for each mechanism.
+
+    What is missed is followed by a ``weight (T,)`` times how far margins are below what an optimum has and a quarter more, as logarithms.
     """
     low, high = low[: len(here.z), None], high[: len(here.z), None]
     T, open_, unit = here.z.shape[1], np.asarray(fit.open.any(axis=1))[:, None], np.eye(len(here.z), dtype=bool)
-    left = fit.missed(here)
-    size, damping = (left**2).sum(axis=(0, 2)), np.full(T, 1e-2)
+    weight = np.zeros(T) if weight is None else weight
+    left = _left(fit, here, weight)
+    size, damping, quiet = (left**2).sum(axis=(0, 2)), np.full(T, 1e-2), np.zeros(T, dtype=np.intp)
     for _ in range(steps):
         rates = fit.rates(here)
-        Z, Y = fit.missed_rates(rates)
-        rows, y, r = Z.swapaxes(0, 1), Y.sum(axis=3), left.swapaxes(0, 1)
+        Z, y = _left_rates(fit, here, rates, weight)
+        rows, r = Z.swapaxes(0, 1), left.swapaxes(0, 1)
         whole = rows.reshape(T, -1, len(here.z))
         across = (y.swapaxes(0, 1)[:, :, None] @ rows)[:, :, 0]
         own = np.where(open_, (y**2).sum(axis=2) * (1 + damping) + np.finfo(float).tiny, 1.0).T
@@ -50,58 +65,80 @@ def descended(fit: Fit, here: FitPoint, low: Array, high: Array, steps: int) -> 
         moved = np.where(open_, -(pull + (across @ (z - here.z).T[..., None])[..., 0]).T / own.T, 0.0)
         theta = here.theta + np.where(fit.open[:, :, None], moved[:, None], 0.0)
         there, came = fit.stepped(here, rates, z, theta)
-        new = fit.missed(there)
+        new = _left(fit, there, weight)
         sizes = np.where(came, (new**2).sum(axis=(0, 2)), np.inf)
         better = sizes < size
         damping = np.clip(np.where(better, damping / 5, damping * 6), 1e-12, 1e12)
+        # a few steps by which little is gained, or none that gains
+        quiet = np.where(better & (sizes < (1 - 1e-5) * size), 0, quiet + 1)
         size, left = np.where(better, sizes, size), np.where(better[:, None], new, left)
         here = fit.mixed(better, there, here)
-    return here, size
+        if (quiet > 8).all():
+            break
+    return here, (fit.missed(here) ** 2).sum(axis=(0, 2))
 
 
-class Trials:
-    """Trial vectors of an optimizer, each carried from the last one that was kept.
+def _left(fit: Fit, here: FitPoint, weight: Array) -> Array:
+    """What is missed ``(n, T, k + 1)``, and what is to be added for margins."""
+    near = np.zeros(here.x.shape[1:])
+    if weight.any():
+        near = weight * np.log(np.maximum(fit.wide / fit.margins(here, fit.wide), 1.0))
+    return np.concatenate([fit.missed(here), near[..., None]], axis=2)
 
-    What is small is followed by ``weight`` times how far margins are below what an optimum has and a quarter more, as logarithms.
+
+def _left_rates(fit: Fit, here: FitPoint, rates: tuple[Array, Array], weight: Array) -> tuple[Array, Array]:
+    """Its derivatives by the unknowns ``(n, T, k + 1, u)``, and by the driver of the row ``(n, T, k + 1)`` where it is open."""
+    Z, Y = fit.missed_rates(rates)
+    Z, Y = (np.concatenate([v, np.zeros((*v.shape[:2], 1, v.shape[3]))], axis=2) for v in (Z, Y))
+    if weight.any():
+        margins = fit.margins(here, fit.wide)
+        rows, which = np.nonzero((margins < fit.wide) & (weight > 0))
+        if rows.size:
+            by = -(weight[which] / margins[rows, which])[:, None]
+            by_z, by_theta = fit.margin_slopes(here, rows, which, rates)
+            Z[rows, which, -1], Y[rows, which, -1] = by * by_z, by * np.where(fit.open[rows], by_theta, 0.0)
+    return Z, Y.sum(axis=3)
+
+
+def settled(fit: Fit, here: FitPoint, low: Array, high: Array) -> FitPoint:
+    """The rows of mechanisms at optima of sums of squares with margins, as far as they come there.
+
+    An optimum without a margin is none: margins have weights, from the size of what is missed on, that grow until they are kept.
+    """
+    size, part = (fit.missed(here) ** 2).sum(axis=(0, 2)), np.ones(here.z.shape[1])
+    # rounds after which an optimum is not sought any further
+    for _ in range(12):
+        weight = part * np.maximum(np.sqrt(size / max(len(fit.asked[0]), 1)), 1e-9)
+        here, new = descended(fit, here, low, high, 40, weight)
+        gained = new < (1 - 1e-3) * size
+        if fit.open.any() and not gained.any():
+            # open drivers are put anew where the path comes nearest
+            there, came = fit.begun(here.z)
+            again = (fit.missed(there) ** 2).sum(axis=(0, 2))
+            better = came & (again < (1 - 1e-6) * new)
+            here, new, gained = fit.mixed(better, there, here), np.where(better, again, new), better
+        narrow = fit.margins(here, LEAST_MARGIN).min(axis=0) < LEAST_MARGIN
+        part, size = np.where(narrow & ~gained, 10.0 * part, part), new
+        if not (gained | (narrow & (part <= 100.0))).any():
+            break
+    return here
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Numbers ``of (k, T)`` the rows of mechanisms, which must not fall below the ``least`` or rise above the ``most``.
+
+    ``by_drivers``: whether they change with the open drivers of rows.
     """
 
-    def __init__(self, fit: Fit, begin: FitPoint, weight: float = 0.0) -> None:
-        self.fit, self.kept, self.last, self.weight = fit, begin, begin, weight
-        self.refused = 1e3 * (1.0 + float(np.abs(self._all(begin)).max(initial=0.0)))
+    of: Callable[[FitPoint], Array]
+    least: float | None = None
+    most: float | None = None
+    by_drivers: bool = True
 
-    def _all(self, here: FitPoint) -> Array:
-        near = self.weight * np.log(np.maximum(1.25 * LEAST_MARGIN / self.fit.margins(here)[:, 0], 1.0))
-        return np.concatenate([self.fit.residual(here), near])
-
-    def at(self, v: Array) -> FitPoint | None:
-        """The rows at a vector; None where they cannot be carried there."""
-        for known in (self.last, self.kept):
-            if np.array_equal(v, self.fit.vector(known)):
-                return known
-        found, came = self.fit.moved(self.kept, *self.fit.parts(v))
-        if came:
-            self.last = found
-        return found if came else None
-
-    def residual(self, v: Array) -> Array:
-        """See ``Fit.residual``; large where the rows cannot be carried there."""
-        here = self.at(v)
-        return np.full(len(self.fit.asked[0]) + self.fit.rows, self.refused) if here is None else self._all(here)
-
-    def jacobian(self, v: Array) -> Array:
-        """See ``Fit.jacobian``; the vector is kept."""
-        here = self.at(v)
-        if here is not None:
-            self.kept = here
-        fit, margins = self.fit, self.fit.margins(self.kept)[:, 0]
-        near, slopes = np.flatnonzero(margins < 1.25 * LEAST_MARGIN * (self.weight > 0)), np.zeros((fit.rows, len(v)))
-        if near.size:
-            slopes[near] = -self.weight * fit.margin_slopes(self.kept, near) / margins[near, None]
-        return np.concatenate([fit.jacobian(self.kept), slopes])
-
-
-Limit = tuple[Callable[[FitPoint], Array], float | None, float | None]
-"""Numbers of the rows, and what they must not fall below or rise above."""
+    def kept(self, here: FitPoint) -> bool:
+        """Whether the rows of a mechanism keep it."""
+        return keeps(self.of(here), self.least, self.most)
 
 
 @dataclass(frozen=True)
@@ -117,7 +154,7 @@ def fitted(
     way: str | None,
     starts: int,
     bounds: Bounds,
-    goal: Callable[[FitPoint], Array] | None = None,
+    goal: Limit | None = None,
     limits: Sequence[Limit] = (),
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
@@ -137,21 +174,14 @@ def fitted(
     begun += [] if evolved is None else [evolved]
     ends: list[FitPoint] = []
     unsafe = lost = early = 0
-    wide: Limit = (lambda here: fit.margins(here)[:, 0]), LEAST_MARGIN, None
+    wide = Limit(fit.margins, LEAST_MARGIN, None)
     for i, begin in enumerate(begun, 1):
         if progress is not None:
             progress(f"best start {i} of {len(begun)} to the end")
-        # an optimum without a margin is none: it is looked for where it keeps one, by weights that grow from the size of what is missed
         end: FitPoint | None = begin
-        for part in (0.0, 1.0, 10.0, 100.0):
-            if end is not None and (fit.margins(end).min() < LEAST_MARGIN) == (part > 0):
-                size = max(float(np.sqrt(np.mean(fit.residual(end) ** 2))), 1e-9)
-                end = least_squares(fit, end, low, high, 200, part * size)
-        narrow = end is not None and fit.margins(end).min() < LEAST_MARGIN
-        kept_as_is = end is not None and all(keeps(f(end), least, most) for f, least, most in limits)
-        if narrow or way != "least_squares" or not kept_as_is:
-            best = begin if narrow or end is None else end
-            end, came = constrained(fit, best, low, high, way, goal, [*limits, wide] if narrow else limits)
+        narrow = fit.margins(begin).min() < LEAST_MARGIN
+        if narrow or way != "least_squares" or not all(limit.kept(begin) for limit in limits):
+            end, came = constrained(fit, begin, low, high, way, goal, [*limits, wide] if narrow else limits)
             early += end is not None and not came
         if end is None:
             lost += 1
@@ -162,7 +192,7 @@ def fitted(
 
     def value(here: FitPoint) -> float:
         if way is None:
-            return 0.0 if goal is None else float(goal(here).max())
+            return 0.0 if goal is None else float(goal.of(here).max())
         errors = fit.errors(here)
         return float(errors.max() if way == "minimax" else np.sqrt((errors**2).mean()))
 
@@ -224,7 +254,7 @@ def _best(
     here, came = fit.begun(z[:, kept]) if kept else (here, np.zeros(0, dtype=bool))
     if not came.any():
         return [], count
-    here, _ = descended(fit, fit.taken(here, np.flatnonzero(came)), low, high, 24)
+    here = settled(fit, fit.taken(here, np.flatnonzero(came)), low, high)
     return [fit.taken(here, np.array([i])) for i in range(here.z.shape[1])], count
 
 
@@ -249,45 +279,13 @@ def _evolved(fit: Fit, low: Array, high: Array, seed: int) -> FitPoint | None:
     return here if came[0] else None
 
 
-def least_squares(
-    fit: Fit, begin: FitPoint, low: Array, high: Array, evaluations: int = 100, weight: float = 0.0
-) -> FitPoint:
-    """The rows with the least sum of squares to which a start leads; ``weight``: see ``Trials``."""
-    here = begin
-    # times that open drivers are put anew where the path comes nearest
-    for _ in range(3):
-        trials = Trials(fit, here, weight)
-        v = np.clip(fit.vector(here), low, high)
-        found = scipy.optimize.least_squares(
-            trials.residual,
-            v,
-            trials.jacobian,
-            (low, high),
-            max_nfev=evaluations,
-            x_scale="jac",
-            xtol=1e-12,
-            ftol=1e-12,
-            gtol=1e-14,
-        )
-        here = trials.at(found.x) or trials.kept
-        again, came = fit.begun(here.z) if fit.open.any() else (here, np.zeros(1, dtype=bool))
-        if not came[0] or _size(fit, again) > (1 - 1e-6) * _size(fit, here):
-            return here
-        here = again
-    return here
-
-
-def _size(fit: Fit, here: FitPoint) -> float:
-    return float((fit.residual(here) ** 2).sum())
-
-
 def constrained(
     fit: Fit,
     begin: FitPoint,
     low: Array,
     high: Array,
     way: str | None,
-    goal: Callable[[FitPoint], Array] | None,
+    goal: Limit | None,
     limits: Sequence[Limit],
 ) -> tuple[FitPoint | None, bool]:
     """The best rows to which a start leads under limits, by sequential quadratic programs; None where they are not kept there. Also
@@ -305,20 +303,20 @@ def constrained(
         constraints.append(met)
     if course.slack:
         constraints.append({"type": "ineq", "fun": course.slacks, "jac": course.slack_slopes})
-    for f, least, most in limits:
-        for sign, end in ((1.0, least), (-1.0, most)):
+    for limit in limits:
+        for sign, end in ((1.0, limit.least), (-1.0, limit.most)):
             if end is not None:
-                constraints.append(course.limit(f, sign, end))
+                constraints.append(course.limit(limit, sign, end))
     aim, slope = course.aim
     found: Any = scipy.optimize.minimize(  # type: ignore[call-overload]  # the stubs know no constraints as tables
         aim, course.begin, jac=slope, constraints=constraints, method="SLSQP", options={"maxiter": 100, "ftol": 1e-12}
     )
     here = course.point(found.x)
     if way is None:  # met to rounding, where the optimizer leaves off before
-        here = least_squares(fit, here, low, high, 20)
+        here, _ = descended(fit, here, low, high, 20)
     if way is None and np.abs(fit.residual(here)).max() > 1e-9:
         return None, False
-    return (here if all(keeps(f(here), least, most) for f, least, most in limits) else None), bool(found.success)
+    return (here if all(limit.kept(here) for limit in limits) else None), bool(found.success)
 
 
 class _RowCourse:
@@ -327,9 +325,13 @@ class _RowCourse:
     With ``J / unit = U S V^T`` at the start ``P = V S^-1``, small singular values left out of the inverse. Behind stands the slack.
     """
 
-    def __init__(self, fit: Fit, begin: FitPoint, way: str | None, goal: Callable[[FitPoint], Array] | None) -> None:
+    step = 1e-5
+    """Of differences, in variables of the vector."""
+
+    def __init__(self, fit: Fit, begin: FitPoint, way: str | None, goal: Limit | None) -> None:
         self.goal, self.slack = goal, way != "least_squares"
-        self.fit, self.trials, self._last = fit, Trials(fit, begin), begin
+        self.fit, self.kept, self._last = fit, begin, begin
+        self._known, self._near = dict[Limit, tuple[FitPoint, Array]](), (None, 0, None)
         self.unit = max(float(np.abs(fit.residual(begin)).max(initial=0.0)), 1e-9)
         _, sigma, Vt = np.linalg.svd(fit.jacobian(begin) / self.unit, full_matrices=True)
         size = np.zeros(len(Vt))
@@ -352,7 +354,7 @@ class _RowCourse:
         """The rows; where they cannot be carried there, as far on the way as they can."""
         if not np.array_equal(w[: len(self.v)], self._asked):
             self._asked = w[: len(self.v)].copy()
-            self._last, _ = self.fit.moved(self.trials.kept, *self.fit.parts(self.vector(w)))
+            self._last, _ = self.fit.moved(self.kept, *self.fit.parts(self.vector(w)))
         return self._last
 
     def _padded(self, slopes: Array) -> Array:
@@ -365,8 +367,8 @@ class _RowCourse:
 
     def jacobian(self, w: Array) -> Array:
         """Its derivatives."""
-        self.trials.kept = self.point(w)
-        return self._padded(self.fit.jacobian(self.trials.kept))
+        self.kept = self.point(w)
+        return self._padded(self.fit.jacobian(self.kept))
 
     def squares(self, w: Array) -> Array:
         """Squares of the errors of the rows."""
@@ -382,7 +384,7 @@ class _RowCourse:
 
     def _small(self, w: Array) -> Array:
         """What is to be small everywhere: the goal, else the squares."""
-        return self.squares(w) if self.goal is None else self.goal(self.point(w))
+        return self.squares(w) if self.goal is None else self.values(self.goal, w)
 
     def slacks(self, w: Array) -> Array:
         """How far that is below the slack."""
@@ -392,31 +394,47 @@ class _RowCourse:
         """Its derivatives."""
         return np.eye(len(w))[-1] - (self.squares_slope(w) if self.goal is None else self.slopes(self.goal, w))
 
-    def slopes(self, f: Callable[[FitPoint], Array], w: Array) -> Array:
+    def values(self, limit: Limit, w: Array) -> Array:
+        """Numbers ``(k,)`` of the rows."""
+        here = self.point(w)
+        if self._known.get(limit, (None,))[0] is not here:
+            self._known[limit] = here, limit.of(here)[:, 0]
+        return self._known[limit][1]
+
+    def slopes(self, limit: Limit, w: Array) -> Array:
         """Central differences of numbers that have no exact derivatives; of one side where the rows come to that one alone."""
-        here = self.trials.kept = self.point(w)
-        v, base, step, u = self.fit.vector(here), f(here), 1e-5, len(here.z)
-        out = np.zeros((len(base), len(v)))
+        here = self.kept = self.point(w)
+        base, (row, _), u = self.values(limit, w), np.nonzero(self.fit.open), len(here.z)
         # one number a row: it changes with the driver of its own row alone, so that all drivers are moved at once
-        row, _ = np.nonzero(self.fit.open)
         alone = len(base) == self.fit.rows
-        ways = [np.eye(len(v))[k] for k in range(u if alone else len(v))]
-        for k, way in enumerate([*ways, np.arange(len(v)) >= u] if alone and row.size else ways):
-            sides = [self.fit.moved(here, *self.fit.parts(v + side * way)) for side in (step, -step)]
-            a, b = (f(there) if came else base for there, came in sides)
-            slope = (a - b) / (step * max(1, sum(came for _, came in sides)))
-            if k < len(ways):
-                out[:, k] = slope
-            else:
-                out[row, np.arange(u, len(v))] = slope[row]
+        more = (1 if alone else row.size) if limit.by_drivers and row.size else 0
+        there, came = self._beside(here, u + more)
+        values = np.where(came, limit.of(there), base[:, None]).reshape(len(base), 2, -1)
+        slope = (values[:, 0] - values[:, 1]) / (self.step * np.maximum(came.reshape(2, -1).sum(axis=0), 1))
+        out = np.zeros((len(base), len(self.v)))
+        if more and alone:
+            out[row, np.arange(u, len(self.v))] = slope[row, u]
+            out[:, :u] = slope[:, :u]
+        else:
+            out[:, : u + more] = slope
         return self._padded(out)
 
-    def limit(self, f: Callable[[FitPoint], Array], sign: float, end: float) -> dict[str, Any]:
+    def _beside(self, here: FitPoint, n: int) -> tuple[FitPoint, Mask]:
+        """Rows a step away from others along the first ``n`` variables of the vector, the last way along all that are left; which came."""
+        if self._near[0] is not here or self._near[1] != n:
+            ways, u, theta = np.eye(len(self.v))[:n], len(here.z), np.repeat(here.theta, 2 * n, axis=2)
+            ways[u:, n - 1 :] = 1.0 if n == u + 1 else ways[u:, n - 1 :]
+            dv = self.step * np.concatenate([ways, -ways]).T
+            theta[self.fit.open] += dv[u:]
+            self._near = here, n, self.fit.stepped(here, self.fit.rates(here), here.z + dv[:u], theta)
+        return self._near[2]
+
+    def limit(self, limit: Limit, sign: float, end: float) -> dict[str, Any]:
         """A limit as the optimizer wants it."""
         return {
             "type": "ineq",
-            "fun": lambda w: sign * (f(self.point(w)) - end),
-            "jac": lambda w: sign * self.slopes(f, w),
+            "fun": lambda w: sign * (self.values(limit, w) - end),
+            "jac": lambda w: sign * self.slopes(limit, w),
         }
 
     def ends(self, low: Array, high: Array) -> Iterator[tuple[Any, Any]]:
@@ -429,3 +447,98 @@ class _RowCourse:
                     lambda w, sign=sign, end=end, kept=kept: sign * (self.vector(w) - end)[kept],
                     lambda w, slope=slope: slope,
                 )
+
+
+class FittedSynthesis:
+    """What a fit asks, and its answers."""
+
+    def __init__(self, problem: RowProblem, tasks: Any, over: Any, driver: str | None, output: str | None) -> None:
+        self.problem, self.over, self.driver, self.output = problem, over, driver, output
+        # exact ones come back in their own frames; the error of a place is that of the origin of its frame, which is another one here
+        if elsewhere := list(self.problem.first.poses):
+            first = f"the first pose of {', '.join(map(repr, elsewhere))} is not the identity"
+            raise DeclarationError(
+                self.problem.name, [f"{first}: a fit begins there; measure its poses from the first one"]
+            )
+        self.fit = Fit(self.problem, tasks)
+
+    def rows(self, here: FitPoint) -> tuple[Mechanism, Array]:
+        """The mechanism of fitted rows, and its coordinates ``(rows, F)``."""
+        p = self.problem
+        q = p.system.coordinates_of(here.x[..., 0]).T[:, : len(p.m.freedom_names())]
+        m = p.unknowns.mechanism(p.outside(here.z)[:, 0])
+        return m.replace(start=dict(zip(m.freedom_names(), q[0].tolist(), strict=True))), q
+
+    def limit(self, what: Any, least: float | None = None, most: float | None = None, sign: float = 1.0) -> Limit:
+        """A quantity of fitted rows, times a sign; where it has no value one that keeps no limit."""
+        measure = what if isinstance(what, Measure) else Measure(self.problem.m, what, self.over)
+        of = partial(self._measured, measure, sign, -1e3 if least is not None else 1e3, least is None and sign > 0)
+        return Limit(of, least, most, not (measure.of_dimensions or self.over))
+
+    def _measured(self, measure: Measure, sign: float, none: float, smooth: bool, here: FitPoint) -> Array:
+        """A quantity ``(k, T)`` of mechanisms."""
+        values = self._together(measure, here)
+        if values is None:
+            each = (self.rows(self.fit.taken(here, np.array([i]))) for i in range(here.z.shape[1]))
+            values = np.stack([measure(m, q, self.driver, smooth) for m, q in each], axis=1)
+        return np.nan_to_num(sign * values, nan=none)
+
+    def _together(self, measure: Measure, here: FitPoint) -> Array | None:
+        """A quantity of mechanisms side by side, near the first of them; None where it has to be taken of each alone."""
+        p, u, what = self.problem, self.problem.unknowns, measure.output or measure.what
+        alone = {name: f.what for name, f in u.fields.items() if isinstance(f, ItemField) and f.one_by_one}
+        # the place of a named point matters to what is said of it alone
+        unread = {n for n, of in alone.items() if of == "links" and not str(what).startswith(n.rpartition(".")[0])}
+        if here.z.shape[1] == 1 or measure.of_dimensions or callable(what) or alone.keys() - unread:
+            return None
+        m, q = self.rows(self.fit.taken(here, np.zeros(1, dtype=np.intp)))
+        own = {name: f for name, f in u.fields.items() if name not in alone}
+        values = p.outside(here.z)[[name in own for name in u.names]]
+        motions, names = dict(self.over or {}), p.m.freedom_names()
+        if not motions and self.driver is not None:
+            every = p.system.coordinates_of(here.x.reshape(len(here.x), -1)).reshape(-1, *here.x.shape[1:])
+            motions = {self.driver: every[names.index(p.m.full_name(self.driver))].T}
+        m = with_unit_effort(m, what) if measure.output else m
+        options = Options(redundant="minimum_norm" if measure.output else "nan")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", MechgraphWarning)
+            _, given = driven(m, {name: np.atleast_2d(v) for name, v in motions.items()})
+            found = solve_together(
+                lambda part, which: varied(m, own, values[:, :1] + part * (values[:, which] - values[:, :1])),
+                here.z.shape[1],
+                given,
+                options,
+            )
+            if found.solution is None or found.alone.any():
+                return None
+            if measure.output:
+                told = np.arcsin(transmission_index(found.solution, what, tuple(given)))
+            else:
+                told = quantity(found.solution, what, what)
+        return np.asarray(told).reshape(here.z.shape[1], -1).T
+
+    def answer(self, found: Fitted) -> Syntheses:
+        """The optima found, the best first."""
+        p, points = self.problem, found.points
+        made = [self.rows(here) for here in points]
+        errors = [float(self.fit.errors(here).max(initial=0.0)) for here in points]
+        shape = (self.fit.rows, len(p.m.links), 4, 4)
+        closed = [float(np.abs(here.at.residual).max(initial=0.0)) for here in points]
+        return Syntheses(
+            p.first.declared,
+            tuple(m for m, _ in made),
+            p.unknowns.names,
+            np.array([p.outside(here.z)[:, 0] for here in points]).reshape(len(points), len(p.unknowns.names)),
+            np.array([p.first.poses_of(here.at.here) for here in points]).reshape(-1, *shape),
+            np.array([q for _, q in made]).reshape(len(made), self.fit.rows, len(p.m.freedom_names())),
+            np.array(closed),
+            ComplexSyntheses(np.zeros((0, len(p.unknowns.names)))),
+            None,
+            (),
+            0,
+            "searched",
+            found.evidence,
+            np.array([1.0 / self.fit.margins(here).min() for here in points]),
+            tuple(fitnesses([m for m, _ in made], np.array([q for _, q in made]), self.driver, self.output, errors)),
+            driver=self.driver,
+        )

@@ -33,10 +33,9 @@ from mechgraph.synthesis.answers import (
 )
 from mechgraph.synthesis.certified import certificates
 from mechgraph.synthesis.classes import ClassMember, NoClass, TaskClass
-from mechgraph.synthesis.fitness import Fitness, Measure, fitnesses, limits_of
-from mechgraph.synthesis.fits import Fit, FitPoint
+from mechgraph.synthesis.fitness import Fitness, fitnesses, limits_of
 from mechgraph.synthesis.labelling import cognates, motions_of, orbits, symmetries
-from mechgraph.synthesis.optima import Fitted, fitted
+from mechgraph.synthesis.optima import FittedSynthesis, fitted
 from mechgraph.synthesis.solve import (
     Progress,
     TaskEnds,
@@ -391,61 +390,6 @@ def subset_values(
     return problem.outside(np.concatenate(real, axis=1)[: of.u]).T
 
 
-class FittedSynthesis:
-    """What a fit asks, and its answers."""
-
-    def __init__(self, m: Mechanism, tasks: Any, unknown: Sequence[str], bounds: Mapping[str, Any], over: Any) -> None:
-        self.problem = RowProblem(m, tasks, unknown)
-        # exact ones come back in their own frames; the error of a place is that of the origin of its frame, which is another one here
-        if elsewhere := list(self.problem.first.poses):
-            first = f"the first pose of {', '.join(map(repr, elsewhere))} is not the identity"
-            raise DeclarationError(
-                self.problem.name, [f"{first}: a fit begins there; measure its poses from the first one"]
-            )
-        self.fit, self.bounds, self.over = Fit(self.problem, tasks), bounds, over
-        self.driver, self.output = driver_of(m, tasks)
-
-    def rows(self, here: FitPoint) -> tuple[Mechanism, Array]:
-        """The mechanism of fitted rows, and its coordinates ``(rows, F)``."""
-        p = self.problem
-        q = p.system.coordinates_of(here.x[..., 0]).T[:, : len(p.m.freedom_names())]
-        m = p.unknowns.mechanism(p.outside(here.z)[:, 0])
-        return m.replace(start=dict(zip(m.freedom_names(), q[0].tolist(), strict=True))), q
-
-    def measured(
-        self, what: Any, sign: float = 1.0, none: float = 1e3, most: bool = True
-    ) -> Callable[[FitPoint], Array]:
-        """A quantity of fitted rows, times a sign; ``none`` where it has no value. ``most``: that must not be large."""
-        measure = what if isinstance(what, Measure) else Measure(self.problem.m, what, self.over)
-        return lambda here: np.nan_to_num(sign * measure(*self.rows(here), self.driver, most and sign > 0), nan=none)
-
-    def answer(self, found: Fitted) -> Syntheses:
-        """The optima found, the best first."""
-        p, points = self.problem, found.points
-        made = [self.rows(here) for here in points]
-        errors = [float(self.fit.errors(here).max(initial=0.0)) for here in points]
-        shape = (self.fit.rows, len(p.m.links), 4, 4)
-        closed = [float(np.abs(here.at.residual).max(initial=0.0)) for here in points]
-        return Syntheses(
-            p.first.declared,
-            tuple(m for m, _ in made),
-            p.unknowns.names,
-            np.array([p.outside(here.z)[:, 0] for here in points]).reshape(len(points), len(p.unknowns.names)),
-            np.array([p.first.poses_of(here.at.here) for here in points]).reshape(-1, *shape),
-            np.array([q for _, q in made]).reshape(len(made), self.fit.rows, len(p.m.freedom_names())),
-            np.array(closed),
-            ComplexSyntheses(np.zeros((0, len(p.unknowns.names)))),
-            None,
-            (),
-            0,
-            "searched",
-            found.evidence,
-            np.array([1.0 / self.fit.margins(here).min() for here in points]),
-            tuple(fitnesses([m for m, _ in made], np.array([q for _, q in made]), self.driver, self.output, errors)),
-            driver=self.driver,
-        )
-
-
 @door
 def synthesize(
     m: Mechanism | Iterable[Chain],
@@ -675,13 +619,10 @@ def _fitted(
     progress: Progress,
 ) -> Syntheses:
     """What comes nearest to what is asked, or meets it and is best in something else."""
-    of = FittedSynthesis(m, tasks, unknown, bounds, over)
+    of = FittedSynthesis(RowProblem(m, tasks, unknown), tasks, over, *driver_of(m, tasks))
     _refuse_other_names(of.problem, bounds)
     exact = subset_values(RowProblem(m, tasks, unknown), tasks, starts, seed, cache, progress) if fit else ()
-    goal = of.measured(*goals[0]) if goals else None
-    limited = [
-        (of.measured(measure, none=1e3 if least is None else -1e3, most=least is None), least, most)
-        for _, measure, least, most in limits
-    ]
+    goal = of.limit(goals[0][0], sign=goals[0][1]) if goals else None
+    limited = [of.limit(measure, least, most) for _, measure, least, most in limits]
     found = fitted(of.fit, fit, starts, bounds, goal, limited, seed, progress, exact)
     return of.answer(found)._kept(require, bounds, limits, of.driver)
