@@ -82,7 +82,7 @@ class Fit:
         Values of the other coordinates asked ``others (k,)``, NaN where nothing is; times ``factors`` where these are unknown.
     """
 
-    wide = 1.25 * LEAST_MARGIN
+    wide = 1.1 * LEAST_MARGIN
     """Margin below which optima are led to wider ones."""
 
     def __init__(self, problem: RowProblem, tasks: Any) -> None:
@@ -191,6 +191,9 @@ class Fit:
             last, dq = size, np.zeros((s.n_freedoms, *came.shape))
             dq[self.free] = np.where((came & going)[..., None], step, 0.0).transpose(2, 0, 1)
             x = s.advance(x, dq)
+            # each step doubles the digits
+            if (size[came & going] < 1e-8).all():
+                return self.point(z, theta, x), came
         return here, came & ~going
 
     def by_drivers(self, here: FitPoint) -> Array:
@@ -206,12 +209,22 @@ class Fit:
         by_z[:, :, self.free] = -here.inverse @ np.moveaxis(here.at.by_unknowns, 3, 1)
         return by_z, self.by_drivers(here)
 
-    def stepped(self, here: FitPoint, rates: tuple[Array, Array], z: Array, theta: Array) -> tuple[FitPoint, Mask]:
-        """Rows carried to other dimensions and drivers in one step; which mechanisms ``(T,)`` come there, all rows on their branches."""
-        dz, dtheta = z - here.z, np.moveaxis(theta - here.theta, 1, 2)
-        dq = (rates[0] @ dz.T[:, :, None] + rates[1] @ dtheta[..., None])[..., 0].transpose(2, 0, 1)
+    @staticmethod
+    def moves(rates: tuple[Array, Array], dz: Array, dtheta: Array) -> Array:
+        """How coordinates ``(F, n, T)`` move along tangents."""
+        moved = rates[0] @ dz.T[:, :, None] + rates[1] @ np.moveaxis(dtheta, 1, 2)[..., None]
+        return np.asarray(moved[..., 0].transpose(2, 0, 1))
+
+    def stepped(
+        self, here: FitPoint, rates: tuple[Array, Array], z: Array, theta: Array, bend: Array | float = 0.0
+    ) -> tuple[FitPoint, Mask]:
+        """Rows carried to other dimensions and drivers in one step along tangents, and a known ``bend (F, n, T)`` from these; which
+        mechanisms ``(T,)`` come there, all rows on their branches.
+        """
+        dq = self.moves(rates, z - here.z, theta - here.theta)
         # the longest step (radians, lengths over L) of a row that may be predicted
         near = np.abs(dq).max(axis=(0, 1)) < 1.0
+        dq = dq + bend
         x = np.broadcast_to(here.x, (len(here.x), *dq.shape[1:]))
         new, came = self.closed(z, theta, self.p.system.advance(x, np.where(near, dq, 0.0)))
         whole = near & came.all(axis=0) & (self._sides(new) == self._sides(here)).all(axis=0)
@@ -256,21 +269,20 @@ class Fit:
     def margin_slopes(self, here: FitPoint, rows: Index, which: Index, rates: tuple[Array, Array]) -> tuple[Array, Array]:
         """Derivatives of the margins of some rows of mechanisms by the unknowns ``(r, u)`` and their drivers ``(r, d)``.
 
-        With singular vectors ``ds_i = u_i^T dF_q v_i``; the matrix changes along tangents, by central differences.
+        With singular vectors ``ds_i = u_i^T dF_q v_i``; the matrix changes along tangents, by differences.
         """
         by_z, by_theta = (v[rows, which] for v in rates)
-        n, h = by_z.shape[2] + by_theta.shape[2], 1e-5
-        ways, dz = np.concatenate([by_z, by_theta], axis=2), np.zeros((len(here.z), len(rows), 2 * n))
-        dz[np.arange(len(dz)), :, np.arange(len(dz))], dz[np.arange(len(dz)), :, n + np.arange(len(dz))] = h, -h
-        z = (here.z[:, which, None] + dz).reshape(len(dz), -1)
-        dq = h * np.concatenate([ways, -ways], axis=2).swapaxes(0, 1).reshape(ways.shape[1], 1, -1)
-        x = self.p.system.advance(np.repeat(here.x[:, rows, which], 2 * n, axis=1)[:, None], dq)
-        J = self.point(z, np.zeros(0), x).matrix[0].reshape(len(rows), 2, n, *here.matrix.shape[2:])
+        ways, h = np.concatenate([by_z, by_theta], axis=2), 1e-6
+        z = here.z[:, which, None] + h * np.eye(len(here.z), ways.shape[2])[:, None]
+        dq = h * ways.swapaxes(0, 1).reshape(ways.shape[1], 1, -1)
+        x = self.p.system.advance(np.repeat(here.x[:, rows, which], ways.shape[2], axis=1)[:, None], dq)
+        J = self.point(z.reshape(len(z), -1), np.zeros(0), x).matrix[0]
+        change = (J.reshape(len(rows), ways.shape[2], *J.shape[1:]) - here.matrix[rows, which][:, None]) / h
         U, sigma, V = np.linalg.svd(here.matrix[rows, which])
         some = [0, self.rank - 1]
-        d = np.einsum("rmi,rwmf,rif->riw", U[:, :, some], (J[:, 0] - J[:, 1]) / (2 * h), V[:, some])
+        d = np.einsum("rmi,rwmf,rif->riw", U[:, :, some], change, V[:, some])
         out = d[:, 1] / sigma[:, :1] - d[:, 0] * (sigma[:, self.rank - 1] / sigma[:, 0] ** 2)[:, None]
-        return out[:, : len(dz)], out[:, len(dz) :]
+        return out[:, : len(z)], out[:, len(z) :]
 
     # --- where rows begin ------------------------------------------------------------------------------------------------
 
@@ -304,7 +316,7 @@ class Fit:
             way = [begin[0]]
             for stop, row in line:
                 # the longest step of a driver, in radians or lengths over L
-                parts = int(np.ceil(np.abs(stop - way[-1]).max() / 0.15))
+                parts = int(np.ceil(np.abs(stop - way[-1]).max() / 0.25))
                 way += [*(way[-1] + (stop - way[-1]) * np.arange(1, parts + 1)[:, None] / max(parts, 1))]
                 if row >= 0:
                     places[row] = len(way) - 1, w
@@ -323,8 +335,12 @@ class Fit:
         rest = np.broadcast_to(self.p.at_rest[:, None, None], (len(self.p.at_rest), ways.shape[1], T))
         here, alive = self.closed(z, values(0), rest, np.inf)
         states, came, sides = [here.x], [alive], self._sides(here)
+        slope = self.by_drivers(here)
         for k in range(1, len(ways)):
-            dq = (self.by_drivers(here) @ np.moveaxis(values(k) - here.theta, 1, 2)[..., None])[..., 0].transpose(2, 0, 1)
+            slope, last = self.by_drivers(here), slope
+            # along a parabola, where steps are alike
+            ahead = np.moveaxis(values(k) - here.theta, 1, 2)[..., None]
+            dq = ((1.5 * slope - 0.5 * last) @ ahead)[..., 0].transpose(2, 0, 1)
             near = alive & (np.abs(dq).max(axis=0) < 1.0)
             # what is left open on the way is closed where the rows are
             here, closed = self.closed(z, values(k), s.advance(here.x, np.where(near, dq, 0.0)), to=1e-3)

@@ -17,7 +17,7 @@ import scipy
 from mechgraph.errors import DeclarationError, MechgraphWarning, counted
 from mechgraph.kinematics.prescribed import driven
 from mechgraph.kinetostatics import transmission_index, with_unit_effort
-from mechgraph.maths.se3 import Array, Mask
+from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
@@ -29,6 +29,8 @@ from mechgraph.synthesis.system import RowProblem
 from mechgraph.variants.numbers import ItemField, varied
 from mechgraph.variants.work import quantity, solve_together
 
+
+ACC = True
 
 def descended(
     fit: Fit, here: FitPoint, low: Array, high: Array, steps: int, weight: Array | None = None
@@ -48,23 +50,38 @@ def descended(
     for _ in range(steps):
         rates = fit.rates(here)
         Z, y = _left_rates(fit, here, rates, weight)
-        rows, r = Z.swapaxes(0, 1), left.swapaxes(0, 1)
+        rows = Z.swapaxes(0, 1)
         whole = rows.reshape(T, -1, len(here.z))
         across = (y.swapaxes(0, 1)[:, :, None] @ rows)[:, :, 0]
         own = np.where(open_, (y**2).sum(axis=2) * (1 + damping) + np.finfo(float).tiny, 1.0).T
-        pull = (y * left).sum(axis=2).T
         A = whole.swapaxes(1, 2) @ whole
-        g = (r.reshape(T, 1, -1) @ whole)[:, 0] - ((pull / own)[:, None] @ across)[:, 0]
-        size_of = np.where(unit, A, 0.0) * damping[:, None, None]
-        A += size_of + 1e-14 * unit - across.swapaxes(1, 2) @ (across / own[..., None])
-        # unknowns at a bound that would leave it stay
-        held = (((here.z <= low) & (g.T > 0)) | ((here.z >= high) & (g.T < 0))).T
-        A = np.where(held[:, :, None] | held[:, None], unit, A)
-        dz = -np.linalg.solve(A, np.where(held, 0.0, g)[..., None])[..., 0].T
+        scale = np.where(unit, A, 0.0).max(axis=1) + 1e-14
+        A += unit * (scale * damping[:, None])[:, None] - across.swapaxes(1, 2) @ (across / own[..., None])
+
+        def way(r: Array, z: Array) -> tuple[Array, Array]:
+            """By how much unknowns and open drivers change to make ``r (n, T, k)`` least; unknowns at a bound that would leave it stay."""
+            pull = (y * r).sum(axis=2).T
+            g = (r.swapaxes(0, 1).reshape(T, 1, -1) @ whole)[:, 0] - ((pull / own)[:, None] @ across)[:, 0]
+            held = (((z <= low) & (g.T > 0)) | ((z >= high) & (g.T < 0))).T
+            dz = -np.linalg.solve(
+                np.where(held[:, :, None] | held[:, None], unit, A), np.where(held, 0.0, g)[..., None]
+            )[..., 0].T
+            dz = np.clip(z + dz, low, high) - z
+            return dz, np.where(open_, -(pull + (across @ dz.T[..., None])[..., 0]).T / own.T, 0.0)
+
+        dz, dt = way(left, here.z)
+        ahead = np.where(fit.open[:, :, None], 1.0, 0.0)
+        if ACC:
+            h = 0.1
+            there, came = fit.stepped(here, rates, here.z + h * dz, here.theta + ahead * (h * dt)[:, None])
+            along = (rows @ dz.T[:, None, :, None])[..., 0].swapaxes(0, 1) + y * dt[..., None]
+            bend = 2 / h * ((_left(fit, there, weight) - left) / h - along)
+            az, at = way(np.where(came[:, None], bend, 0.0), here.z)
+            short = (scale * az.T**2).sum(axis=1) < 0.5 * (scale * dz.T**2).sum(axis=1)
+            curved = fit.p.system.difference(there.x, here.x) - h * fit.moves(rates, dz, ahead * dt[:, None])
+            dz, dt = dz + np.where(short, 0.5 * az, 0.0), dt + np.where(short, 0.5 * at, 0.0)
         z = np.clip(here.z + dz, low, high)
-        moved = np.where(open_, -(pull + (across @ (z - here.z).T[..., None])[..., 0]).T / own.T, 0.0)
-        theta = here.theta + np.where(fit.open[:, :, None], moved[:, None], 0.0)
-        there, came = fit.stepped(here, rates, z, theta)
+        there, came = fit.stepped(here, rates, z, here.theta + ahead * dt[:, None], np.where(came & short, curved / h**2, 0.0))
         new = _left(fit, there, weight)
         sizes = np.where(came, (new**2).sum(axis=(0, 2)), np.inf)
         better = sizes < size
@@ -105,12 +122,12 @@ def settled(fit: Fit, here: FitPoint, low: Array, high: Array) -> FitPoint:
 
     An optimum without a margin is none: margins have weights, from the size of what is missed on, that grow until they are kept.
     """
-    size, part = (fit.missed(here) ** 2).sum(axis=(0, 2)), np.ones(here.z.shape[1])
+    size, part = (fit.missed(here) ** 2).sum(axis=(0, 2)), np.full(here.z.shape[1], 10.0)
     # rounds after which an optimum is not sought any further
-    for _ in range(12):
+    for _ in range(8):
         weight = part * np.maximum(np.sqrt(size / max(len(fit.asked[0]), 1)), 1e-9)
         here, new = descended(fit, here, low, high, 40, weight)
-        gained = new < (1 - 1e-3) * size
+        gained = new < 0.6 * size
         if fit.open.any() and not gained.any():
             # open drivers are put anew where the path comes nearest
             there, came = fit.begun(here.z)
@@ -118,10 +135,22 @@ def settled(fit: Fit, here: FitPoint, low: Array, high: Array) -> FitPoint:
             better = came & (again < (1 - 1e-6) * new)
             here, new, gained = fit.mixed(better, there, here), np.where(better, again, new), better
         narrow = fit.margins(here, LEAST_MARGIN).min(axis=0) < LEAST_MARGIN
-        part, size = np.where(narrow & ~gained, 10.0 * part, part), new
-        if not (gained | (narrow & (part <= 100.0))).any():
+        # what comes to the same, or stays far behind the best one, goes no further
+        kept = _different(here.z, new, 16.0 * new.min())
+        here, part, size = fit.taken(here, kept), np.where(narrow, 10.0 * part, part)[kept], new[kept]
+        if not (gained | narrow)[kept].any():
             break
     return here
+
+
+def _different(z: Array, size: Array, most: float) -> Index:
+    """Which of mechanisms ``z (u, T)`` differ and are not above a size, the best first."""
+    kept = list[int]()
+    for i in np.argsort(size, kind="stable").tolist():
+        # in L
+        if size[i] <= most and all(np.abs(z[:, i] - z[:, j]).max() > 1e-2 for j in kept):
+            kept.append(i)
+    return np.array(kept, dtype=np.intp)
 
 
 @dataclass(frozen=True)
@@ -224,15 +253,15 @@ def _best(
 ) -> tuple[list[FitPoint], int]:
     """The rows of the best mechanisms to which dimensions ``tries (u, n)`` lead, by some rows first; and how many lead to all rows."""
     # rows by which starts are compared, starts that go down together, and those whose end is sought
-    coarse, together, most, found, sizes = fit.of_some(24), 64, 4, [tries[:, :0]], [np.zeros(0)]
+    coarse, together, most, found, sizes = fit.of_some(20), 64, 4, [tries[:, :0]], [np.zeros(0)]
     count = 0
     for k in range(0, tries.shape[1], together):
         here, came = coarse.begun(tries[:, k : k + together])
         here, count = coarse.taken(here, np.flatnonzero(came)), count + int(came.sum())
         # the better half goes on, with open drivers put anew where the path comes nearest
-        for _ in range(4 if came.any() else 0):
-            here, size = descended(coarse, here, low, high, 8)
-            if coarse.open.any():
+        for n in (3, 6, 10, 16) if came.any() else ():
+            here, size = descended(coarse, here, low, high, n)
+            if coarse.open.any() and n > 3:
                 there, came = coarse.begun(here.z)
                 again = (coarse.missed(there) ** 2).sum(axis=(0, 2))
                 here, size = (
@@ -246,12 +275,8 @@ def _best(
         if progress is not None:
             progress(f"{min(k + together, tries.shape[1])} of {tries.shape[1]} starts")
     z, size = np.concatenate(found, axis=1), np.concatenate(sizes)
-    kept = list[int]()
-    # those that differ, in L
-    for i in np.argsort(size, kind="stable").tolist():
-        if len(kept) < most and all(np.abs(z[:, i] - z[:, j]).max() > 1e-2 for j in kept):
-            kept.append(i)
-    here, came = fit.begun(z[:, kept]) if kept else (here, np.zeros(0, dtype=bool))
+    kept = _different(z, size, np.inf)[:most]
+    here, came = fit.begun(z[:, kept]) if kept.size else (here, np.zeros(0, dtype=bool))
     if not came.any():
         return [], count
     here = settled(fit, fit.taken(here, np.flatnonzero(came)), low, high)
