@@ -266,7 +266,9 @@ class Fit:
             out[near] = size[:, self.rank - 1] / size[:, 0]
         return out
 
-    def margin_slopes(self, here: FitPoint, rows: Index, which: Index, rates: tuple[Array, Array]) -> tuple[Array, Array]:
+    def margin_slopes(
+        self, here: FitPoint, rows: Index, which: Index, rates: tuple[Array, Array]
+    ) -> tuple[Array, Array]:
         """Derivatives of the margins of some rows of mechanisms by the unknowns ``(r, u)`` and their drivers ``(r, d)``.
 
         With singular vectors ``ds_i = u_i^T dF_q v_i``; the matrix changes along tangents, by differences.

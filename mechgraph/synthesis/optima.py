@@ -1,4 +1,4 @@
-"""Starts of fits and their way to optima: all together by the method of Levenberg and Marquardt, the best of them to the end.
+"""Starts of fits and their way to optima, all together: by the method of Levenberg and Marquardt, under limits each by itself.
 
 Starts go down on some of the rows, from which drivers are eliminated one by one: each acts on its own row. The best of them are followed to
 the end on all rows.
@@ -30,58 +30,75 @@ from mechgraph.variants.numbers import ItemField, varied
 from mechgraph.variants.work import quantity, solve_together
 
 
-ACC = True
+class _DampedStep:
+    """Steps of mechanisms by the method of Levenberg and Marquardt.
+
+    With ``J = [Z Y]`` by the unknowns and the drivers ``Y^T Y`` is diagonal, as a driver acts on its own row: the unknowns are those of
+    ``(Z^T Z + m D - Z^T Y (Y^T Y)^-1 Y^T Z) dz``, ``D`` the diagonal of ``Z^T Z``, the damping ``m`` one for each mechanism.
+    """
+
+    def __init__(
+        self, here: FitPoint, Z: Array, y: Array, damping: Array, open_: Mask, ends: tuple[Array, Array]
+    ) -> None:
+        self.z, self.rows, self.y, self.ends, self.open = here.z, Z.swapaxes(0, 1), y, ends, open_
+        u, T = here.z.shape
+        self.unit, self.whole = np.eye(u, dtype=bool), self.rows.reshape(T, -1, u)
+        self.across = (y.swapaxes(0, 1)[:, :, None] @ self.rows)[:, :, 0]
+        self.own = np.where(open_[:, None], (y**2).sum(axis=2) * (1 + damping) + np.finfo(float).tiny, 1.0).T
+        A = self.whole.swapaxes(1, 2) @ self.whole
+        self.scale = np.where(self.unit, A, 0.0).max(axis=1) + 1e-14
+        damped = self.unit * (self.scale * damping[:, None])[:, None]
+        self.A = A + damped - self.across.swapaxes(1, 2) @ (self.across / self.own[..., None])
+
+    def least(self, r: Array) -> tuple[Array, Array]:
+        """Changes of unknowns ``(u, T)`` and open drivers ``(n, T)`` that make ``r (n, T, k)`` least."""
+        pull, (low, high) = (self.y * r).sum(axis=2).T, self.ends
+        flat = r.swapaxes(0, 1).reshape(len(pull), 1, -1)
+        g = (flat @ self.whole)[:, 0] - ((pull / self.own)[:, None] @ self.across)[:, 0]
+        # unknowns at a bound that would leave it stay
+        held = (((self.z <= low) & (g.T > 0)) | ((self.z >= high) & (g.T < 0))).T
+        A = np.where(held[:, :, None] | held[:, None], self.unit, self.A)
+        dz = -np.linalg.solve(A, np.where(held, 0.0, g)[..., None])[..., 0].T
+        dz = np.clip(self.z + dz, low, high) - self.z
+        moved = -(pull + (self.across @ dz.T[..., None])[..., 0]) / self.own
+        return dz, np.where(self.open[:, None], moved.T, 0.0)
+
+    def along(self, dz: Array, dt: Array) -> Array:
+        """By how much what is missed changes ``(n, T, k)``."""
+        return (self.rows @ dz.T[:, None, :, None])[..., 0].swapaxes(0, 1) + self.y * dt[..., None]
+
+    def size(self, dz: Array) -> Array:
+        """Squares ``(T,)`` of the lengths of changes."""
+        return (self.scale * dz.T**2).sum(axis=1)
+
 
 def descended(
     fit: Fit, here: FitPoint, low: Array, high: Array, steps: int, weight: Array | None = None
 ) -> tuple[FitPoint, Array]:
     """The rows of mechanisms on their way to the least sums of squares, some steps on; and these sums ``(T,)``.
 
-    With ``J = [Z Y]`` by the unknowns and the drivers ``Y^T Y`` is diagonal, as a driver acts on its own row: the unknowns are those of
-    ``(Z^T Z + m D - Z^T Y (Y^T Y)^-1 Y^T Z) dz``, ``D`` the diagonal of ``Z^T Z``, the damping ``m`` one for each mechanism.
-
-    What is missed is followed by a ``weight (T,)`` times how far margins are below what an optimum has and a quarter more, as logarithms.
+    Steps bend with the valley, by the second derivative along them: Transtrum and Sethna, Improvements to the Levenberg-Marquardt
+    algorithm, arXiv:1201.5885, 2012. What is missed is followed by a ``weight (T,)`` times how far margins are below ``fit.wide``, as
+    logarithms.
     """
-    low, high = low[: len(here.z), None], high[: len(here.z), None]
-    T, open_, unit = here.z.shape[1], np.asarray(fit.open.any(axis=1))[:, None], np.eye(len(here.z), dtype=bool)
-    weight = np.zeros(T) if weight is None else weight
+    u, T, open_ = len(here.z), here.z.shape[1], np.asarray(fit.open.any(axis=1))
+    ends, weight = (low[:u, None], high[:u, None]), np.zeros(T) if weight is None else weight
     left = _left(fit, here, weight)
     size, damping, quiet = (left**2).sum(axis=(0, 2)), np.full(T, 1e-2), np.zeros(T, dtype=np.intp)
+    # part of a step on which its bend is seen
+    part, each = 0.1, fit.open[:, :, None].astype(float)
     for _ in range(steps):
         rates = fit.rates(here)
-        Z, y = _left_rates(fit, here, rates, weight)
-        rows = Z.swapaxes(0, 1)
-        whole = rows.reshape(T, -1, len(here.z))
-        across = (y.swapaxes(0, 1)[:, :, None] @ rows)[:, :, 0]
-        own = np.where(open_, (y**2).sum(axis=2) * (1 + damping) + np.finfo(float).tiny, 1.0).T
-        A = whole.swapaxes(1, 2) @ whole
-        scale = np.where(unit, A, 0.0).max(axis=1) + 1e-14
-        A += unit * (scale * damping[:, None])[:, None] - across.swapaxes(1, 2) @ (across / own[..., None])
-
-        def way(r: Array, z: Array) -> tuple[Array, Array]:
-            """By how much unknowns and open drivers change to make ``r (n, T, k)`` least; unknowns at a bound that would leave it stay."""
-            pull = (y * r).sum(axis=2).T
-            g = (r.swapaxes(0, 1).reshape(T, 1, -1) @ whole)[:, 0] - ((pull / own)[:, None] @ across)[:, 0]
-            held = (((z <= low) & (g.T > 0)) | ((z >= high) & (g.T < 0))).T
-            dz = -np.linalg.solve(
-                np.where(held[:, :, None] | held[:, None], unit, A), np.where(held, 0.0, g)[..., None]
-            )[..., 0].T
-            dz = np.clip(z + dz, low, high) - z
-            return dz, np.where(open_, -(pull + (across @ dz.T[..., None])[..., 0]).T / own.T, 0.0)
-
-        dz, dt = way(left, here.z)
-        ahead = np.where(fit.open[:, :, None], 1.0, 0.0)
-        if ACC:
-            h = 0.1
-            there, came = fit.stepped(here, rates, here.z + h * dz, here.theta + ahead * (h * dt)[:, None])
-            along = (rows @ dz.T[:, None, :, None])[..., 0].swapaxes(0, 1) + y * dt[..., None]
-            bend = 2 / h * ((_left(fit, there, weight) - left) / h - along)
-            az, at = way(np.where(came[:, None], bend, 0.0), here.z)
-            short = (scale * az.T**2).sum(axis=1) < 0.5 * (scale * dz.T**2).sum(axis=1)
-            curved = fit.p.system.difference(there.x, here.x) - h * fit.moves(rates, dz, ahead * dt[:, None])
-            dz, dt = dz + np.where(short, 0.5 * az, 0.0), dt + np.where(short, 0.5 * at, 0.0)
-        z = np.clip(here.z + dz, low, high)
-        there, came = fit.stepped(here, rates, z, here.theta + ahead * dt[:, None], np.where(came & short, curved / h**2, 0.0))
+        step = _DampedStep(here, *_left_rates(fit, here, rates, weight), damping, open_, ends)
+        dz, dt = step.least(left)
+        there, came = fit.stepped(here, rates, here.z + part * dz, here.theta + each * (part * dt)[:, None])
+        bend = ((_left(fit, there, weight) - left) / part - step.along(dz, dt)) / part
+        az, at = step.least(np.where(came[:, None], bend, 0.0))
+        curved = fit.p.system.difference(there.x, here.x) / part - fit.moves(rates, dz, each * dt[:, None])
+        short = came & (step.size(az) < 0.125 * step.size(dz))
+        dz, dt = np.clip(here.z + dz + np.where(short, az, 0.0), *ends) - here.z, dt + np.where(short, at, 0.0)
+        theta = here.theta + each * dt[:, None]
+        there, came = fit.stepped(here, rates, here.z + dz, theta, np.where(short, curved / part, 0.0))
         new = _left(fit, there, weight)
         sizes = np.where(came, (new**2).sum(axis=(0, 2)), np.inf)
         better = sizes < size
@@ -154,7 +171,7 @@ def _different(z: Array, size: Array, most: float) -> Index:
 
 
 @dataclass(frozen=True)
-class Limit:
+class RowLimit:
     """Numbers ``of (k, T)`` the rows of mechanisms, which must not fall below the ``least`` or rise above the ``most``.
 
     ``by_drivers``: whether they change with the open drivers of rows.
@@ -168,6 +185,17 @@ class Limit:
     def kept(self, here: FitPoint) -> bool:
         """Whether the rows of a mechanism keep it."""
         return keeps(self.of(here), self.least, self.most)
+
+    @property
+    def ends(self) -> list[tuple[float, float]]:
+        """The ends that there are, with the senses in which numbers lie on the right side of them, over their sizes."""
+        return [(s / max(1.0, abs(end)), end) for s, end in ((1.0, self.least), (-1.0, self.most)) if end is not None]
+
+    def amiss(self, here: FitPoint) -> float:
+        """How far the rows of a mechanism fall short of it; infinite where there is no number."""
+        values = self.of(here)
+        short = max((float((-sense * (values - end)).max(initial=0.0)) for sense, end in self.ends), default=0.0)
+        return short if np.isfinite(values).all() else np.inf
 
 
 @dataclass(frozen=True)
@@ -183,8 +211,8 @@ def fitted(
     way: str | None,
     starts: int,
     bounds: Bounds,
-    goal: Limit | None = None,
-    limits: Sequence[Limit] = (),
+    goal: RowLimit | None = None,
+    limits: Sequence[RowLimit] = (),
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
     exact: Iterable[Array] = (),
@@ -198,18 +226,18 @@ def fitted(
     box = np.where(np.isfinite(low[:u]), low[:u], fit.z0 - 0.5), np.where(np.isfinite(high[:u]), high[:u], fit.z0 + 0.5)
     told = [fit.p.inside(values[:, None])[:, 0] for values in exact]
     tries = [fit.z0, *told, *(rng.uniform(*box) for _ in range(starts - 1 - len(told)))]
-    begun, count = _best(fit, np.clip(np.transpose(tries), low[:u, None], high[:u, None]), low, high, progress)
+    begun, count = _best(fit, np.clip(np.transpose(tries), low[:u, None], high[:u, None]), low, high, limits, progress)
     evolved = None if begun else _evolved(fit, *box, seed)
     begun += [] if evolved is None else [evolved]
     ends: list[FitPoint] = []
     unsafe = lost = early = 0
-    wide = Limit(fit.margins, LEAST_MARGIN, None)
+    wide = RowLimit(fit.margins, LEAST_MARGIN, None)
     for i, begin in enumerate(begun, 1):
         if progress is not None:
             progress(f"best start {i} of {len(begun)} to the end")
         end: FitPoint | None = begin
         narrow = fit.margins(begin).min() < LEAST_MARGIN
-        if narrow or way != "least_squares" or not all(limit.kept(begin) for limit in limits):
+        if narrow or way != "least_squares" or limits:
             end, came = constrained(fit, begin, low, high, way, goal, [*limits, wide] if narrow else limits)
             early += end is not None and not came
         if end is None:
@@ -244,14 +272,17 @@ def fitted(
             f"Left out: {unsafe} of which the path does not lead through all rows, {lost} that came to no optimum within the limits."
         )
     if early:
-        words.append(f"Stopped after 100 steps, before the optimum: {early}; better ones may be near.")
+        words.append(f"Stopped before the optimum: {early}; better ones may be near.")
     return Fitted(tuple(kept), tuple(words))
 
 
 def _best(
-    fit: Fit, tries: Array, low: Array, high: Array, progress: Callable[[str], None] | None
+    fit: Fit, tries: Array, low: Array, high: Array, limits: Sequence[RowLimit], progress: Callable[[str], None] | None
 ) -> tuple[list[FitPoint], int]:
-    """The rows of the best mechanisms to which dimensions ``tries (u, n)`` lead, by some rows first; and how many lead to all rows."""
+    """The rows of the best mechanisms to which dimensions ``tries (u, n)`` lead, by some rows first; and how many lead to all rows.
+
+    Under limits also those that fall short of them by the least, before what is missed is as small as can be.
+    """
     # rows by which starts are compared, starts that go down together, and those whose end is sought
     coarse, together, most, found, sizes = fit.of_some(20), 64, 4, [tries[:, :0]], [np.zeros(0)]
     count = 0
@@ -270,17 +301,29 @@ def _best(
                 )
             order = np.argsort(size, kind="stable")[: max(len(size) // 2, most)]
             here, size = coarse.taken(here, order), size[order]
+            if limits and n == 6:
+                found.append(here.z)
+                sizes.append(size)
         found.append(here.z)
         sizes.append((coarse.missed(here) ** 2).sum(axis=(0, 2)))
         if progress is not None:
             progress(f"{min(k + together, tries.shape[1])} of {tries.shape[1]} starts")
     z, size = np.concatenate(found, axis=1), np.concatenate(sizes)
-    kept = _different(z, size, np.inf)[:most]
+    kept = _different(z, size, np.inf)[: 6 * most if limits else most]
     here, came = fit.begun(z[:, kept]) if kept.size else (here, np.zeros(0, dtype=bool))
     if not came.any():
         return [], count
-    here = settled(fit, fit.taken(here, np.flatnonzero(came)), low, high)
-    return [fit.taken(here, np.array([i])) for i in range(here.z.shape[1])], count
+    here = fit.taken(here, np.flatnonzero(came))
+    each = [fit.taken(here, np.array([i])) for i in range(here.z.shape[1])]
+    best = settled(fit, fit.taken(here, np.arange(min(most, len(each)))), low, high)
+    ends = [fit.taken(best, np.array([i])) for i in range(best.z.shape[1])]
+    if not limits:
+        return ends, count
+    # that which misses least leads the way, in parts of L and of limits
+    amiss = {id(one): max(limit.amiss(one) for limit in limits) for one in [*ends, *each]}
+    each.sort(key=lambda one: amiss[id(one)] + float(np.sqrt((fit.residual(one) ** 2).mean())))
+    every = [*ends[:2], *each]
+    return [one for one in every if np.isfinite(amiss[id(one)])][:most] or every[:1], count
 
 
 def _evolved(fit: Fit, low: Array, high: Array, seed: int) -> FitPoint | None:
@@ -310,8 +353,8 @@ def constrained(
     low: Array,
     high: Array,
     way: str | None,
-    goal: Limit | None,
-    limits: Sequence[Limit],
+    goal: RowLimit | None,
+    limits: Sequence[RowLimit],
 ) -> tuple[FitPoint | None, bool]:
     """The best rows to which a start leads under limits, by sequential quadratic programs; None where they are not kept there. Also
     whether the optimizer came to an end before it had to stop.
@@ -319,6 +362,11 @@ def constrained(
     ``way`` is ``"least_squares"``, ``"minimax"`` (the least slack ``s`` with ``|r_i|^2 <= s`` at every row), or None: what is asked is met,
     and the ``goal`` is as small as it can be.
     """
+    came = True
+    if limits and (way == "least_squares" or not all(limit.kept(begin) for limit in limits)):
+        begin, came = within(fit, begin, low, high, limits, 60)
+    if way == "least_squares":
+        return (begin if all(limit.kept(begin) for limit in limits) else None), came
     course = _RowCourse(fit, begin, way, goal)
     constraints = [{"type": "ineq", "fun": f, "jac": df} for f, df in course.ends(low, high)]
     if way is None:
@@ -328,10 +376,7 @@ def constrained(
         constraints.append(met)
     if course.slack:
         constraints.append({"type": "ineq", "fun": course.slacks, "jac": course.slack_slopes})
-    for limit in limits:
-        for sign, end in ((1.0, limit.least), (-1.0, limit.most)):
-            if end is not None:
-                constraints.append(course.limit(limit, sign, end))
+    constraints += [course.limit(limit, *end) for limit in limits for end in limit.ends]
     aim, slope = course.aim
     found: Any = scipy.optimize.minimize(  # type: ignore[call-overload]  # the stubs know no constraints as tables
         aim, course.begin, jac=slope, constraints=constraints, method="SLSQP", options={"maxiter": 100, "ftol": 1e-12}
@@ -344,19 +389,138 @@ def constrained(
     return (here if all(limit.kept(here) for limit in limits) else None), bool(found.success)
 
 
+class _Beside:
+    """Numbers of rows, and differences of those that have no exact derivatives; of the last rows that were asked they are known."""
+
+    step = 1e-5
+    """In variables of the vector."""
+
+    def __init__(self, fit: Fit) -> None:
+        self.fit, self._known = fit, dict[RowLimit, tuple[FitPoint, Array]]()
+        self._near: tuple[Any, int, Any] = None, 0, None
+
+    def values(self, limit: RowLimit, here: FitPoint) -> Array:
+        """Numbers ``(k,)`` of the rows."""
+        if self._known.get(limit, (None,))[0] is not here:
+            # where there is no number rows are worse than any that have one
+            self._known[limit] = here, np.nan_to_num(limit.of(here)[:, 0], nan=1e3 if limit.least is None else -1e3)
+        return self._known[limit][1]
+
+    def slopes(self, limit: RowLimit, here: FitPoint) -> Array:
+        """Central differences by the vector; of one side where the rows come to that one alone."""
+        base, (row, _), u = self.values(limit, here), np.nonzero(self.fit.open), len(here.z)
+        # one number a row: it changes with the driver of its own row alone, so that all drivers are moved at once
+        alone = len(base) == self.fit.rows
+        more = (1 if alone else row.size) if limit.by_drivers and row.size else 0
+        there, came = self._moved(here, u + more)
+        values = limit.of(there)
+        values = np.where(came & np.isfinite(values), values, base[:, None]).reshape(len(base), 2, -1)
+        slope = (values[:, 0] - values[:, 1]) / (self.step * np.maximum(came.reshape(2, -1).sum(axis=0), 1))
+        out = np.zeros((len(base), u + row.size))
+        if more and alone:
+            out[row, np.arange(u, u + row.size)] = slope[row, u]
+            out[:, :u] = slope[:, :u]
+        else:
+            out[:, : u + more] = slope
+        return out
+
+    def _moved(self, here: FitPoint, n: int) -> tuple[FitPoint, Mask]:
+        """Rows a step away from others along the first ``n`` variables, where these are one more than the unknowns along all others at
+        once; which came.
+        """
+        if self._near[0] is not here or self._near[1] != n:
+            u, v = len(here.z), len(self.fit.vector(here))
+            ways, theta = np.eye(v)[:n], np.repeat(here.theta, 2 * n, axis=2)
+            ways[u:, n - 1 :] = 1.0 if n == u + 1 else ways[u:, n - 1 :]
+            dv = self.step * np.concatenate([ways, -ways]).T
+            theta[self.fit.open] += dv[u:]
+            self._near = here, n, self.fit.stepped(here, self.fit.rates(here), here.z + dv[:u], theta)
+        return self._near[2]
+
+
+def within(
+    fit: Fit, here: FitPoint, low: Array, high: Array, limits: Sequence[RowLimit], steps: int
+) -> tuple[FitPoint, bool]:
+    """The rows with the least sum of squares under limits to which a start leads; whether it comes to rest there.
+
+    By the method of Levenberg and Marquardt with limits that are linear in each step, missed by a slack that costs much; steps are taken
+    that make the sum of the squares smaller, and how far limits are missed times more than all multipliers.
+    """
+    beside, ends = _Beside(fit), [(limit, *end) for limit in limits for end in limit.ends]
+
+    def told(at: FitPoint) -> tuple[Array, Array]:
+        """What is missed, and how far above limits the numbers are, over their sizes."""
+        above = [sense * (beside.values(limit, at) - end) for limit, sense, end in ends]
+        return fit.residual(at), np.concatenate(above)
+
+    # limits may be missed by a little on the way, as they bend
+    (r, c), damping, price, quiet, slip = told(here), 1e-3, 0.0, 0, 1e-3
+    for k in range(steps):
+        v, J, rates = fit.vector(here), fit.jacobian(here), fit.rates(here)
+        C = [sense * beside.slopes(limit, here) for limit, sense, _ in ends]
+        bounded = [np.flatnonzero(np.isfinite(end)) for end in (low, high)]
+        C += [np.eye(len(v))[bounded[0]], -np.eye(len(v))[bounded[1]]]
+        room = np.concatenate([c, (v - low)[bounded[0]], (high - v)[bounded[1]]])
+        for _ in range(12):
+            D = np.sqrt(damping) * np.maximum(np.linalg.norm(J, axis=0), 1e-2)
+            d, most = _step(np.concatenate([J, np.diag(D)]), np.append(-r, np.zeros(len(v))), np.concatenate(C), room)
+            price = max(price, 2.0 * most)
+            z, theta = fit.parts(v + d)
+            dq = np.abs(fit.moves(rates, z - here.z, theta - here.theta)).max()
+            if dq > 0.5:
+                z, theta = fit.parts(v + d * (0.5 / dq))
+            there, came = fit.stepped(here, rates, z, theta)
+            if came[0]:
+                new = told(there)
+                gained = _merit(r, c + slip, price) - _merit(new[0], new[1] + slip, price)
+            if came[0] and gained > 0:
+                break
+            damping = min(damping * 6, 1e12)
+        else:
+            gained, there, new, quiet = 0.0, here, (r, c), quiet + 4
+        quiet = 0 if gained > 1e-6 * _merit(new[0], new[1] + slip, price) + 1e-20 else quiet + 1
+        here, (r, c), damping = there, new, max(damping / 5, 1e-12)
+        if quiet > 3 and not slip:
+            return here, True
+        if quiet > 3 or 3 * k > 2 * steps:
+            slip, quiet = 0.0, 0
+    return here, False
+
+
+def _merit(r: Array, c: Array, price: float) -> float:
+    return 0.5 * float(r @ r) + price * float(np.maximum(-c, 0.0).max(initial=0.0))
+
+
+def _step(E: Array, f: Array, C: Array, room: Array) -> tuple[Array, float]:
+    """The least ``|E d - f|`` under ``C d + s + room >= 0``, with a slack ``s`` that costs much; and the sum of the multipliers.
+
+    A problem of least distance, which becomes one of least squares without negative numbers: Lawson and Hanson, Solving Least Squares
+    Problems, 1974, chapter 23.
+    """
+    n = E.shape[1]
+    E = np.pad(E, ((0, 1), (0, 1)))
+    E[-1, -1] = 1e3
+    Q, R = np.linalg.qr(E)
+    base = Q.T @ np.append(f, 0.0)
+    G = np.concatenate([np.pad(C, ((0, 0), (0, 1)), constant_values=1.0), np.eye(n + 1)[-1:]])
+    GR = scipy.linalg.solve_triangular(R, G.T, trans="T").T
+    h = -np.append(room, 0.0) - GR @ base
+    u, _ = scipy.optimize.nnls(np.vstack([GR.T, h]), np.append(np.zeros(n + 1), 1.0))
+    left = np.append(GR.T @ u, h @ u - 1.0)
+    y = -left[:-1] / left[-1]
+    return scipy.linalg.solve_triangular(R, base + y)[:n], float(-u[:-1].sum() / left[-1])
+
+
 class _RowCourse:
     """Rows as functions of variables ``w``, in which what is missed changes by as much in all directions: ``v = v_0 + P w``.
 
     With ``J / unit = U S V^T`` at the start ``P = V S^-1``, small singular values left out of the inverse. Behind stands the slack.
     """
 
-    step = 1e-5
-    """Of differences, in variables of the vector."""
-
-    def __init__(self, fit: Fit, begin: FitPoint, way: str | None, goal: Limit | None) -> None:
+    def __init__(self, fit: Fit, begin: FitPoint, way: str | None, goal: RowLimit | None) -> None:
         self.goal, self.slack = goal, way != "least_squares"
         self.fit, self.kept, self._last = fit, begin, begin
-        self._known, self._near = dict[Limit, tuple[FitPoint, Array]](), (None, 0, None)
+        self.beside = _Beside(fit)
         self.unit = max(float(np.abs(fit.residual(begin)).max(initial=0.0)), 1e-9)
         _, sigma, Vt = np.linalg.svd(fit.jacobian(begin) / self.unit, full_matrices=True)
         size = np.zeros(len(Vt))
@@ -409,7 +573,7 @@ class _RowCourse:
 
     def _small(self, w: Array) -> Array:
         """What is to be small everywhere: the goal, else the squares."""
-        return self.squares(w) if self.goal is None else self.values(self.goal, w)
+        return self.squares(w) if self.goal is None else self.beside.values(self.goal, self.point(w))
 
     def slacks(self, w: Array) -> Array:
         """How far that is below the slack."""
@@ -419,47 +583,17 @@ class _RowCourse:
         """Its derivatives."""
         return np.eye(len(w))[-1] - (self.squares_slope(w) if self.goal is None else self.slopes(self.goal, w))
 
-    def values(self, limit: Limit, w: Array) -> Array:
-        """Numbers ``(k,)`` of the rows."""
-        here = self.point(w)
-        if self._known.get(limit, (None,))[0] is not here:
-            self._known[limit] = here, limit.of(here)[:, 0]
-        return self._known[limit][1]
+    def slopes(self, limit: RowLimit, w: Array) -> Array:
+        """Of numbers by the variables."""
+        self.kept = self.point(w)
+        return self._padded(self.beside.slopes(limit, self.kept))
 
-    def slopes(self, limit: Limit, w: Array) -> Array:
-        """Central differences of numbers that have no exact derivatives; of one side where the rows come to that one alone."""
-        here = self.kept = self.point(w)
-        base, (row, _), u = self.values(limit, w), np.nonzero(self.fit.open), len(here.z)
-        # one number a row: it changes with the driver of its own row alone, so that all drivers are moved at once
-        alone = len(base) == self.fit.rows
-        more = (1 if alone else row.size) if limit.by_drivers and row.size else 0
-        there, came = self._beside(here, u + more)
-        values = np.where(came, limit.of(there), base[:, None]).reshape(len(base), 2, -1)
-        slope = (values[:, 0] - values[:, 1]) / (self.step * np.maximum(came.reshape(2, -1).sum(axis=0), 1))
-        out = np.zeros((len(base), len(self.v)))
-        if more and alone:
-            out[row, np.arange(u, len(self.v))] = slope[row, u]
-            out[:, :u] = slope[:, :u]
-        else:
-            out[:, : u + more] = slope
-        return self._padded(out)
-
-    def _beside(self, here: FitPoint, n: int) -> tuple[FitPoint, Mask]:
-        """Rows a step away from others along the first ``n`` variables of the vector, the last way along all that are left; which came."""
-        if self._near[0] is not here or self._near[1] != n:
-            ways, u, theta = np.eye(len(self.v))[:n], len(here.z), np.repeat(here.theta, 2 * n, axis=2)
-            ways[u:, n - 1 :] = 1.0 if n == u + 1 else ways[u:, n - 1 :]
-            dv = self.step * np.concatenate([ways, -ways]).T
-            theta[self.fit.open] += dv[u:]
-            self._near = here, n, self.fit.stepped(here, self.fit.rates(here), here.z + dv[:u], theta)
-        return self._near[2]
-
-    def limit(self, limit: Limit, sign: float, end: float) -> dict[str, Any]:
+    def limit(self, limit: RowLimit, sense: float, end: float) -> dict[str, Any]:
         """A limit as the optimizer wants it."""
         return {
             "type": "ineq",
-            "fun": lambda w: sign * (self.values(limit, w) - end),
-            "jac": lambda w: sign * self.slopes(limit, w),
+            "fun": lambda w: sense * (self.beside.values(limit, self.point(w)) - end),
+            "jac": lambda w: sense * self.slopes(limit, w),
         }
 
     def ends(self, low: Array, high: Array) -> Iterator[tuple[Any, Any]]:
@@ -494,19 +628,19 @@ class FittedSynthesis:
         m = p.unknowns.mechanism(p.outside(here.z)[:, 0])
         return m.replace(start=dict(zip(m.freedom_names(), q[0].tolist(), strict=True))), q
 
-    def limit(self, what: Any, least: float | None = None, most: float | None = None, sign: float = 1.0) -> Limit:
-        """A quantity of fitted rows, times a sign; where it has no value one that keeps no limit."""
+    def limit(self, what: Any, least: float | None = None, most: float | None = None, sign: float = 1.0) -> RowLimit:
+        """A quantity of fitted rows, times a sign."""
         measure = what if isinstance(what, Measure) else Measure(self.problem.m, what, self.over)
-        of = partial(self._measured, measure, sign, -1e3 if least is not None else 1e3, least is None and sign > 0)
-        return Limit(of, least, most, not (measure.of_dimensions or self.over))
+        of = partial(self._measured, measure, sign, least is None and sign > 0)
+        return RowLimit(of, least, most, not (measure.of_dimensions or self.over))
 
-    def _measured(self, measure: Measure, sign: float, none: float, smooth: bool, here: FitPoint) -> Array:
-        """A quantity ``(k, T)`` of mechanisms."""
+    def _measured(self, measure: Measure, sign: float, smooth: bool, here: FitPoint) -> Array:
+        """A quantity ``(k, T)`` of mechanisms; NaN where it has no value."""
         values = self._together(measure, here)
         if values is None:
             each = (self.rows(self.fit.taken(here, np.array([i]))) for i in range(here.z.shape[1]))
             values = np.stack([measure(m, q, self.driver, smooth) for m, q in each], axis=1)
-        return np.nan_to_num(sign * values, nan=none)
+        return np.asarray(sign * values)
 
     def _together(self, measure: Measure, here: FitPoint) -> Array | None:
         """A quantity of mechanisms side by side, near the first of them; None where it has to be taken of each alone."""
