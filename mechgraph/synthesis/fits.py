@@ -11,7 +11,7 @@ sign at a row is refused, and of what is found the path follower of ``solve`` ha
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -26,6 +26,7 @@ from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
+from mechgraph.synthesis.fitness import keeps
 from mechgraph.synthesis.system import ArrowRows, RowProblem
 from mechgraph.synthesis.tasks import FunctionTask
 
@@ -80,12 +81,14 @@ class Fit:
         Values of the drivers, and which are unknown.
     wanted : (n, k) array
         Values of the other coordinates asked ``others (k,)``, NaN where nothing is; times ``factors`` where these are unknown.
+    own, over : int, (k, d) array
+        How many rows ask for something; behind them stand those that are led over values of the drivers, and asked for nothing.
     """
 
     wide = 1.1 * LEAST_MARGIN
     """Margin below which optima are led to wider ones."""
 
-    def __init__(self, problem: RowProblem, tasks: Any) -> None:
+    def __init__(self, problem: RowProblem, tasks: Any, over: Any = None) -> None:
         self.p, self.tasks, s = problem, tasks, problem.system
         if problem.rates:
             told = "rates (velocities, accelerations, twists) are met exactly or not at all; leave them out of a fit"
@@ -110,11 +113,29 @@ class Fit:
         self.others: Index = problem.columns[kept]
         self.wanted, self.factor_of = problem.asked[:, kept], problem.factor_of[kept]
         self._check(x)
+        if over is not None and not isinstance(over, np.ndarray):
+            over = self._over(over)
+        self.own, self.over = self.rows, self.theta[:0] if over is None else np.asarray(over)
+        more, self.rows = len(self.over), self.rows + len(self.over)
+        self.theta = np.concatenate([self.theta, self.over])
+        self.open, self.wanted = (
+            np.pad(v, ((0, more), (0, 0)), constant_values=none)
+            for v, none in ((self.open, False), (self.wanted, np.nan))
+        )
 
     def of_some(self, most: int) -> Fit:
-        """The same of so many rows at most, the first among them."""
-        rows = np.unique(np.linspace(0, self.rows - 1, min(most, self.rows)).round().astype(np.intp))
-        return Fit(self.p.with_rows(rows), self.tasks)
+        """The same of so many rows at most of which something is asked, the first among them."""
+        rows = np.unique(np.linspace(0, self.own - 1, min(most, self.own)).round().astype(np.intp))
+        return Fit(self.p.with_rows(rows), self.tasks, self.over)
+
+    def _over(self, over: Mapping[str, Any]) -> Array | None:
+        """Values ``(k, d)`` of the drivers over which conditions hold; None where others drive there."""
+        names = [self.p.whole.freedom_names()[k] for k in self.drivers]
+        given = {self.p.m.full_name(name): np.ravel(values) for name, values in over.items()}
+        if set(given) != set(names):
+            return None
+        unit = np.where(self.p.system.is_length[self.drivers], self.p.L, 1.0)
+        return np.stack(np.broadcast_arrays(*map(given.__getitem__, names)), axis=1) / unit
 
     def _drivers(self, tasks: Any) -> Index:
         """Columns of freedoms with given values: inputs of functions, those with timing, then the drives."""
@@ -448,3 +469,80 @@ class Fit:
         low, high = (self.p.inside(end[:, None])[:, 0] for end in (low, high))
         rest = np.full(int(self.open.sum()), np.inf)
         return np.concatenate([low, -rest]), np.concatenate([high, rest])
+
+
+@dataclass(frozen=True)
+class RowLimit:
+    """Numbers ``of (k, T)`` the rows of mechanisms, which must not fall below the ``least`` or rise above the ``most``.
+
+    ``by_drivers``: whether they change with the open drivers of rows.
+    """
+
+    of: Callable[[FitPoint], Array]
+    least: float | None = None
+    most: float | None = None
+    by_drivers: bool = True
+
+    def kept(self, here: FitPoint) -> bool:
+        """Whether the rows of a mechanism keep it."""
+        return keeps(self.of(here), self.least, self.most)
+
+    @property
+    def ends(self) -> list[tuple[float, float]]:
+        """The ends that there are, with the senses in which numbers lie on the right side of them, over their sizes."""
+        return [(s / max(1.0, abs(end)), end) for s, end in ((1.0, self.least), (-1.0, self.most)) if end is not None]
+
+    def amiss(self, here: FitPoint) -> float:
+        """How far the rows of a mechanism fall short of it; infinite where there is no number."""
+        values = self.of(here)
+        short = max((float((-sense * (values - end)).max(initial=0.0)) for sense, end in self.ends), default=0.0)
+        return short if np.isfinite(values).all() else np.inf
+
+
+class RowDifferences:
+    """Numbers of rows, and differences of those that have no exact derivatives; of the last rows that were asked they are known."""
+
+    step = 1e-5
+    """In variables of the vector."""
+
+    def __init__(self, fit: Fit) -> None:
+        self.fit, self._known = fit, dict[RowLimit, tuple[FitPoint, Array]]()
+        self._near: tuple[Any, int, Any] = None, 0, None
+
+    def values(self, limit: RowLimit, here: FitPoint) -> Array:
+        """Numbers ``(k,)`` of the rows."""
+        if self._known.get(limit, (None,))[0] is not here:
+            # where there is no number rows are worse than any that have one
+            self._known[limit] = here, np.nan_to_num(limit.of(here)[:, 0], nan=1e3 if limit.least is None else -1e3)
+        return self._known[limit][1]
+
+    def slopes(self, limit: RowLimit, here: FitPoint) -> Array:
+        """Central differences by the vector; of one side where the rows come to that one alone."""
+        base, (row, _), u = self.values(limit, here), np.nonzero(self.fit.open), len(here.z)
+        # one number a row: it changes with the driver of its own row alone, so that all drivers are moved at once
+        alone = len(base) >= self.fit.own
+        more = (1 if alone else row.size) if limit.by_drivers and row.size else 0
+        there, came = self._moved(here, u + more)
+        values = limit.of(there)
+        values = np.where(came & np.isfinite(values), values, base[:, None]).reshape(len(base), 2, -1)
+        slope = (values[:, 0] - values[:, 1]) / (self.step * np.maximum(came.reshape(2, -1).sum(axis=0), 1))
+        out = np.zeros((len(base), u + row.size))
+        if more and alone:
+            out[row, np.arange(u, u + row.size)] = slope[row, u]
+            out[:, :u] = slope[:, :u]
+        else:
+            out[:, : u + more] = slope
+        return out
+
+    def _moved(self, here: FitPoint, n: int) -> tuple[FitPoint, Mask]:
+        """Rows a step away from others along the first ``n`` variables, where these are one more than the unknowns along all others at
+        once; which came.
+        """
+        if self._near[0] is not here or self._near[1] != n:
+            u, v = len(here.z), len(self.fit.vector(here))
+            ways, theta = np.eye(v)[:n], np.repeat(here.theta, 2 * n, axis=2)
+            ways[u:, n - 1 :] = 1.0 if n == u + 1 else ways[u:, n - 1 :]
+            dv = self.step * np.concatenate([ways, -ways]).T
+            theta[self.fit.open] += dv[u:]
+            self._near = here, n, self.fit.stepped(here, self.fit.rates(here), here.z + dv[:u], theta)
+        return self._near[2]

@@ -8,26 +8,29 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import partial
+from dataclasses import replace
+from functools import cached_property, partial
+from itertools import combinations_with_replacement
 from typing import Any
 
 import numpy as np
 import scipy
 
 from mechgraph.errors import DeclarationError, MechgraphWarning, counted
-from mechgraph.kinematics.prescribed import driven
-from mechgraph.kinetostatics import transmission_index, with_unit_effort
+from mechgraph.kinematics.prescribed import DriverMotion
+from mechgraph.kinetostatics import Pipeline, transmission_index, with_unit_effort
 from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.outcome import Options
+from mechgraph.outcome import Options, Starts, in_kernel
+from mechgraph.result.solution import Solution
 from mechgraph.synthesis.answers import ComplexSyntheses, Syntheses
-from mechgraph.synthesis.fitness import Measure, fitnesses, keeps
-from mechgraph.synthesis.fits import LEAST_MARGIN, Bounds, Fit, FitPoint
+from mechgraph.synthesis.fitness import Measure, distances, fitnesses
+from mechgraph.synthesis.fits import LEAST_MARGIN, Bounds, Fit, FitPoint, RowDifferences, RowLimit
 from mechgraph.synthesis.system import RowProblem
 from mechgraph.variants.numbers import ItemField, varied
-from mechgraph.variants.work import quantity, solve_together
+from mechgraph.variants.work import quantity
 
 
 class _DampedStep:
@@ -168,34 +171,6 @@ def _different(z: Array, size: Array, most: float) -> Index:
         if size[i] <= most and all(np.abs(z[:, i] - z[:, j]).max() > 1e-2 for j in kept):
             kept.append(i)
     return np.array(kept, dtype=np.intp)
-
-
-@dataclass(frozen=True)
-class RowLimit:
-    """Numbers ``of (k, T)`` the rows of mechanisms, which must not fall below the ``least`` or rise above the ``most``.
-
-    ``by_drivers``: whether they change with the open drivers of rows.
-    """
-
-    of: Callable[[FitPoint], Array]
-    least: float | None = None
-    most: float | None = None
-    by_drivers: bool = True
-
-    def kept(self, here: FitPoint) -> bool:
-        """Whether the rows of a mechanism keep it."""
-        return keeps(self.of(here), self.least, self.most)
-
-    @property
-    def ends(self) -> list[tuple[float, float]]:
-        """The ends that there are, with the senses in which numbers lie on the right side of them, over their sizes."""
-        return [(s / max(1.0, abs(end)), end) for s, end in ((1.0, self.least), (-1.0, self.most)) if end is not None]
-
-    def amiss(self, here: FitPoint) -> float:
-        """How far the rows of a mechanism fall short of it; infinite where there is no number."""
-        values = self.of(here)
-        short = max((float((-sense * (values - end)).max(initial=0.0)) for sense, end in self.ends), default=0.0)
-        return short if np.isfinite(values).all() else np.inf
 
 
 @dataclass(frozen=True)
@@ -389,55 +364,6 @@ def constrained(
     return (here if all(limit.kept(here) for limit in limits) else None), bool(found.success)
 
 
-class _Beside:
-    """Numbers of rows, and differences of those that have no exact derivatives; of the last rows that were asked they are known."""
-
-    step = 1e-5
-    """In variables of the vector."""
-
-    def __init__(self, fit: Fit) -> None:
-        self.fit, self._known = fit, dict[RowLimit, tuple[FitPoint, Array]]()
-        self._near: tuple[Any, int, Any] = None, 0, None
-
-    def values(self, limit: RowLimit, here: FitPoint) -> Array:
-        """Numbers ``(k,)`` of the rows."""
-        if self._known.get(limit, (None,))[0] is not here:
-            # where there is no number rows are worse than any that have one
-            self._known[limit] = here, np.nan_to_num(limit.of(here)[:, 0], nan=1e3 if limit.least is None else -1e3)
-        return self._known[limit][1]
-
-    def slopes(self, limit: RowLimit, here: FitPoint) -> Array:
-        """Central differences by the vector; of one side where the rows come to that one alone."""
-        base, (row, _), u = self.values(limit, here), np.nonzero(self.fit.open), len(here.z)
-        # one number a row: it changes with the driver of its own row alone, so that all drivers are moved at once
-        alone = len(base) == self.fit.rows
-        more = (1 if alone else row.size) if limit.by_drivers and row.size else 0
-        there, came = self._moved(here, u + more)
-        values = limit.of(there)
-        values = np.where(came & np.isfinite(values), values, base[:, None]).reshape(len(base), 2, -1)
-        slope = (values[:, 0] - values[:, 1]) / (self.step * np.maximum(came.reshape(2, -1).sum(axis=0), 1))
-        out = np.zeros((len(base), u + row.size))
-        if more and alone:
-            out[row, np.arange(u, u + row.size)] = slope[row, u]
-            out[:, :u] = slope[:, :u]
-        else:
-            out[:, : u + more] = slope
-        return out
-
-    def _moved(self, here: FitPoint, n: int) -> tuple[FitPoint, Mask]:
-        """Rows a step away from others along the first ``n`` variables, where these are one more than the unknowns along all others at
-        once; which came.
-        """
-        if self._near[0] is not here or self._near[1] != n:
-            u, v = len(here.z), len(self.fit.vector(here))
-            ways, theta = np.eye(v)[:n], np.repeat(here.theta, 2 * n, axis=2)
-            ways[u:, n - 1 :] = 1.0 if n == u + 1 else ways[u:, n - 1 :]
-            dv = self.step * np.concatenate([ways, -ways]).T
-            theta[self.fit.open] += dv[u:]
-            self._near = here, n, self.fit.stepped(here, self.fit.rates(here), here.z + dv[:u], theta)
-        return self._near[2]
-
-
 def within(
     fit: Fit, here: FitPoint, low: Array, high: Array, limits: Sequence[RowLimit], steps: int
 ) -> tuple[FitPoint, bool]:
@@ -446,7 +372,7 @@ def within(
     By the method of Levenberg and Marquardt with limits that are linear in each step, missed by a slack that costs much; steps are taken
     that make the sum of the squares smaller, and how far limits are missed times more than all multipliers.
     """
-    beside, ends = _Beside(fit), [(limit, *end) for limit in limits for end in limit.ends]
+    beside, ends = RowDifferences(fit), [(limit, *end) for limit in limits for end in limit.ends]
 
     def told(at: FitPoint) -> tuple[Array, Array]:
         """What is missed, and how far above limits the numbers are, over their sizes."""
@@ -520,7 +446,7 @@ class _RowCourse:
     def __init__(self, fit: Fit, begin: FitPoint, way: str | None, goal: RowLimit | None) -> None:
         self.goal, self.slack = goal, way != "least_squares"
         self.fit, self.kept, self._last = fit, begin, begin
-        self.beside = _Beside(fit)
+        self.beside = RowDifferences(fit)
         self.unit = max(float(np.abs(fit.residual(begin)).max(initial=0.0)), 1e-9)
         _, sigma, Vt = np.linalg.svd(fit.jacobian(begin) / self.unit, full_matrices=True)
         size = np.zeros(len(Vt))
@@ -619,12 +545,12 @@ class FittedSynthesis:
             raise DeclarationError(
                 self.problem.name, [f"{first}: a fit begins there; measure its poses from the first one"]
             )
-        self.fit = Fit(self.problem, tasks)
+        self.fit = Fit(self.problem, tasks, over)
 
     def rows(self, here: FitPoint) -> tuple[Mechanism, Array]:
         """The mechanism of fitted rows, and its coordinates ``(rows, F)``."""
         p = self.problem
-        q = p.system.coordinates_of(here.x[..., 0]).T[:, : len(p.m.freedom_names())]
+        q = p.system.coordinates_of(here.x[:, : self.fit.own, 0]).T[:, : len(p.m.freedom_names())]
         m = p.unknowns.mechanism(p.outside(here.z)[:, 0])
         return m.replace(start=dict(zip(m.freedom_names(), q[0].tolist(), strict=True))), q
 
@@ -636,60 +562,91 @@ class FittedSynthesis:
 
     def _measured(self, measure: Measure, sign: float, smooth: bool, here: FitPoint) -> Array:
         """A quantity ``(k, T)`` of mechanisms; NaN where it has no value."""
-        values = self._together(measure, here)
+        values = self._together(measure, smooth, here)
         if values is None:
             each = (self.rows(self.fit.taken(here, np.array([i]))) for i in range(here.z.shape[1]))
             values = np.stack([measure(m, q, self.driver, smooth) for m, q in each], axis=1)
         return np.asarray(sign * values)
 
-    def _together(self, measure: Measure, here: FitPoint) -> Array | None:
-        """A quantity of mechanisms side by side, near the first of them; None where it has to be taken of each alone."""
-        p, u, what = self.problem, self.problem.unknowns, measure.output or measure.what
+    @cached_property
+    def _squared(self) -> tuple[Array, Array, Array, Array]:
+        """Squares of all distances of elements of a link: at some unknowns ``(u,)``, there ``(k,)``, and their derivatives ``(k, u)`` and
+        ``(k, u, u)``: they are polynomials of degree two.
+        """
+        p, u = self.problem, len(self.fit.z0)
+        z, unit = np.random.default_rng(0).normal(size=u), np.eye(u)
+
+        def squares(*ways: Array) -> Array:
+            return np.asarray(distances(p.unknowns.mechanism(p.outside(sum(ways, z)[:, None])[:, 0])) ** 2)
+
+        base, ahead = squares(), np.stack([squares(e) for e in unit])
+        both = np.zeros((u, u, len(base)))
+        for i, j in combinations_with_replacement(range(u), 2):
+            both[i, j] = both[j, i] = squares(unit[i], unit[j]) - ahead[i] - ahead[j] + base
+        return z, base, (ahead - base - 0.5 * both[range(u), range(u)]).T, both.transpose(2, 0, 1)
+
+    def _lengths(self, what: Any, smooth: bool, z: Array) -> Array:
+        """Distances of elements of a link, or their ratios ``(k, T)``; the largest alone, where that need not be ``smooth``."""
+        begin, base, slope, both = self._squared
+        d = z - begin[:, None]
+        squares = base[:, None] + slope @ d + 0.5 * np.einsum("kij,it,jt->kt", both, d, d)
+        lengths = np.sqrt(np.maximum(squares, 0.0))
+        if what == "ratio":
+            lengths = (lengths[:, None] / lengths).reshape(-1, z.shape[1])
+        return lengths if smooth else lengths.max(axis=0, keepdims=True)
+
+    def _together(self, measure: Measure, smooth: bool, here: FitPoint) -> Array | None:
+        """A quantity of mechanisms side by side, at the states of their rows; None where it has to be taken of each alone."""
+        p, u, what, T = self.problem, self.problem.unknowns, measure.output or measure.what, here.z.shape[1]
+        if measure.of_dimensions:
+            return self._lengths(what, smooth, here.z)
         alone = {name: f.what for name, f in u.fields.items() if isinstance(f, ItemField) and f.one_by_one}
         # the place of a named point matters to what is said of it alone
         unread = {n for n, of in alone.items() if of == "links" and not str(what).startswith(n.rpartition(".")[0])}
-        if here.z.shape[1] == 1 or measure.of_dimensions or callable(what) or alone.keys() - unread:
+        drivers = [self.driver] if self.over is None else [*self.over]
+        if callable(what) or alone.keys() - unread or None in drivers or len(self.fit.over) < (self.over is not None):
             return None
-        m, q = self.rows(self.fit.taken(here, np.zeros(1, dtype=np.intp)))
+        rows = slice(self.fit.own, None) if len(self.fit.over) else slice(None)
+        names, states = p.m.freedom_names(), np.moveaxis(here.x[:, rows], 1, 2)
+        q = p.system.coordinates_of(states.reshape(len(states), -1))[: len(names)]
         own = {name: f for name, f in u.fields.items() if name not in alone}
-        values = p.outside(here.z)[[name in own for name in u.names]]
-        motions, names = dict(self.over or {}), p.m.freedom_names()
-        if not motions and self.driver is not None:
-            every = p.system.coordinates_of(here.x.reshape(len(here.x), -1)).reshape(-1, *here.x.shape[1:])
-            motions = {self.driver: every[names.index(p.m.full_name(self.driver))].T}
+        values, which = p.outside(here.z), np.repeat(np.arange(T), states.shape[2])
+        m = u.mechanism(values[:, 0]).replace(start=dict(zip(names, q[:, 0].tolist(), strict=True)))
         m = with_unit_effort(m, what) if measure.output else m
-        options = Options(redundant="minimum_norm" if measure.output else "nan")
+        motions = {p.m.full_name(name): q[names.index(p.m.full_name(name))][:, None] for name in drivers if name}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MechgraphWarning)
-            _, given = driven(m, {name: np.atleast_2d(v) for name, v in motions.items()})
-            found = solve_together(
-                lambda part, which: varied(m, own, values[:, :1] + part * (values[:, which] - values[:, :1])),
-                here.z.shape[1],
-                given,
-                options,
-            )
-            if found.solution is None or found.alone.any():
-                return None
+            line = Pipeline(DriverMotion(m, motions), Options(redundant="minimum_norm" if measure.output else "nan"))
+            par = line.system.par
+            numbers = varied(m, own, values[[name in own for name in u.names]]).numbers
+            made = numbers.with_rest(line.m).parameters(line.m, par.offset, par.origin, par.L)
+            system = line.system.with_parameters(replace(made, mass=np.broadcast_to(made.mass, (len(m.links), T))))
+            begin = line.system.state_of(q)
+            kernel = in_kernel(line, system.cases(which), m.loads, len(which))
+            if kernel is not None:
+                kernel.begin(begin)
+            starts = Starts(begin, lambda at: system.cases(which[at]), m.loads, 1, kernel)
+            found = Solution(line.run(starts, (len(which), 1)).trajectory)
             if measure.output:
-                told = np.arcsin(transmission_index(found.solution, what, tuple(given)))
+                told = np.arcsin(transmission_index(found, what, tuple(motions)))
             else:
-                told = quantity(found.solution, what, what)
-        return np.asarray(told).reshape(here.z.shape[1], -1).T
+                told = quantity(found, what, what)
+        return np.asarray(told).reshape(T, -1).T
 
     def answer(self, found: Fitted) -> Syntheses:
         """The optima found, the best first."""
         p, points = self.problem, found.points
         made = [self.rows(here) for here in points]
         errors = [float(self.fit.errors(here).max(initial=0.0)) for here in points]
-        shape = (self.fit.rows, len(p.m.links), 4, 4)
+        shape = (self.fit.own, len(p.m.links), 4, 4)
         closed = [float(np.abs(here.at.residual).max(initial=0.0)) for here in points]
         return Syntheses(
             p.first.declared,
             tuple(m for m, _ in made),
             p.unknowns.names,
             np.array([p.outside(here.z)[:, 0] for here in points]).reshape(len(points), len(p.unknowns.names)),
-            np.array([p.first.poses_of(here.at.here) for here in points]).reshape(-1, *shape),
-            np.array([q for _, q in made]).reshape(len(made), self.fit.rows, len(p.m.freedom_names())),
+            np.array([p.first.poses_of(here.at.here)[: self.fit.own] for here in points]).reshape(-1, *shape),
+            np.array([q for _, q in made]).reshape(len(made), self.fit.own, len(p.m.freedom_names())),
             np.array(closed),
             ComplexSyntheses(np.zeros((0, len(p.unknowns.names)))),
             None,

@@ -619,7 +619,11 @@ def _fitted(
     progress: Progress,
 ) -> Syntheses:
     """What comes nearest to what is asked, or meets it and is best in something else."""
-    of = FittedSynthesis(RowProblem(m, tasks, unknown), tasks, over, *driver_of(m, tasks))
+    # sizes are the same everywhere
+    moving = any(not measure.of_dimensions for _, measure, *_ in limits) or any(
+        what not in ("size", "ratio") for what, _ in goals
+    )
+    of = FittedSynthesis(RowProblem(m, tasks, unknown), tasks, over if moving else None, *driver_of(m, tasks))
     _refuse_other_names(of.problem, bounds)
     exact = subset_values(RowProblem(m, tasks, unknown), tasks, starts, seed, cache, progress) if fit else ()
     goal = of.limit(goals[0][0], sign=goals[0][1]) if goals else None
