@@ -752,7 +752,7 @@ def transmission(s: Solution, output: str, driver: str | None = None) -> Transmi
         raise DeclarationError(
             f"transmission of {m.name!r}", [wrong(output, "output", "another freedom than a driver")]
         )
-    index = _index(_held(s, output, drivers), output, drivers)
+    index = transmission_index(_held(s, output, drivers), output, drivers)
     return Transmission(s, drivers, output, np.where((s.status == OK), index, np.nan))
 
 
@@ -834,9 +834,7 @@ def _held(s: Solution, output: str, drivers: tuple[str, ...]) -> Solution:
     known = np.flatnonzero(places.solved)
     if not known.size or not s.prescribed:
         raise DeclarationError(f"transmission of {m.name!r}", ["no position with prescribed motion; solve one first"])
-    light = m.replace(
-        links=[link.replace(mass=0.0, inertia=None) for link in m.links], loads=[Effort(output, 1.0)], response=None
-    )
+    light = with_unit_effort(m, output)
     # where a position was not solved the motion waits at one that was
     at = known[np.clip(np.searchsorted(known, np.arange(places.solved.size), side="right") - 1, 0, None)]
     motions = {name: of[at].reshape(s.batch) for name, of in zip(places.drivers, places.driver_values, strict=True)}
@@ -846,8 +844,14 @@ def _held(s: Solution, output: str, drivers: tuple[str, ...]) -> Solution:
         return solve(light, motions, actuate=actuate, redundant="minimum_norm", on_reach="flag")
 
 
-def _index(s: Solution, output: str, drivers: tuple[str, ...]) -> Array:
-    """``sin mu`` at all positions of the unloaded mechanism with a unit effort in the output."""
+def with_unit_effort(m: Mechanism, output: str) -> Mechanism:
+    """The mechanism without masses and loads, but for a unit effort in the output."""
+    links = [link.replace(mass=0.0, inertia=None) for link in m.links]
+    return m.replace(links=links, loads=[Effort(output, 1.0)], response=None)
+
+
+def transmission_index(s: Solution, output: str, drivers: tuple[str, ...]) -> Array:
+    """``sin mu`` at all positions of a mechanism at rest ``with_unit_effort`` in the output, reactions of least norm."""
     m = s.mechanism
     k, j = m.freedom(output)
     guide = m.pairs[k]

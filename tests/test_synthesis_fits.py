@@ -130,6 +130,42 @@ def test_fits_begin_with_exact_solutions_of_parts_of_the_task() -> None:
     assert any("do a part of the positions exactly" in text for text in s.evidence)
 
 
+@pytest.mark.parametrize("over", [None, {"A": np.linspace(0.0, 2 * np.pi, 36)}], ids=["at the points", "over a turn"])
+def test_a_fit_keeps_conditions_and_is_best_among_all_near_by_that_do(over: dict[str, np.ndarray] | None) -> None:
+    """Without conditions links of a path along an ellipse grow without end; with them the bound of size is reached."""
+    points = ellipse(10)
+    least, most = np.deg2rad(35), 4.0
+    s = mg.synthesize(
+        four_bar(),
+        mg.path("coupler.tip", points),
+        EVERYTHING,
+        fit="least_squares",
+        conditions={"transmission D": (least, None), "size": (None, most)},
+        over=over,
+        starts=16,
+    )
+
+    def judged(m: mg.Mechanism, angles: np.ndarray) -> tuple[float, float]:
+        """Least transmission angle, and largest distance on a link, by cosines of triangles."""
+        A, B, C, D, P = (
+            complex(*np.asarray(p)[:2]) for p in (*(pair.point for pair in m.pairs), m.links[2].points["tip"])
+        )
+        a, b, c, d = abs(B - A), abs(C - B), abs(D - C), abs(D - A)
+        turned = angles + np.angle((B - A) / (D - A))
+        across = a * a + d * d - 2 * a * d * np.cos(turned)
+        sharp = np.arccos((b * b + c * c - across) / (2 * b * c))
+        return float(np.minimum(sharp, np.pi - sharp).min()), max(a, b, c, d, abs(P - B), abs(P - C))
+
+    for m, q, fitness in zip(s, s.coordinates, s.fitness, strict=True):
+        angle, size = judged(m, over["A"] if over else q[:, 0])
+        assert angle > least - 2e-6
+        assert size < most + 1e-5
+        tip = mg.kinematics(m, {"A": q[:, 0]}).link("coupler").at("tip").position[:, :2]
+        assert np.linalg.norm(tip - points, axis=1).max() == pytest.approx(fitness.error, rel=1e-6)
+    assert s.fitness[0].error < 0.05
+    assert s.fitness[0].size > most - 1e-4
+
+
 def formula(z: np.ndarray, targets: np.ndarray) -> float:
     """Mean square distance of points from the curve of a four-bar, at 180 crank angles; large where it cannot turn so far."""
     A, B, C, D, P = (z[k : k + 2] @ [1, 1j] for k in range(0, 10, 2))

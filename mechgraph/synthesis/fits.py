@@ -11,7 +11,7 @@ sign at a row is refused, and of what is found the path follower of ``solve`` ha
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -26,6 +26,7 @@ from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
+from mechgraph.synthesis.fitness import keeps
 from mechgraph.synthesis.system import ArrowRows, RowProblem
 from mechgraph.synthesis.tasks import FunctionTask
 
@@ -38,13 +39,35 @@ Bounds = Mapping[str, tuple[float | None, float | None]]
 @dataclass(frozen=True)
 class FitPoint:
     """Rows of ``T`` mechanisms: unknowns ``z (u, T)`` and drivers ``theta (n, d, T)`` in internal units, states ``x (nx, n, T)``, and their
-    equations.
+    equations, of ``rank`` in the coordinates ``free`` that no driver has.
     """
 
     z: Array
     theta: Array
     x: Array
     at: ArrowRows
+    free: Index
+    rank: int
+
+    @cached_property
+    def matrix(self) -> Array:
+        """``F_q (n, T, m, f)``."""
+        return np.moveaxis(self.at.by_coordinates[:, :, self.free], 3, 1)
+
+    @cached_property
+    def square(self) -> bool:
+        """Whether as many rows as coordinates are independent."""
+        return self.matrix.shape[2] == self.matrix.shape[3] == self.rank
+
+    @cached_property
+    def inverse(self) -> Array:
+        """That of ``F_q``."""
+        if self.square:
+            try:
+                return np.asarray(np.linalg.inv(self.matrix))
+            except np.linalg.LinAlgError:  # one of them is singular to the last digit
+                pass
+        return np.asarray(np.linalg.pinv(self.matrix, 1e-9), dtype=float)
 
 
 class Fit:
@@ -58,9 +81,14 @@ class Fit:
         Values of the drivers, and which are unknown.
     wanted : (n, k) array
         Values of the other coordinates asked ``others (k,)``, NaN where nothing is; times ``factors`` where these are unknown.
+    own, over : int, (k, d) array
+        How many rows ask for something; behind them stand those that are led over values of the drivers, and asked for nothing.
     """
 
-    def __init__(self, problem: RowProblem, tasks: Any) -> None:
+    wide = 1.1 * LEAST_MARGIN
+    """Margin below which optima are led to wider ones."""
+
+    def __init__(self, problem: RowProblem, tasks: Any, over: Any = None) -> None:
         self.p, self.tasks, s = problem, tasks, problem.system
         if problem.rates:
             told = "rates (velocities, accelerations, twists) are met exactly or not at all; leave them out of a fit"
@@ -85,11 +113,29 @@ class Fit:
         self.others: Index = problem.columns[kept]
         self.wanted, self.factor_of = problem.asked[:, kept], problem.factor_of[kept]
         self._check(x)
+        if over is not None and not isinstance(over, np.ndarray):
+            over = self._over(over)
+        self.own, self.over = self.rows, self.theta[:0] if over is None else np.asarray(over)
+        more, self.rows = len(self.over), self.rows + len(self.over)
+        self.theta = np.concatenate([self.theta, self.over])
+        self.open, self.wanted = (
+            np.pad(v, ((0, more), (0, 0)), constant_values=none)
+            for v, none in ((self.open, False), (self.wanted, np.nan))
+        )
 
     def of_some(self, most: int) -> Fit:
-        """The same of so many rows at most, the first among them."""
-        rows = np.unique(np.linspace(0, self.rows - 1, min(most, self.rows)).round().astype(np.intp))
-        return Fit(self.p.with_rows(rows), self.tasks)
+        """The same of so many rows at most of which something is asked, the first among them."""
+        rows = np.unique(np.linspace(0, self.own - 1, min(most, self.own)).round().astype(np.intp))
+        return Fit(self.p.with_rows(rows), self.tasks, self.over)
+
+    def _over(self, over: Mapping[str, Any]) -> Array | None:
+        """Values ``(k, d)`` of the drivers over which conditions hold; None where others drive there."""
+        names = [self.p.whole.freedom_names()[k] for k in self.drivers]
+        given = {self.p.m.full_name(name): np.ravel(values) for name, values in over.items()}
+        if set(given) != set(names):
+            return None
+        unit = np.where(self.p.system.is_length[self.drivers], self.p.L, 1.0)
+        return np.stack(np.broadcast_arrays(*map(given.__getitem__, names)), axis=1) / unit
 
     def _drivers(self, tasks: Any) -> Index:
         """Columns of freedoms with given values: inputs of functions, those with timing, then the drives."""
@@ -131,7 +177,7 @@ class Fit:
     def point(self, z: Array, theta: Array, x: Array) -> FitPoint:
         """Rows at states, and their equations."""
         numbers = self.p.numbers.with_values(self.p.places, z)
-        return FitPoint(z, theta, x, self.p.equations(numbers, x.swapaxes(0, 1)))
+        return FitPoint(z, theta, x, self.p.equations(numbers, x.swapaxes(0, 1)), self.free, self.rank)
 
     def taken(self, here: FitPoint, which: Index) -> FitPoint:
         """Some of the mechanisms."""
@@ -142,61 +188,66 @@ class Fit:
         parts = ((one.z, other.z), (one.theta, other.theta), (one.x, other.x))
         return one if first.all() else self.point(*(np.where(first, a, b) for a, b in parts))
 
-    def closed(self, z: Array, theta: Array, x: Array, longest: float = 1.0) -> tuple[FitPoint, Mask]:
-        """Rows closed from states near by; at which ``(n, T)`` Newton's method comes to an end there, by steps below the ``longest``."""
+    def closed(
+        self, z: Array, theta: Array, x: Array, longest: float = 1.0, to: float = 1e-12
+    ) -> tuple[FitPoint, Mask]:
+        """Rows closed from states near by, but for an error; at which ``(n, T)`` Newton's method comes to an end there, the first step
+        of which is shorter than the ``longest``.
+        """
         s, x = self.p.system, x.copy()
         x[s.single_rows[self.drivers]] = theta.swapaxes(0, 1)
-        came = np.ones(x.shape[1:], dtype=bool)
-        # steps of Newton's method, and what may be left open
+        came, last = np.ones(x.shape[1:], dtype=bool), np.full(x.shape[1:], 2 * longest)
+        # steps of Newton's method, each at most half as long as the one before
         for _ in range(12):
             here = self.point(z, theta, x)
             left = here.at.residual.swapaxes(1, 2)
-            going = came & ~(np.abs(left).max(axis=2, initial=0.0) < 1e-12)
+            going = came & ~(np.abs(left).max(axis=2, initial=0.0) < to)
             if not going.any():
                 return here, came
-            step = -(self._inverse(here) @ left[..., None])[..., 0]
-            came &= ~going | (np.abs(step).max(axis=2, initial=0.0) < longest)
-            dq = np.zeros((s.n_freedoms, *came.shape))
+            step = -(here.inverse @ left[..., None])[..., 0]
+            size = np.abs(step).max(axis=2, initial=0.0)
+            came &= ~going | (size < 0.5 * last)
+            last, dq = size, np.zeros((s.n_freedoms, *came.shape))
             dq[self.free] = np.where((came & going)[..., None], step, 0.0).transpose(2, 0, 1)
             x = s.advance(x, dq)
+            # each step doubles the digits
+            if (size[came & going] < 1e-8).all():
+                return self.point(z, theta, x), came
         return here, came & ~going
 
-    def _matrix(self, here: FitPoint) -> Array:
-        """``F_q (n, T, m, f)``."""
-        return np.moveaxis(here.at.by_coordinates[:, :, self.free], 3, 1)
-
-    def _inverse(self, here: FitPoint) -> Array:
-        J = self._matrix(here)
-        if J.shape[2] == J.shape[3] == self.rank:
-            try:
-                return np.asarray(np.linalg.inv(J))
-            except np.linalg.LinAlgError:  # one of them is singular to the last digit
-                pass
-        return np.asarray(np.linalg.pinv(J, 1e-9), dtype=float)
-
-    def by_drivers(self, here: FitPoint, inverse: Array) -> Array:
+    def by_drivers(self, here: FitPoint) -> Array:
         """``dq/dtheta (n, T, F, d)``."""
-        out = np.zeros((*inverse.shape[:2], self.p.system.n_freedoms, len(self.drivers)))
-        out[:, :, self.free] = -inverse @ np.moveaxis(here.at.by_coordinates[:, :, self.drivers], 3, 1)
+        out = np.zeros((*here.x.shape[1:], self.p.system.n_freedoms, len(self.drivers)))
+        out[:, :, self.free] = -here.inverse @ np.moveaxis(here.at.by_coordinates[:, :, self.drivers], 3, 1)
         out[:, :, self.drivers] = np.eye(len(self.drivers))
         return out
 
     def rates(self, here: FitPoint) -> tuple[Array, Array]:
         """``dq/dz (n, T, F, u)`` and ``dq/dtheta (n, T, F, d)``."""
-        inverse = self._inverse(here)
-        by_z = np.zeros((*inverse.shape[:2], self.p.system.n_freedoms, len(here.z)))
-        by_z[:, :, self.free] = -inverse @ np.moveaxis(here.at.by_unknowns, 3, 1)
-        return by_z, self.by_drivers(here, inverse)
+        by_z = np.zeros((*here.x.shape[1:], self.p.system.n_freedoms, len(here.z)))
+        by_z[:, :, self.free] = -here.inverse @ np.moveaxis(here.at.by_unknowns, 3, 1)
+        return by_z, self.by_drivers(here)
 
-    def stepped(self, here: FitPoint, rates: tuple[Array, Array], z: Array, theta: Array) -> tuple[FitPoint, Mask]:
-        """Rows carried to other dimensions and drivers in one step; which mechanisms ``(T,)`` come there, all rows on their branches."""
-        dz, dtheta = z - here.z, np.moveaxis(theta - here.theta, 1, 2)
-        dq = (rates[0] @ dz.T[:, :, None] + rates[1] @ dtheta[..., None])[..., 0].transpose(2, 0, 1)
+    @staticmethod
+    def moves(rates: tuple[Array, Array], dz: Array, dtheta: Array) -> Array:
+        """How coordinates ``(F, n, T)`` move along tangents."""
+        moved = rates[0] @ dz.T[:, :, None] + rates[1] @ np.moveaxis(dtheta, 1, 2)[..., None]
+        return np.asarray(moved[..., 0].transpose(2, 0, 1))
+
+    def stepped(
+        self, here: FitPoint, rates: tuple[Array, Array], z: Array, theta: Array, bend: Array | float = 0.0
+    ) -> tuple[FitPoint, Mask]:
+        """Rows carried to other dimensions and drivers in one step along tangents, and a known ``bend (F, n, T)`` from these; which
+        mechanisms ``(T,)`` come there, all rows on their branches.
+        """
+        dq = self.moves(rates, z - here.z, theta - here.theta)
         # the longest step (radians, lengths over L) of a row that may be predicted
         near = np.abs(dq).max(axis=(0, 1)) < 1.0
-        new, came = self.closed(z, theta, self.p.system.advance(here.x, np.where(near, dq, 0.0)))
+        dq = dq + bend
+        x = np.broadcast_to(here.x, (len(here.x), *dq.shape[1:]))
+        new, came = self.closed(z, theta, self.p.system.advance(x, np.where(near, dq, 0.0)))
         whole = near & came.all(axis=0) & (self._sides(new) == self._sides(here)).all(axis=0)
-        return new, whole & (self.margins(new).min(axis=0) > LEAST_MARGIN / 20)
+        return new, whole & (self.margins(new, LEAST_MARGIN / 20).min(axis=0) > LEAST_MARGIN / 20)
 
     def moved(self, here: FitPoint, z: Array, theta: Array) -> tuple[FitPoint, bool]:
         """Rows of one mechanism carried to other dimensions and drivers, in one step or in several; where a row would leave its branch as
@@ -217,30 +268,42 @@ class Fit:
 
     def _sides(self, here: FitPoint) -> Array:
         """Signs ``(n, T)`` of the determinants of ``F_q`` at the rows, where it has one."""
-        J = self._matrix(here)
-        return np.asarray(np.linalg.slogdet(J)[0] if J.shape[2] == J.shape[3] else np.ones(J.shape[:2]))
+        return np.asarray(np.linalg.slogdet(here.matrix)[0] if here.square else np.ones(here.x.shape[1:]))
 
-    def margins(self, here: FitPoint) -> Array:
-        """How far rows ``(n, T)`` are from folds, and links from having no length: least singular value of ``F_q`` over its largest."""
-        size = np.linalg.svd(self._matrix(here), compute_uv=False)
-        return np.asarray(size[..., self.rank - 1] / size[..., 0])
-
-    def margin_slopes(self, here: FitPoint, rows: Index) -> Array:
-        """Derivatives ``(r, v)`` of margins of some rows of a mechanism by its vector: central differences along tangents."""
-        by_z, by_theta = self.rates(here)
-        u, h = len(here.z), 1e-5
-        ways = np.concatenate([by_z, by_theta if self.open.any() else by_theta[..., :0]], axis=3)[rows, 0]
-        n = ways.shape[2]
-        dz = np.eye(u, n)
-        z = here.z + h * np.concatenate([dz, -dz], axis=1)
-        dq = h * np.concatenate([ways, -ways], axis=2).swapaxes(0, 1)
-        x = self.p.system.advance(np.repeat(here.x[:, rows], 2 * n, axis=2), dq)
-        m = self.margins(self.point(z, np.zeros(0), x))
-        slope, out = (m[:, :n] - m[:, n:]) / (2 * h), np.zeros((len(rows), u + int(self.open.sum())))
-        out[:, :u] = slope[:, :u]
-        for j, row in enumerate(np.nonzero(self.open)[0]):
-            out[rows == row, u + j] = slope[rows == row, u]
+    def margins(self, here: FitPoint, below: float = np.inf) -> Array:
+        """How far rows ``(n, T)`` are from folds, and links from having no length: least singular value of ``F_q`` over its largest. Where
+        these lie above what is of interest ``below``, so do numbers that are less than they.
+        """
+        J, near = here.matrix, np.ones(here.x.shape[1:], dtype=bool)
+        out = np.ones(near.shape)
+        if here.square and np.isfinite(below):
+            # norms of Frobenius are no less than the largest singular values
+            out = 1.0 / np.maximum(np.linalg.norm(J, axis=(2, 3)) * np.linalg.norm(here.inverse, axis=(2, 3)), 1.0)
+            near = ~(out > below)
+        if near.any():
+            size = np.linalg.svd(J[near], compute_uv=False)
+            out[near] = size[:, self.rank - 1] / size[:, 0]
         return out
+
+    def margin_slopes(
+        self, here: FitPoint, rows: Index, which: Index, rates: tuple[Array, Array]
+    ) -> tuple[Array, Array]:
+        """Derivatives of the margins of some rows of mechanisms by the unknowns ``(r, u)`` and their drivers ``(r, d)``.
+
+        With singular vectors ``ds_i = u_i^T dF_q v_i``; the matrix changes along tangents, by differences.
+        """
+        by_z, by_theta = (v[rows, which] for v in rates)
+        ways, h = np.concatenate([by_z, by_theta], axis=2), 1e-6
+        z = here.z[:, which, None] + h * np.eye(len(here.z), ways.shape[2])[:, None]
+        dq = h * ways.swapaxes(0, 1).reshape(ways.shape[1], 1, -1)
+        x = self.p.system.advance(np.repeat(here.x[:, rows, which], ways.shape[2], axis=1)[:, None], dq)
+        J = self.point(z.reshape(len(z), -1), np.zeros(0), x).matrix[0]
+        change = (J.reshape(len(rows), ways.shape[2], *J.shape[1:]) - here.matrix[rows, which][:, None]) / h
+        U, sigma, V = np.linalg.svd(here.matrix[rows, which])
+        some = [0, self.rank - 1]
+        d = np.einsum("rmi,rwmf,rif->riw", U[:, :, some], change, V[:, some])
+        out = d[:, 1] / sigma[:, :1] - d[:, 0] * (sigma[:, self.rank - 1] / sigma[:, 0] ** 2)[:, None]
+        return out[:, : len(z)], out[:, len(z) :]
 
     # --- where rows begin ------------------------------------------------------------------------------------------------
 
@@ -274,7 +337,7 @@ class Fit:
             way = [begin[0]]
             for stop, row in line:
                 # the longest step of a driver, in radians or lengths over L
-                parts = int(np.ceil(np.abs(stop - way[-1]).max() / 0.15))
+                parts = int(np.ceil(np.abs(stop - way[-1]).max() / 0.25))
                 way += [*(way[-1] + (stop - way[-1]) * np.arange(1, parts + 1)[:, None] / max(parts, 1))]
                 if row >= 0:
                     places[row] = len(way) - 1, w
@@ -293,11 +356,15 @@ class Fit:
         rest = np.broadcast_to(self.p.at_rest[:, None, None], (len(self.p.at_rest), ways.shape[1], T))
         here, alive = self.closed(z, values(0), rest, np.inf)
         states, came, sides = [here.x], [alive], self._sides(here)
+        slope = self.by_drivers(here)
         for k in range(1, len(ways)):
-            by_theta = self.by_drivers(here, self._inverse(here))
-            dq = (by_theta @ np.moveaxis(values(k) - here.theta, 1, 2)[..., None])[..., 0].transpose(2, 0, 1)
+            slope, last = self.by_drivers(here), slope
+            # along a parabola, where steps are alike
+            ahead = np.moveaxis(values(k) - here.theta, 1, 2)[..., None]
+            dq = ((1.5 * slope - 0.5 * last) @ ahead)[..., 0].transpose(2, 0, 1)
             near = alive & (np.abs(dq).max(axis=0) < 1.0)
-            here, closed = self.closed(z, values(k), s.advance(here.x, np.where(near, dq, 0.0)))
+            # what is left open on the way is closed where the rows are
+            here, closed = self.closed(z, values(k), s.advance(here.x, np.where(near, dq, 0.0)), to=1e-3)
             alive = near & closed & (self._sides(here) == sides)
             states.append(here.x)
             came.append(alive)
@@ -402,3 +469,80 @@ class Fit:
         low, high = np.minimum(low, high), np.maximum(low, high)
         rest = np.full(int(self.open.sum()), np.inf)
         return np.concatenate([low, -rest]), np.concatenate([high, rest])
+
+
+@dataclass(frozen=True)
+class RowLimit:
+    """Numbers ``of (k, T)`` the rows of mechanisms, which must not fall below the ``least`` or rise above the ``most``.
+
+    ``by_drivers``: whether they change with the open drivers of rows.
+    """
+
+    of: Callable[[FitPoint], Array]
+    least: float | None = None
+    most: float | None = None
+    by_drivers: bool = True
+
+    def kept(self, here: FitPoint) -> bool:
+        """Whether the rows of a mechanism keep it."""
+        return keeps(self.of(here), self.least, self.most)
+
+    @property
+    def ends(self) -> list[tuple[float, float]]:
+        """The ends that there are, with the senses in which numbers lie on the right side of them, over their sizes."""
+        return [(s / max(1.0, abs(end)), end) for s, end in ((1.0, self.least), (-1.0, self.most)) if end is not None]
+
+    def amiss(self, here: FitPoint) -> float:
+        """How far the rows of a mechanism fall short of it; infinite where there is no number."""
+        values = self.of(here)
+        short = max((float((-sense * (values - end)).max(initial=0.0)) for sense, end in self.ends), default=0.0)
+        return short if np.isfinite(values).all() else np.inf
+
+
+class RowDifferences:
+    """Numbers of rows, and differences of those that have no exact derivatives; of the last rows that were asked they are known."""
+
+    step = 1e-5
+    """In variables of the vector."""
+
+    def __init__(self, fit: Fit) -> None:
+        self.fit, self._known = fit, dict[RowLimit, tuple[FitPoint, Array]]()
+        self._near: tuple[Any, int, Any] = None, 0, None
+
+    def values(self, limit: RowLimit, here: FitPoint) -> Array:
+        """Numbers ``(k,)`` of the rows."""
+        if self._known.get(limit, (None,))[0] is not here:
+            # where there is no number rows are worse than any that have one
+            self._known[limit] = here, np.nan_to_num(limit.of(here)[:, 0], nan=1e3 if limit.least is None else -1e3)
+        return self._known[limit][1]
+
+    def slopes(self, limit: RowLimit, here: FitPoint) -> Array:
+        """Central differences by the vector; of one side where the rows come to that one alone."""
+        base, (row, _), u = self.values(limit, here), np.nonzero(self.fit.open), len(here.z)
+        # one number a row: it changes with the driver of its own row alone, so that all drivers are moved at once
+        alone = len(base) >= self.fit.own
+        more = (1 if alone else row.size) if limit.by_drivers and row.size else 0
+        there, came = self._moved(here, u + more)
+        values = limit.of(there)
+        values = np.where(came & np.isfinite(values), values, base[:, None]).reshape(len(base), 2, -1)
+        slope = (values[:, 0] - values[:, 1]) / (self.step * np.maximum(came.reshape(2, -1).sum(axis=0), 1))
+        out = np.zeros((len(base), u + row.size))
+        if more and alone:
+            out[row, np.arange(u, u + row.size)] = slope[row, u]
+            out[:, :u] = slope[:, :u]
+        else:
+            out[:, : u + more] = slope
+        return out
+
+    def _moved(self, here: FitPoint, n: int) -> tuple[FitPoint, Mask]:
+        """Rows a step away from others along the first ``n`` variables, where these are one more than the unknowns along all others at
+        once; which came.
+        """
+        if self._near[0] is not here or self._near[1] != n:
+            u, v = len(here.z), len(self.fit.vector(here))
+            ways, theta = np.eye(v)[:n], np.repeat(here.theta, 2 * n, axis=2)
+            ways[u:, n - 1 :] = 1.0 if n == u + 1 else ways[u:, n - 1 :]
+            dv = self.step * np.concatenate([ways, -ways]).T
+            theta[self.fit.open] += dv[u:]
+            self._near = here, n, self.fit.stepped(here, self.fit.rates(here), here.z + dv[:u], theta)
+        return self._near[2]

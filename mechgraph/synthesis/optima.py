@@ -1,4 +1,4 @@
-"""Starts of fits and their way to optima: all together by the method of Levenberg and Marquardt, the best of them to the end.
+"""Starts of fits and their way to optima, all together: by the method of Levenberg and Marquardt, under limits each by itself.
 
 Starts go down on some of the rows, from which drivers are eliminated one by one: each acts on its own row. The best of them are followed to
 the end on all rows.
@@ -6,102 +6,171 @@ the end on all rows.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property, partial
+from itertools import combinations_with_replacement
 from typing import Any
 
 import numpy as np
 import scipy
 
-from mechgraph.errors import counted
-from mechgraph.maths.se3 import Array
+from mechgraph.errors import DeclarationError, MechgraphWarning, counted
+from mechgraph.kinematics.prescribed import DriverMotion
+from mechgraph.kinetostatics import Pipeline, transmission_index, with_unit_effort
+from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
-from mechgraph.synthesis.fitness import keeps
-from mechgraph.synthesis.fits import LEAST_MARGIN, Bounds, Fit, FitPoint
+from mechgraph.model.mechanism import Mechanism
+from mechgraph.outcome import Options, Starts, in_kernel
+from mechgraph.result.solution import Solution
+from mechgraph.synthesis.answers import ComplexSyntheses, Syntheses
+from mechgraph.synthesis.fitness import Measure, distances, fitnesses
+from mechgraph.synthesis.fits import LEAST_MARGIN, Bounds, Fit, FitPoint, RowDifferences, RowLimit
+from mechgraph.synthesis.system import RowProblem
+from mechgraph.variants.numbers import ItemField, varied
+from mechgraph.variants.work import quantity
 
 
-def descended(fit: Fit, here: FitPoint, low: Array, high: Array, steps: int) -> tuple[FitPoint, Array]:
-    """The rows of mechanisms on their way to the least sums of squares, some steps on; and these sums ``(T,)``.
+class _DampedStep:
+    """Steps of mechanisms by the method of Levenberg and Marquardt.
 
     With ``J = [Z Y]`` by the unknowns and the drivers ``Y^T Y`` is diagonal, as a driver acts on its own row: the unknowns are those of
     ``(Z^T Z + m D - Z^T Y (Y^T Y)^-1 Y^T Z) dz``, ``D`` the diagonal of ``Z^T Z``, the damping ``m`` one for each mechanism.
     """
-    low, high = low[: len(here.z), None], high[: len(here.z), None]
-    T, open_, unit = here.z.shape[1], np.asarray(fit.open.any(axis=1))[:, None], np.eye(len(here.z), dtype=bool)
-    left = fit.missed(here)
-    size, damping = (left**2).sum(axis=(0, 2)), np.full(T, 1e-2)
+
+    def __init__(
+        self, here: FitPoint, Z: Array, y: Array, damping: Array, open_: Mask, ends: tuple[Array, Array]
+    ) -> None:
+        self.z, self.rows, self.y, self.ends, self.open = here.z, Z.swapaxes(0, 1), y, ends, open_
+        u, T = here.z.shape
+        self.unit, self.whole = np.eye(u, dtype=bool), self.rows.reshape(T, -1, u)
+        self.across = (y.swapaxes(0, 1)[:, :, None] @ self.rows)[:, :, 0]
+        self.own = np.where(open_[:, None], (y**2).sum(axis=2) * (1 + damping) + np.finfo(float).tiny, 1.0).T
+        A = self.whole.swapaxes(1, 2) @ self.whole
+        self.scale = np.where(self.unit, A, 0.0).max(axis=1) + 1e-14
+        damped = self.unit * (self.scale * damping[:, None])[:, None]
+        self.A = A + damped - self.across.swapaxes(1, 2) @ (self.across / self.own[..., None])
+
+    def least(self, r: Array) -> tuple[Array, Array]:
+        """Changes of unknowns ``(u, T)`` and open drivers ``(n, T)`` that make ``r (n, T, k)`` least."""
+        pull, (low, high) = (self.y * r).sum(axis=2).T, self.ends
+        flat = r.swapaxes(0, 1).reshape(len(pull), 1, -1)
+        g = (flat @ self.whole)[:, 0] - ((pull / self.own)[:, None] @ self.across)[:, 0]
+        # unknowns at a bound that would leave it stay
+        held = (((self.z <= low) & (g.T > 0)) | ((self.z >= high) & (g.T < 0))).T
+        A = np.where(held[:, :, None] | held[:, None], self.unit, self.A)
+        dz = -np.linalg.solve(A, np.where(held, 0.0, g)[..., None])[..., 0].T
+        dz = np.clip(self.z + dz, low, high) - self.z
+        moved = -(pull + (self.across @ dz.T[..., None])[..., 0]) / self.own
+        return dz, np.where(self.open[:, None], moved.T, 0.0)
+
+    def along(self, dz: Array, dt: Array) -> Array:
+        """By how much what is missed changes ``(n, T, k)``."""
+        return (self.rows @ dz.T[:, None, :, None])[..., 0].swapaxes(0, 1) + self.y * dt[..., None]
+
+    def size(self, dz: Array) -> Array:
+        """Squares ``(T,)`` of the lengths of changes."""
+        return (self.scale * dz.T**2).sum(axis=1)
+
+
+def descended(
+    fit: Fit, here: FitPoint, low: Array, high: Array, steps: int, weight: Array | None = None
+) -> tuple[FitPoint, Array]:
+    """The rows of mechanisms on their way to the least sums of squares, some steps on; and these sums ``(T,)``.
+
+    Steps bend with the valley, by the second derivative along them: Transtrum and Sethna, Improvements to the Levenberg-Marquardt
+    algorithm, arXiv:1201.5885, 2012. What is missed is followed by a ``weight (T,)`` times how far margins are below ``fit.wide``, as
+    logarithms.
+    """
+    u, T, open_ = len(here.z), here.z.shape[1], np.asarray(fit.open.any(axis=1))
+    ends, weight = (low[:u, None], high[:u, None]), np.zeros(T) if weight is None else weight
+    left = _left(fit, here, weight)
+    size, damping, quiet = (left**2).sum(axis=(0, 2)), np.full(T, 1e-2), np.zeros(T, dtype=np.intp)
+    # part of a step on which its bend is seen
+    part, each = 0.1, fit.open[:, :, None].astype(float)
     for _ in range(steps):
         rates = fit.rates(here)
-        Z, Y = fit.missed_rates(rates)
-        rows, y, r = Z.swapaxes(0, 1), Y.sum(axis=3), left.swapaxes(0, 1)
-        whole = rows.reshape(T, -1, len(here.z))
-        across = (y.swapaxes(0, 1)[:, :, None] @ rows)[:, :, 0]
-        own = np.where(open_, (y**2).sum(axis=2) * (1 + damping) + np.finfo(float).tiny, 1.0).T
-        pull = (y * left).sum(axis=2).T
-        A = whole.swapaxes(1, 2) @ whole
-        g = (r.reshape(T, 1, -1) @ whole)[:, 0] - ((pull / own)[:, None] @ across)[:, 0]
-        size_of = np.where(unit, A, 0.0) * damping[:, None, None]
-        A += size_of + 1e-14 * unit - across.swapaxes(1, 2) @ (across / own[..., None])
-        # unknowns at a bound that would leave it stay
-        held = (((here.z <= low) & (g.T > 0)) | ((here.z >= high) & (g.T < 0))).T
-        A = np.where(held[:, :, None] | held[:, None], unit, A)
-        dz = -np.linalg.solve(A, np.where(held, 0.0, g)[..., None])[..., 0].T
-        z = np.clip(here.z + dz, low, high)
-        moved = np.where(open_, -(pull + (across @ (z - here.z).T[..., None])[..., 0]).T / own.T, 0.0)
-        theta = here.theta + np.where(fit.open[:, :, None], moved[:, None], 0.0)
-        there, came = fit.stepped(here, rates, z, theta)
-        new = fit.missed(there)
+        step = _DampedStep(here, *_left_rates(fit, here, rates, weight), damping, open_, ends)
+        dz, dt = step.least(left)
+        there, came = fit.stepped(here, rates, here.z + part * dz, here.theta + each * (part * dt)[:, None])
+        bend = ((_left(fit, there, weight) - left) / part - step.along(dz, dt)) / part
+        az, at = step.least(np.where(came[:, None], bend, 0.0))
+        curved = fit.p.system.difference(there.x, here.x) / part - fit.moves(rates, dz, each * dt[:, None])
+        short = came & (step.size(az) < 0.125 * step.size(dz))
+        dz, dt = np.clip(here.z + dz + np.where(short, az, 0.0), *ends) - here.z, dt + np.where(short, at, 0.0)
+        theta = here.theta + each * dt[:, None]
+        there, came = fit.stepped(here, rates, here.z + dz, theta, np.where(short, curved / part, 0.0))
+        new = _left(fit, there, weight)
         sizes = np.where(came, (new**2).sum(axis=(0, 2)), np.inf)
         better = sizes < size
         damping = np.clip(np.where(better, damping / 5, damping * 6), 1e-12, 1e12)
+        # a few steps by which little is gained, or none that gains
+        quiet = np.where(better & (sizes < (1 - 1e-5) * size), 0, quiet + 1)
         size, left = np.where(better, sizes, size), np.where(better[:, None], new, left)
         here = fit.mixed(better, there, here)
-    return here, size
+        if (quiet > 8).all():
+            break
+    return here, (fit.missed(here) ** 2).sum(axis=(0, 2))
 
 
-class Trials:
-    """Trial vectors of an optimizer, each carried from the last one that was kept.
+def _left(fit: Fit, here: FitPoint, weight: Array) -> Array:
+    """What is missed ``(n, T, k + 1)``, and what is to be added for margins."""
+    near = np.zeros(here.x.shape[1:])
+    if weight.any():
+        near = weight * np.log(np.maximum(fit.wide / fit.margins(here, fit.wide), 1.0))
+    return np.concatenate([fit.missed(here), near[..., None]], axis=2)
 
-    What is small is followed by ``weight`` times how far margins are below what an optimum has and a quarter more, as logarithms.
+
+def _left_rates(fit: Fit, here: FitPoint, rates: tuple[Array, Array], weight: Array) -> tuple[Array, Array]:
+    """Its derivatives by the unknowns ``(n, T, k + 1, u)``, and by the driver of the row ``(n, T, k + 1)`` where it is open."""
+    Z, Y = fit.missed_rates(rates)
+    Z, Y = (np.concatenate([v, np.zeros((*v.shape[:2], 1, v.shape[3]))], axis=2) for v in (Z, Y))
+    if weight.any():
+        margins = fit.margins(here, fit.wide)
+        rows, which = np.nonzero((margins < fit.wide) & (weight > 0))
+        if rows.size:
+            by = -(weight[which] / margins[rows, which])[:, None]
+            by_z, by_theta = fit.margin_slopes(here, rows, which, rates)
+            Z[rows, which, -1], Y[rows, which, -1] = by * by_z, by * np.where(fit.open[rows], by_theta, 0.0)
+    return Z, Y.sum(axis=3)
+
+
+def settled(fit: Fit, here: FitPoint, low: Array, high: Array) -> FitPoint:
+    """The rows of mechanisms at optima of sums of squares with margins, as far as they come there.
+
+    An optimum without a margin is none: margins have weights, from the size of what is missed on, that grow until they are kept.
     """
-
-    def __init__(self, fit: Fit, begin: FitPoint, weight: float = 0.0) -> None:
-        self.fit, self.kept, self.last, self.weight = fit, begin, begin, weight
-        self.refused = 1e3 * (1.0 + float(np.abs(self._all(begin)).max(initial=0.0)))
-
-    def _all(self, here: FitPoint) -> Array:
-        near = self.weight * np.log(np.maximum(1.25 * LEAST_MARGIN / self.fit.margins(here)[:, 0], 1.0))
-        return np.concatenate([self.fit.residual(here), near])
-
-    def at(self, v: Array) -> FitPoint | None:
-        """The rows at a vector; None where they cannot be carried there."""
-        for known in (self.last, self.kept):
-            if np.array_equal(v, self.fit.vector(known)):
-                return known
-        found, came = self.fit.moved(self.kept, *self.fit.parts(v))
-        if came:
-            self.last = found
-        return found if came else None
-
-    def residual(self, v: Array) -> Array:
-        """See ``Fit.residual``; large where the rows cannot be carried there."""
-        here = self.at(v)
-        return np.full(len(self.fit.asked[0]) + self.fit.rows, self.refused) if here is None else self._all(here)
-
-    def jacobian(self, v: Array) -> Array:
-        """See ``Fit.jacobian``; the vector is kept."""
-        here = self.at(v)
-        if here is not None:
-            self.kept = here
-        fit, margins = self.fit, self.fit.margins(self.kept)[:, 0]
-        near, slopes = np.flatnonzero(margins < 1.25 * LEAST_MARGIN * (self.weight > 0)), np.zeros((fit.rows, len(v)))
-        if near.size:
-            slopes[near] = -self.weight * fit.margin_slopes(self.kept, near) / margins[near, None]
-        return np.concatenate([fit.jacobian(self.kept), slopes])
+    size, part = (fit.missed(here) ** 2).sum(axis=(0, 2)), np.full(here.z.shape[1], 10.0)
+    # rounds after which an optimum is not sought any further
+    for _ in range(8):
+        weight = part * np.maximum(np.sqrt(size / max(len(fit.asked[0]), 1)), 1e-9)
+        here, new = descended(fit, here, low, high, 40, weight)
+        gained = new < 0.6 * size
+        if fit.open.any() and not gained.any():
+            # open drivers are put anew where the path comes nearest
+            there, came = fit.begun(here.z)
+            again = (fit.missed(there) ** 2).sum(axis=(0, 2))
+            better = came & (again < (1 - 1e-6) * new)
+            here, new, gained = fit.mixed(better, there, here), np.where(better, again, new), better
+        narrow = fit.margins(here, LEAST_MARGIN).min(axis=0) < LEAST_MARGIN
+        # what comes to the same, or stays far behind the best one, goes no further
+        kept = _different(here.z, new, 16.0 * new.min())
+        here, part, size = fit.taken(here, kept), np.where(narrow, 10.0 * part, part)[kept], new[kept]
+        if not (gained | narrow)[kept].any():
+            break
+    return here
 
 
-Limit = tuple[Callable[[FitPoint], Array], float | None, float | None]
-"""Numbers of the rows, and what they must not fall below or rise above."""
+def _different(z: Array, size: Array, most: float) -> Index:
+    """Which of mechanisms ``z (u, T)`` differ and are not above a size, the best first."""
+    kept = list[int]()
+    for i in np.argsort(size, kind="stable").tolist():
+        # in L
+        if size[i] <= most and all(np.abs(z[:, i] - z[:, j]).max() > 1e-2 for j in kept):
+            kept.append(i)
+    return np.array(kept, dtype=np.intp)
 
 
 @dataclass(frozen=True)
@@ -117,8 +186,8 @@ def fitted(
     way: str | None,
     starts: int,
     bounds: Bounds,
-    goal: Callable[[FitPoint], Array] | None = None,
-    limits: Sequence[Limit] = (),
+    goal: RowLimit | None = None,
+    limits: Sequence[RowLimit] = (),
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
     exact: Iterable[Array] = (),
@@ -132,26 +201,19 @@ def fitted(
     box = np.where(np.isfinite(low[:u]), low[:u], fit.z0 - 0.5), np.where(np.isfinite(high[:u]), high[:u], fit.z0 + 0.5)
     told = [fit.p.inside(values[:, None])[:, 0] for values in exact]
     tries = [fit.z0, *told, *(rng.uniform(*box) for _ in range(starts - 1 - len(told)))]
-    begun, count = _best(fit, np.clip(np.transpose(tries), low[:u, None], high[:u, None]), low, high, progress)
+    begun, count = _best(fit, np.clip(np.transpose(tries), low[:u, None], high[:u, None]), low, high, limits, progress)
     evolved = None if begun else _evolved(fit, *box, seed)
     begun += [] if evolved is None else [evolved]
     ends: list[FitPoint] = []
     unsafe = lost = early = 0
-    wide: Limit = (lambda here: fit.margins(here)[:, 0]), LEAST_MARGIN, None
+    wide = RowLimit(fit.margins, LEAST_MARGIN, None)
     for i, begin in enumerate(begun, 1):
         if progress is not None:
             progress(f"best start {i} of {len(begun)} to the end")
-        # an optimum without a margin is none: it is looked for where it keeps one, by weights that grow from the size of what is missed
         end: FitPoint | None = begin
-        for part in (0.0, 1.0, 10.0, 100.0):
-            if end is not None and (fit.margins(end).min() < LEAST_MARGIN) == (part > 0):
-                size = max(float(np.sqrt(np.mean(fit.residual(end) ** 2))), 1e-9)
-                end = least_squares(fit, end, low, high, 200, part * size)
-        narrow = end is not None and fit.margins(end).min() < LEAST_MARGIN
-        kept_as_is = end is not None and all(keeps(f(end), least, most) for f, least, most in limits)
-        if narrow or way != "least_squares" or not kept_as_is:
-            best = begin if narrow or end is None else end
-            end, came = constrained(fit, best, low, high, way, goal, [*limits, wide] if narrow else limits)
+        narrow = fit.margins(begin).min() < LEAST_MARGIN
+        if narrow or way != "least_squares" or limits:
+            end, came = constrained(fit, begin, low, high, way, goal, [*limits, wide] if narrow else limits)
             early += end is not None and not came
         if end is None:
             lost += 1
@@ -162,7 +224,7 @@ def fitted(
 
     def value(here: FitPoint) -> float:
         if way is None:
-            return 0.0 if goal is None else float(goal(here).max())
+            return 0.0 if goal is None else float(goal.of(here).max())
         errors = fit.errors(here)
         return float(errors.max() if way == "minimax" else np.sqrt((errors**2).mean()))
 
@@ -185,24 +247,27 @@ def fitted(
             f"Left out: {unsafe} of which the path does not lead through all rows, {lost} that came to no optimum within the limits."
         )
     if early:
-        words.append(f"Stopped after 100 steps, before the optimum: {early}; better ones may be near.")
+        words.append(f"Stopped before the optimum: {early}; better ones may be near.")
     return Fitted(tuple(kept), tuple(words))
 
 
 def _best(
-    fit: Fit, tries: Array, low: Array, high: Array, progress: Callable[[str], None] | None
+    fit: Fit, tries: Array, low: Array, high: Array, limits: Sequence[RowLimit], progress: Callable[[str], None] | None
 ) -> tuple[list[FitPoint], int]:
-    """The rows of the best mechanisms to which dimensions ``tries (u, n)`` lead, by some rows first; and how many lead to all rows."""
+    """The rows of the best mechanisms to which dimensions ``tries (u, n)`` lead, by some rows first; and how many lead to all rows.
+
+    Under limits also those that fall short of them by the least, before what is missed is as small as can be.
+    """
     # rows by which starts are compared, starts that go down together, and those whose end is sought
-    coarse, together, most, found, sizes = fit.of_some(24), 64, 4, [tries[:, :0]], [np.zeros(0)]
+    coarse, together, most, found, sizes = fit.of_some(20), 64, 4, [tries[:, :0]], [np.zeros(0)]
     count = 0
     for k in range(0, tries.shape[1], together):
         here, came = coarse.begun(tries[:, k : k + together])
         here, count = coarse.taken(here, np.flatnonzero(came)), count + int(came.sum())
         # the better half goes on, with open drivers put anew where the path comes nearest
-        for _ in range(4 if came.any() else 0):
-            here, size = descended(coarse, here, low, high, 8)
-            if coarse.open.any():
+        for n in (3, 6, 10, 16) if came.any() else ():
+            here, size = descended(coarse, here, low, high, n)
+            if coarse.open.any() and n > 3:
                 there, came = coarse.begun(here.z)
                 again = (coarse.missed(there) ** 2).sum(axis=(0, 2))
                 here, size = (
@@ -211,21 +276,29 @@ def _best(
                 )
             order = np.argsort(size, kind="stable")[: max(len(size) // 2, most)]
             here, size = coarse.taken(here, order), size[order]
+            if limits and n == 6:
+                found.append(here.z)
+                sizes.append(size)
         found.append(here.z)
         sizes.append((coarse.missed(here) ** 2).sum(axis=(0, 2)))
         if progress is not None:
             progress(f"{min(k + together, tries.shape[1])} of {tries.shape[1]} starts")
     z, size = np.concatenate(found, axis=1), np.concatenate(sizes)
-    kept = list[int]()
-    # those that differ, in L
-    for i in np.argsort(size, kind="stable").tolist():
-        if len(kept) < most and all(np.abs(z[:, i] - z[:, j]).max() > 1e-2 for j in kept):
-            kept.append(i)
-    here, came = fit.begun(z[:, kept]) if kept else (here, np.zeros(0, dtype=bool))
+    kept = _different(z, size, np.inf)[: 6 * most if limits else most]
+    here, came = fit.begun(z[:, kept]) if kept.size else (here, np.zeros(0, dtype=bool))
     if not came.any():
         return [], count
-    here, _ = descended(fit, fit.taken(here, np.flatnonzero(came)), low, high, 24)
-    return [fit.taken(here, np.array([i])) for i in range(here.z.shape[1])], count
+    here = fit.taken(here, np.flatnonzero(came))
+    each = [fit.taken(here, np.array([i])) for i in range(here.z.shape[1])]
+    best = settled(fit, fit.taken(here, np.arange(min(most, len(each)))), low, high)
+    ends = [fit.taken(best, np.array([i])) for i in range(best.z.shape[1])]
+    if not limits:
+        return ends, count
+    # that which misses least leads the way, in parts of L and of limits
+    amiss = {id(one): max(limit.amiss(one) for limit in limits) for one in [*ends, *each]}
+    each.sort(key=lambda one: amiss[id(one)] + float(np.sqrt((fit.residual(one) ** 2).mean())))
+    every = [*ends[:2], *each]
+    return [one for one in every if np.isfinite(amiss[id(one)])][:most] or every[:1], count
 
 
 def _evolved(fit: Fit, low: Array, high: Array, seed: int) -> FitPoint | None:
@@ -249,46 +322,14 @@ def _evolved(fit: Fit, low: Array, high: Array, seed: int) -> FitPoint | None:
     return here if came[0] else None
 
 
-def least_squares(
-    fit: Fit, begin: FitPoint, low: Array, high: Array, evaluations: int = 100, weight: float = 0.0
-) -> FitPoint:
-    """The rows with the least sum of squares to which a start leads; ``weight``: see ``Trials``."""
-    here = begin
-    # times that open drivers are put anew where the path comes nearest
-    for _ in range(3):
-        trials = Trials(fit, here, weight)
-        v = np.clip(fit.vector(here), low, high)
-        found = scipy.optimize.least_squares(
-            trials.residual,
-            v,
-            trials.jacobian,
-            (low, high),
-            max_nfev=evaluations,
-            x_scale="jac",
-            xtol=1e-12,
-            ftol=1e-12,
-            gtol=1e-14,
-        )
-        here = trials.at(found.x) or trials.kept
-        again, came = fit.begun(here.z) if fit.open.any() else (here, np.zeros(1, dtype=bool))
-        if not came[0] or _size(fit, again) > (1 - 1e-6) * _size(fit, here):
-            return here
-        here = again
-    return here
-
-
-def _size(fit: Fit, here: FitPoint) -> float:
-    return float((fit.residual(here) ** 2).sum())
-
-
 def constrained(
     fit: Fit,
     begin: FitPoint,
     low: Array,
     high: Array,
     way: str | None,
-    goal: Callable[[FitPoint], Array] | None,
-    limits: Sequence[Limit],
+    goal: RowLimit | None,
+    limits: Sequence[RowLimit],
 ) -> tuple[FitPoint | None, bool]:
     """The best rows to which a start leads under limits, by sequential quadratic programs; None where they are not kept there. Also
     whether the optimizer came to an end before it had to stop.
@@ -296,6 +337,11 @@ def constrained(
     ``way`` is ``"least_squares"``, ``"minimax"`` (the least slack ``s`` with ``|r_i|^2 <= s`` at every row), or None: what is asked is met,
     and the ``goal`` is as small as it can be.
     """
+    came = True
+    if limits and (way == "least_squares" or not all(limit.kept(begin) for limit in limits)):
+        begin, came = within(fit, begin, low, high, limits, 60)
+    if way == "least_squares":
+        return (begin if all(limit.kept(begin) for limit in limits) else None), came
     course = _RowCourse(fit, begin, way, goal)
     constraints = [{"type": "ineq", "fun": f, "jac": df} for f, df in course.ends(low, high)]
     if way is None:
@@ -305,20 +351,90 @@ def constrained(
         constraints.append(met)
     if course.slack:
         constraints.append({"type": "ineq", "fun": course.slacks, "jac": course.slack_slopes})
-    for f, least, most in limits:
-        for sign, end in ((1.0, least), (-1.0, most)):
-            if end is not None:
-                constraints.append(course.limit(f, sign, end))
+    constraints += [course.limit(limit, *end) for limit in limits for end in limit.ends]
     aim, slope = course.aim
     found: Any = scipy.optimize.minimize(  # type: ignore[call-overload]  # the stubs know no constraints as tables
         aim, course.begin, jac=slope, constraints=constraints, method="SLSQP", options={"maxiter": 100, "ftol": 1e-12}
     )
     here = course.point(found.x)
     if way is None:  # met to rounding, where the optimizer leaves off before
-        here = least_squares(fit, here, low, high, 20)
+        here, _ = descended(fit, here, low, high, 20)
     if way is None and np.abs(fit.residual(here)).max() > 1e-9:
         return None, False
-    return (here if all(keeps(f(here), least, most) for f, least, most in limits) else None), bool(found.success)
+    return (here if all(limit.kept(here) for limit in limits) else None), bool(found.success)
+
+
+def within(
+    fit: Fit, here: FitPoint, low: Array, high: Array, limits: Sequence[RowLimit], steps: int
+) -> tuple[FitPoint, bool]:
+    """The rows with the least sum of squares under limits to which a start leads; whether it comes to rest there.
+
+    By the method of Levenberg and Marquardt with limits that are linear in each step, missed by a slack that costs much; steps are taken
+    that make the sum of the squares smaller, and how far limits are missed times more than all multipliers.
+    """
+    beside, ends = RowDifferences(fit), [(limit, *end) for limit in limits for end in limit.ends]
+
+    def told(at: FitPoint) -> tuple[Array, Array]:
+        """What is missed, and how far above limits the numbers are, over their sizes."""
+        above = [sense * (beside.values(limit, at) - end) for limit, sense, end in ends]
+        return fit.residual(at), np.concatenate(above)
+
+    # limits may be missed by a little on the way, as they bend
+    (r, c), damping, price, quiet, slip = told(here), 1e-3, 0.0, 0, 1e-3
+    for k in range(steps):
+        v, J, rates = fit.vector(here), fit.jacobian(here), fit.rates(here)
+        C = [sense * beside.slopes(limit, here) for limit, sense, _ in ends]
+        bounded = [np.flatnonzero(np.isfinite(end)) for end in (low, high)]
+        C += [np.eye(len(v))[bounded[0]], -np.eye(len(v))[bounded[1]]]
+        room = np.concatenate([c, (v - low)[bounded[0]], (high - v)[bounded[1]]])
+        for _ in range(12):
+            D = np.sqrt(damping) * np.maximum(np.linalg.norm(J, axis=0), 1e-2)
+            d, most = _step(np.concatenate([J, np.diag(D)]), np.append(-r, np.zeros(len(v))), np.concatenate(C), room)
+            price = max(price, 2.0 * most)
+            z, theta = fit.parts(v + d)
+            dq = np.abs(fit.moves(rates, z - here.z, theta - here.theta)).max()
+            if dq > 0.5:
+                z, theta = fit.parts(v + d * (0.5 / dq))
+            there, came = fit.stepped(here, rates, z, theta)
+            if came[0]:
+                new = told(there)
+                gained = _merit(r, c + slip, price) - _merit(new[0], new[1] + slip, price)
+            if came[0] and gained > 0:
+                break
+            damping = min(damping * 6, 1e12)
+        else:
+            gained, there, new, quiet = 0.0, here, (r, c), quiet + 4
+        quiet = 0 if gained > 1e-6 * _merit(new[0], new[1] + slip, price) + 1e-20 else quiet + 1
+        here, (r, c), damping = there, new, max(damping / 5, 1e-12)
+        if quiet > 3 and not slip:
+            return here, True
+        if quiet > 3 or 3 * k > 2 * steps:
+            slip, quiet = 0.0, 0
+    return here, False
+
+
+def _merit(r: Array, c: Array, price: float) -> float:
+    return 0.5 * float(r @ r) + price * float(np.maximum(-c, 0.0).max(initial=0.0))
+
+
+def _step(E: Array, f: Array, C: Array, room: Array) -> tuple[Array, float]:
+    """The least ``|E d - f|`` under ``C d + s + room >= 0``, with a slack ``s`` that costs much; and the sum of the multipliers.
+
+    A problem of least distance, which becomes one of least squares without negative numbers: Lawson and Hanson, Solving Least Squares
+    Problems, 1974, chapter 23.
+    """
+    n = E.shape[1]
+    E = np.pad(E, ((0, 1), (0, 1)))
+    E[-1, -1] = 1e3
+    Q, R = np.linalg.qr(E)
+    base = Q.T @ np.append(f, 0.0)
+    G = np.concatenate([np.pad(C, ((0, 0), (0, 1)), constant_values=1.0), np.eye(n + 1)[-1:]])
+    GR = scipy.linalg.solve_triangular(R, G.T, trans="T").T
+    h = -np.append(room, 0.0) - GR @ base
+    u, _ = scipy.optimize.nnls(np.vstack([GR.T, h]), np.append(np.zeros(n + 1), 1.0))
+    left = np.append(GR.T @ u, h @ u - 1.0)
+    y = -left[:-1] / left[-1]
+    return scipy.linalg.solve_triangular(R, base + y)[:n], float(-u[:-1].sum() / left[-1])
 
 
 class _RowCourse:
@@ -327,9 +443,10 @@ class _RowCourse:
     With ``J / unit = U S V^T`` at the start ``P = V S^-1``, small singular values left out of the inverse. Behind stands the slack.
     """
 
-    def __init__(self, fit: Fit, begin: FitPoint, way: str | None, goal: Callable[[FitPoint], Array] | None) -> None:
+    def __init__(self, fit: Fit, begin: FitPoint, way: str | None, goal: RowLimit | None) -> None:
         self.goal, self.slack = goal, way != "least_squares"
-        self.fit, self.trials, self._last = fit, Trials(fit, begin), begin
+        self.fit, self.kept, self._last = fit, begin, begin
+        self.beside = RowDifferences(fit)
         self.unit = max(float(np.abs(fit.residual(begin)).max(initial=0.0)), 1e-9)
         _, sigma, Vt = np.linalg.svd(fit.jacobian(begin) / self.unit, full_matrices=True)
         size = np.zeros(len(Vt))
@@ -352,7 +469,7 @@ class _RowCourse:
         """The rows; where they cannot be carried there, as far on the way as they can."""
         if not np.array_equal(w[: len(self.v)], self._asked):
             self._asked = w[: len(self.v)].copy()
-            self._last, _ = self.fit.moved(self.trials.kept, *self.fit.parts(self.vector(w)))
+            self._last, _ = self.fit.moved(self.kept, *self.fit.parts(self.vector(w)))
         return self._last
 
     def _padded(self, slopes: Array) -> Array:
@@ -365,8 +482,8 @@ class _RowCourse:
 
     def jacobian(self, w: Array) -> Array:
         """Its derivatives."""
-        self.trials.kept = self.point(w)
-        return self._padded(self.fit.jacobian(self.trials.kept))
+        self.kept = self.point(w)
+        return self._padded(self.fit.jacobian(self.kept))
 
     def squares(self, w: Array) -> Array:
         """Squares of the errors of the rows."""
@@ -382,7 +499,7 @@ class _RowCourse:
 
     def _small(self, w: Array) -> Array:
         """What is to be small everywhere: the goal, else the squares."""
-        return self.squares(w) if self.goal is None else self.goal(self.point(w))
+        return self.squares(w) if self.goal is None else self.beside.values(self.goal, self.point(w))
 
     def slacks(self, w: Array) -> Array:
         """How far that is below the slack."""
@@ -392,31 +509,17 @@ class _RowCourse:
         """Its derivatives."""
         return np.eye(len(w))[-1] - (self.squares_slope(w) if self.goal is None else self.slopes(self.goal, w))
 
-    def slopes(self, f: Callable[[FitPoint], Array], w: Array) -> Array:
-        """Central differences of numbers that have no exact derivatives; of one side where the rows come to that one alone."""
-        here = self.trials.kept = self.point(w)
-        v, base, step, u = self.fit.vector(here), f(here), 1e-5, len(here.z)
-        out = np.zeros((len(base), len(v)))
-        # one number a row: it changes with the driver of its own row alone, so that all drivers are moved at once
-        row, _ = np.nonzero(self.fit.open)
-        alone = len(base) == self.fit.rows
-        ways = [np.eye(len(v))[k] for k in range(u if alone else len(v))]
-        for k, way in enumerate([*ways, np.arange(len(v)) >= u] if alone and row.size else ways):
-            sides = [self.fit.moved(here, *self.fit.parts(v + side * way)) for side in (step, -step)]
-            a, b = (f(there) if came else base for there, came in sides)
-            slope = (a - b) / (step * max(1, sum(came for _, came in sides)))
-            if k < len(ways):
-                out[:, k] = slope
-            else:
-                out[row, np.arange(u, len(v))] = slope[row]
-        return self._padded(out)
+    def slopes(self, limit: RowLimit, w: Array) -> Array:
+        """Of numbers by the variables."""
+        self.kept = self.point(w)
+        return self._padded(self.beside.slopes(limit, self.kept))
 
-    def limit(self, f: Callable[[FitPoint], Array], sign: float, end: float) -> dict[str, Any]:
+    def limit(self, limit: RowLimit, sense: float, end: float) -> dict[str, Any]:
         """A limit as the optimizer wants it."""
         return {
             "type": "ineq",
-            "fun": lambda w: sign * (f(self.point(w)) - end),
-            "jac": lambda w: sign * self.slopes(f, w),
+            "fun": lambda w: sense * (self.beside.values(limit, self.point(w)) - end),
+            "jac": lambda w: sense * self.slopes(limit, w),
         }
 
     def ends(self, low: Array, high: Array) -> Iterator[tuple[Any, Any]]:
@@ -429,3 +532,156 @@ class _RowCourse:
                     lambda w, sign=sign, end=end, kept=kept: sign * (self.vector(w) - end)[kept],
                     lambda w, slope=slope: slope,
                 )
+
+
+class FittedSynthesis:
+    """What a fit asks, and its answers."""
+
+    def __init__(
+        self, problem: RowProblem, tasks: Any, over: Any, driver: str | None, output: str | None, faults: list[str]
+    ) -> None:
+        self.problem, self.over, self.driver, self.output = problem, over, driver, output
+        # exact ones come back in their own frames; the error of a place is that of the origin of its frame, which is another one here
+        if elsewhere := list(problem.first.poses):
+            first = f"the first pose of {', '.join(map(repr, elsewhere))} is not the identity"
+            faults.append(f"{first}: a fit begins there; measure its poses from the first one")
+        try:
+            self.fit = Fit(problem, tasks, over)
+        except DeclarationError as error:
+            faults += error.faults
+        if faults:
+            raise DeclarationError(problem.name, faults)
+
+    def answered(
+        self,
+        fit: str | None,
+        bounds: Mapping[str, Any],
+        limits: Sequence[Any],
+        goals: Sequence[tuple[Measure, float]],
+        starts: int,
+        seed: int,
+        progress: Callable[[str], None] | None,
+        exact: Iterable[Array],
+    ) -> Syntheses:
+        """What comes nearest to what is asked, or meets it and is best in something else."""
+        goal = self.limit(goals[0][0], sign=goals[0][1]) if goals else None
+        limited = [self.limit(measure, least, most) for _, measure, least, most in limits]
+        return self.answer(fitted(self.fit, fit, starts, bounds, goal, limited, seed, progress, exact))
+
+    def rows(self, here: FitPoint) -> tuple[Mechanism, Array]:
+        """The mechanism of fitted rows, and its coordinates ``(rows, F)``."""
+        p = self.problem
+        q = p.system.coordinates_of(here.x[:, : self.fit.own, 0]).T[:, : len(p.m.freedom_names())]
+        m = p.unknowns.mechanism(p.outside(here.z)[:, 0])
+        return m.replace(start=dict(zip(m.freedom_names(), q[0].tolist(), strict=True))), q
+
+    def limit(
+        self, measure: Measure, least: float | None = None, most: float | None = None, sign: float = 1.0
+    ) -> RowLimit:
+        """A quantity of fitted rows, times a sign."""
+        of = partial(self._measured, measure, sign, least is None and sign > 0)
+        return RowLimit(of, least, most, not (measure.of_dimensions or self.over))
+
+    def _measured(self, measure: Measure, sign: float, smooth: bool, here: FitPoint) -> Array:
+        """A quantity ``(k, T)`` of mechanisms; NaN where it has no value."""
+        values = self._together(measure, smooth, here)
+        if values is None:
+            each = (self.rows(self.fit.taken(here, np.array([i]))) for i in range(here.z.shape[1]))
+            values = np.stack([measure(m, q, self.driver, smooth) for m, q in each], axis=1)
+        return np.asarray(sign * values)
+
+    @cached_property
+    def _by_points(self) -> bool:
+        """Whether no numbers are sought but those of points, and what has no part in dimensions."""
+        return all(p.array in ("point", "factors") for own in self.problem.unknowns.places for p in own)
+
+    @cached_property
+    def _squared(self) -> tuple[Array, Array, Array, Array]:
+        """Squares of all distances of elements of a link: at some unknowns ``(u,)``, there ``(k,)``, and their derivatives ``(k, u)`` and
+        ``(k, u, u)``: they are polynomials of degree two.
+        """
+        p, u = self.problem, len(self.fit.z0)
+        z, unit = np.random.default_rng(0).normal(size=u), np.eye(u)
+
+        def squares(*ways: Array) -> Array:
+            return np.asarray(distances(p.unknowns.mechanism(p.outside(sum(ways, z)[:, None])[:, 0])) ** 2)
+
+        base, ahead = squares(), np.stack([squares(e) for e in unit])
+        both = np.zeros((u, u, len(base)))
+        for i, j in combinations_with_replacement(range(u), 2):
+            both[i, j] = both[j, i] = squares(unit[i], unit[j]) - ahead[i] - ahead[j] + base
+        return z, base, (ahead - base - 0.5 * both[range(u), range(u)]).T, both.transpose(2, 0, 1)
+
+    def _lengths(self, what: Any, smooth: bool, z: Array) -> Array:
+        """Distances of elements of a link, or their ratios ``(k, T)``; the largest alone, where that need not be ``smooth``."""
+        begin, base, slope, both = self._squared
+        d = z - begin[:, None]
+        squares = base[:, None] + slope @ d + 0.5 * np.einsum("kij,it,jt->kt", both, d, d)
+        lengths = np.sqrt(np.maximum(squares, 0.0))
+        if what == "ratio":
+            lengths = (lengths[:, None] / lengths).reshape(-1, z.shape[1])
+        return lengths if smooth else lengths.max(axis=0, keepdims=True)
+
+    def _together(self, measure: Measure, smooth: bool, here: FitPoint) -> Array | None:
+        """A quantity of mechanisms side by side, at the states of their rows; None where it has to be taken of each alone."""
+        p, u, what, T = self.problem, self.problem.unknowns, measure.output or measure.what, here.z.shape[1]
+        if measure.of_dimensions:
+            return self._lengths(what, smooth, here.z) if self._by_points else None
+        alone = {name: f.what for name, f in u.fields.items() if isinstance(f, ItemField) and f.one_by_one}
+        # the place of a named point matters to what is said of it alone
+        unread = {n for n, of in alone.items() if of == "links" and not str(what).startswith(n.rpartition(".")[0])}
+        drivers = [self.driver] if self.over is None else [*self.over]
+        if callable(what) or alone.keys() - unread or None in drivers or len(self.fit.over) < (self.over is not None):
+            return None
+        rows = slice(self.fit.own, None) if len(self.fit.over) else slice(None)
+        names, states = p.m.freedom_names(), np.moveaxis(here.x[:, rows], 1, 2)
+        q = p.system.coordinates_of(states.reshape(len(states), -1))[: len(names)]
+        own = {name: f for name, f in u.fields.items() if name not in alone}
+        values, which = p.outside(here.z), np.repeat(np.arange(T), states.shape[2])
+        m = u.mechanism(values[:, 0]).replace(start=dict(zip(names, q[:, 0].tolist(), strict=True)))
+        m = with_unit_effort(m, what) if measure.output else m
+        motions = {p.m.full_name(name): q[names.index(p.m.full_name(name))][:, None] for name in drivers if name}
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", MechgraphWarning)
+            line = Pipeline(DriverMotion(m, motions), Options(redundant="minimum_norm" if measure.output else "nan"))
+            par = line.system.par
+            numbers = varied(m, own, values[[name in own for name in u.names]]).numbers
+            made = numbers.with_rest(line.m).parameters(line.m, par.offset, par.origin, par.L)
+            system = line.system.with_parameters(replace(made, mass=np.broadcast_to(made.mass, (len(m.links), T))))
+            begin = line.system.state_of(q)
+            kernel = in_kernel(line, system.cases(which), m.loads, len(which))
+            if kernel is not None:
+                kernel.begin(begin)
+            starts = Starts(begin, lambda at: system.cases(which[at]), m.loads, 1, kernel)
+            found = Solution(line.run(starts, (len(which), 1)).trajectory)
+            if measure.output:
+                told = np.arcsin(transmission_index(found, what, tuple(motions)))
+            else:
+                told = quantity(found, what, what)
+        return np.asarray(told).reshape(T, -1).T
+
+    def answer(self, found: Fitted) -> Syntheses:
+        """The optima found, the best first."""
+        p, points = self.problem, found.points
+        made = [self.rows(here) for here in points]
+        errors = [float(self.fit.errors(here).max(initial=0.0)) for here in points]
+        shape = (self.fit.own, len(p.m.links), 4, 4)
+        closed = [float(np.abs(here.at.residual).max(initial=0.0)) for here in points]
+        return Syntheses(
+            p.first.declared,
+            tuple(m for m, _ in made),
+            p.unknowns.names,
+            np.array([p.outside(here.z)[:, 0] for here in points]).reshape(len(points), len(p.unknowns.names)),
+            np.array([p.first.poses_of(here.at.here)[: self.fit.own] for here in points]).reshape(-1, *shape),
+            np.array([q for _, q in made]).reshape(len(made), self.fit.own, len(p.m.freedom_names())),
+            np.array(closed),
+            ComplexSyntheses(np.zeros((0, len(p.unknowns.names)))),
+            None,
+            (),
+            0,
+            "searched",
+            found.evidence,
+            np.array([1.0 / self.fit.margins(here).min() for here in points]),
+            tuple(fitnesses([m for m, _ in made], np.array([q for _, q in made]), self.driver, self.output, errors)),
+            driver=self.driver,
+        )

@@ -33,10 +33,9 @@ from mechgraph.synthesis.answers import (
 from mechgraph.synthesis.certified import certificates
 from mechgraph.synthesis.classes import NoClass, TaskClass
 from mechgraph.synthesis.fitness import Fitness, Measure, fitnesses, limits_of
-from mechgraph.synthesis.fits import Fit, FitPoint
 from mechgraph.synthesis.labelling import cognates, motions_of, orbits, symmetries
 from mechgraph.synthesis.legs import ClassMember
-from mechgraph.synthesis.optima import Fitted, fitted
+from mechgraph.synthesis.optima import FittedSynthesis
 from mechgraph.synthesis.solve import (
     Progress,
     TaskEnds,
@@ -428,84 +427,6 @@ def subset_values(
     return problem.outside(np.concatenate(real, axis=1)[: of.u]).T
 
 
-class FittedSynthesis:
-    """What a fit asks, and its answers."""
-
-    def __init__(self, problem: RowProblem, tasks: Any, over: Any, faults: list[str]) -> None:
-        self.problem, self.over = problem, over
-        # exact ones come back in their own frames; the error of a place is that of the origin of its frame, which is another one here
-        if elsewhere := list(problem.first.poses):
-            first = f"the first pose of {', '.join(map(repr, elsewhere))} is not the identity"
-            faults.append(f"{first}: a fit begins there; measure its poses from the first one")
-        try:
-            self.fit = Fit(problem, tasks)
-        except DeclarationError as error:
-            faults += error.faults
-        if faults:
-            raise DeclarationError(problem.name, faults)
-        self.driver, self.output = driver_of(problem.m, tasks)
-
-    def answered(
-        self,
-        fit: FitName | None,
-        bounds: Mapping[str, Any],
-        limits: Sequence[Any],
-        goals: Sequence[tuple[Measure, float]],
-        starts: int,
-        seed: int,
-        progress: Progress,
-        exact: Iterable[Array],
-    ) -> Syntheses:
-        """What comes nearest to what is asked, or meets it and is best in something else."""
-        goal = self.measured(*goals[0]) if goals else None
-        limited = [
-            (self.measured(measure, none=1e3 if least is None else -1e3, most=least is None), least, most)
-            for _, measure, least, most in limits
-        ]
-        return self.answer(fitted(self.fit, fit, starts, bounds, goal, limited, seed, progress, exact))
-
-    def rows(self, here: FitPoint) -> tuple[Mechanism, Array]:
-        """The mechanism of fitted rows, and its coordinates ``(rows, F)``."""
-        p = self.problem
-        q = p.system.coordinates_of(here.x[..., 0]).T[:, : len(p.m.freedom_names())]
-        m = p.unknowns.mechanism(p.outside(here.z)[:, 0])
-        return m.replace(start=dict(zip(m.freedom_names(), q[0].tolist(), strict=True))), q
-
-    def measured(
-        self, measure: Measure, sign: float = 1.0, none: float = 1e3, most: bool = True
-    ) -> Callable[[FitPoint], Array]:
-        """A quantity of fitted rows, times a sign; ``none`` where it has no value. ``most``: that must not be large."""
-        return lambda here: np.nan_to_num(sign * measure(*self.rows(here), self.driver, most and sign > 0), nan=none)
-
-    def answer(self, found: Fitted) -> Syntheses:
-        """The optima found, the best first."""
-        p, points = self.problem, found.points
-        made = [self.rows(here) for here in points]
-        errors = [float(self.fit.errors(here).max(initial=0.0)) for here in points]
-        shape = (self.fit.rows, len(p.m.links), 4, 4)
-        closed = [float(np.abs(here.at.residual).max(initial=0.0)) for here in points]
-        return Syntheses(
-            p.first.declared,
-            tuple(m for m, _ in made),
-            p.unknowns.names,
-            np.array([p.outside(here.z)[:, 0] for here in points]).reshape(len(points), len(p.unknowns.names)),
-            np.array([p.first.poses_of(here.at.here) for here in points]).reshape(-1, *shape),
-            np.array([q for _, q in made]).reshape(len(made), self.fit.rows, len(p.m.freedom_names())),
-            np.array(closed),
-            ComplexSyntheses(np.zeros((0, len(p.unknowns.names)))),
-            None,
-            (),
-            0,
-            "searched",
-            found.evidence,
-            np.array([1.0 / self.fit.margins(here).min() for here in points]),
-            Deferred.known(
-                fitnesses([m for m, _ in made], np.array([q for _, q in made]), self.driver, self.output, errors)
-            ),
-            driver=self.driver,
-        )
-
-
 @door
 def synthesize(
     m: Mechanism | Iterable[Chain],
@@ -647,7 +568,13 @@ def synthesize(
         told = f"{where}: an angle of {most:.4g} rad is asked, {most / (2 * np.pi):.3g} turns; angles are in radians, not degrees"
         warnings.warn(told, MechgraphWarning, stacklevel=3)
     if fitting:
-        fits, numbers = FittedSynthesis(problem, tasks, over, faults), (int(starts), int(seed))
+        # sizes are the same everywhere
+        moving = not all(
+            measure.of_dimensions for measure in (*(limit[1] for limit in limits), *(goal[0] for goal in goals))
+        )
+        ends_of = (None, None) if faults else driver_of(m, tasks)
+        fits = FittedSynthesis(problem, tasks, over if moving else None, *ends_of, faults)
+        numbers = int(starts), int(seed)
         exact = subset_values(RowProblem(m, tasks, unknown), tasks, *numbers, cache, progress) if fit else ()
         answer = fits.answered(fit, within, limits, goals, *numbers, progress, exact)
         return answer._kept(require, within, limits, fits.driver)
