@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
+from ladder import geared_five_bar
 from scipy.spatial.transform import Rotation
 
 import mechgraph as mg
@@ -156,5 +157,222 @@ def test_a_mechanism_with_a_curve_or_surface_is_found_again_by_a_fit(made) -> No
     with pytest.raises(mg.DeclarationError, match="pairs K: curves and surfaces are made of pieces"):
         mg.synthesize(own, task, unknown.split())
     assert found_again(own, task, unknown.split(), np.random.default_rng(0), fit="least_squares", starts=1)
-    with pytest.raises(mg.DeclarationError, match=r"K\.\w+\.radius: only points and directions can be fitted"):
-        mg.synthesize(own, task, [f"K.{'curve' if made is groove else 'surface'}.radius"], fit="least_squares")
+    field = "K.curve.radius" if made is groove else "K.surface.radius"
+    shape = field.split(".")[1]
+    true = getattr(own.pair("K"), shape)
+    larger = own.pair("K").reshaped(**{shape: true.replace(radius=1.1 * true.radius)})
+    off = own.replace(pairs=[larger if p.name == "K" else p for p in own.pairs])
+    s = mg.synthesize(off, task, [field, unknown.split()[0]], fit="least_squares", starts=1)
+    assert s.values[0] == pytest.approx([true.radius, own.pair("A").point[0]], abs=1e-8)
+    assert does(s[0], task) < 1e-8
+
+
+def does(m: mg.Mechanism, task: object) -> float:
+    """By how much the output of a mechanism fails to be the function asked of it, by its kinematics alone."""
+    angles, wanted = np.asarray(task.pairs, dtype=float).T
+    freedom = m.full_name(task.output)
+    pair = freedom.partition(".")[0]
+    moved = mg.kinematics(m, {task.input: angles + m.start.get(m.full_name(task.input), 0.0)})[pair].position
+    turned = moved.reshape(len(angles), -1)[:, m.pair(pair).freedom_names.index(freedom)]
+    return float(np.abs(turned - turned[0] - (wanted - wanted[0])).max())
+
+
+# --- numbers that are no places of pairs ---------------------------------------------------------------------------------
+
+
+def press(pitch: float = 0.2, C: float = 0.9) -> mg.Mechanism:
+    """A screw lifts a nut, which tips a rocker by a rod."""
+    pairs = [
+        mg.Pair("A", "H", "frame", "nut", point=(0, 0, 0), axis=(0, 0, 1), pitch=pitch),
+        mg.Pair("B", "S", "nut", "rod", point=(0.3, 0, 0)),
+        mg.Pair("C", "S", "rod", "rocker", point=(C, 0.2, 0.8)),
+        mg.Pair("D", "R", "frame", "rocker", point=(1.5, 0, 0), axis=(0, 1, 0)),
+    ]
+    return mg.Mechanism("press", pairs=pairs, drives=["A"])
+
+
+def geared(constant: float = 0.4, ratio: float = 2.0) -> mg.Mechanism:
+    """A five-bar whose second crank turns half as fast as the first, from another angle."""
+    m = geared_five_bar()
+    return m.replace(couplings=[mg.Coupling({"A": -1, "E": ratio}, name="g", constant=constant)])
+
+
+def slide(constant: float = 0.7) -> mg.Mechanism:
+    """A slider-crank, and a gauge that stands off the slider by a constant."""
+    arm = mg.Marker((1, 0, 0))
+    pairs = [
+        mg.Pair("A", "R", "frame", "crank", on_a=mg.Marker((0, 0, 0)), on_b=mg.Marker((0, 0, 0))),
+        mg.Pair("B", "R", "crank", "rod", on_a=arm, on_b=mg.Marker((0, 0, 0))),
+        mg.Pair("C", "R", "rod", "slider", on_a=mg.Marker((3, 0, 0)), on_b=mg.Marker((0, 0, 0))),
+        mg.Pair(
+            "D", "P", "frame", "slider", on_a=mg.Marker((0, 0, 0), (1, 0, 0)), on_b=mg.Marker((0, 0, 0), (1, 0, 0))
+        ),
+        mg.Pair("F", "P", "frame", "gauge", on_a=mg.Marker((0, 1, 0), (1, 0, 0)), on_b=mg.Marker((0, 0, 0), (1, 0, 0))),
+    ]
+    off = mg.Coupling({"F": 1, "D": -1}, name="g", constant=constant)
+    begin = {"A": 0.5, "B": -0.66, "C": 0.16, "D": 3.8, "F": 3.8 + constant}
+    return mg.Mechanism("gauge", pairs=pairs, drives=["A"], planar=True, couplings=[off], start=begin)
+
+
+def bars(*length: float) -> mg.Mechanism:
+    """A four-bar as a chain, closed at 0.8 with lengths 1, 3, 2.5, 3.2."""
+    start = {"O1": 0.8, "O2": 1.841215382371239, "O3": 1.540863661239548, "O4": 2.1011062635688}
+    return mg.chain("RRRR", twist=[0] * 4, length=length, offset=[0] * 4).replace(start=start)
+
+
+def test_a_screw_has_the_two_pitches_with_which_a_rod_keeps_its_length() -> None:
+    """With ``p`` the pin of the nut is at ``(0.3 cos a, 0.3 sin a, p a)``: a quadratic for every length of the rod."""
+    angles = np.array([0.0, 0.6])
+    turned = mg.kinematics(press(), {"A": angles})["D"].position[:, 0]
+    s = mg.synthesize(press(0.3), mg.function("A", "D", np.column_stack([angles, turned])), ["A.pitch"])
+    pin, tip = np.array([0.3, 0, 0]), np.array([0.9, 0.2, 0.8])
+    D = np.array([1.5, 0, 0])
+    tip_then = D + Rotation.from_rotvec([0, turned[1], 0]).apply(tip - D)
+    apart = tip_then - Rotation.from_rotvec([0, 0, angles[1]]).apply(pin)
+    # over p: |apart - p a z|^2 = |tip - pin|^2
+    wanted = np.roots([angles[1] ** 2, -2 * angles[1] * apart[2], apart @ apart - (tip - pin) @ (tip - pin)])
+    assert (s.total, s.completeness, s.certificates[0]) == (2, "tested", None)
+    assert np.sort(s.field("A.pitch")) == pytest.approx(np.sort(wanted.real), abs=1e-9)
+    task = mg.function("A", "D", np.column_stack([angles, turned]))
+    assert max(does(one, task) for one in s) < 1e-10
+    assert (s.residual < 1e-12).all()
+
+
+def test_a_second_crank_has_the_two_phases_with_which_a_dyad_closes() -> None:
+    """Where A stands and C is bent, B and D are at a known distance: D lies on two circles. Whole turns count once."""
+    q = mg.kinematics(geared(), {"A": 0.0})["C"].position.item()
+    s = mg.synthesize(geared(0.1), mg.positions([{"A": 0.0, "C": q}, {}]), ["g.constant"])
+    B, C, D, E = (complex(*p) for p in ((0.2, 0.9), (1.5, 1.5), (2.8, 1.1), (3, 0)))
+    across, crank = abs(C - B + np.exp(1j * q) * (D - C)), D - E
+    # |E + r exp(i e) - B| of the angle e from where the second crank is declared
+    toward = B - E
+    cosine = (abs(toward) ** 2 + abs(crank) ** 2 - across**2) / (2 * abs(toward) * abs(crank))
+    angles = np.angle(toward / crank) + np.arccos(cosine) * np.array([1, -1])
+    assert (s.total, s.completeness) == (2, "tested")
+    assert np.sort(np.exp(1j * s.field("g.constant") / 2)) == pytest.approx(np.sort(np.exp(1j * angles)), abs=1e-9)
+    # of each the second crank begins within half a turn, and does so with its own constant
+    for one in s:
+        assert mg.kinematics(one, {"A": 0.0})["C"].position.item() == pytest.approx(q, abs=1e-10)
+        assert 2 * one.start["E.Rz"] == pytest.approx(one.couplings[0].constant, abs=1e-12)
+        assert abs(one.start["E.Rz"]) <= np.pi
+
+
+def test_a_gauge_has_the_two_constants_of_both_ways_in_which_the_slider_closes() -> None:
+    """``F - k = r cos a +- (l^2 - r^2 sin^2 a)^(1/2)``."""
+    s = mg.synthesize(slide(0.2), mg.positions([{"A": 0.5, "F": 4.0}, {}]), ["g.constant"])
+    root = np.sqrt(9 - np.sin(0.5) ** 2)
+    assert s.total == 2
+    assert np.sort(s.field("g.constant")) == pytest.approx([4 - np.cos(0.5) - root, 4 - np.cos(0.5) + root], abs=1e-9)
+    for one in s:
+        assert mg.kinematics(one, {"A": 0.5})["F"].position.item() == pytest.approx(4.0, abs=1e-10)
+
+
+def test_lengths_of_a_chain_are_those_of_freudensteins_equation() -> None:
+    """``|a1 + a2 e^(i q2) + ...|``: with angles of first and last pair given, squares of lengths are linear in three numbers."""
+    own, A = bars(1.0, 3.0, 2.5, 3.2), np.array([0.8, 1.0, 1.25])
+    D = mg.kinematics(own, {"O1": A})["O4"].position[:, 0]
+    rows = [{"O1": a, "O4": d} for a, d in zip(A, D, strict=True)]
+    s = mg.synthesize(bars(1.0, 3.1, 2.6, 3.3), mg.positions(rows), ["length[1]", "length[2]", "length[3]"])
+    # ends of the middle bar are r e^(i a) and that of the last one, seen from the frame: c^2 = |d + b e^(-i d) + e^(i a)|^2
+    assert np.abs(s.values - [3.0, 2.5, 3.2]).max(axis=1).min() < 1e-9
+    for one, values in zip(s, s.values, strict=True):
+        assert np.abs(mg.kinematics(one, {"O1": A})["O4"].position[:, 0] - D).max() < 1e-10
+        # lengths of both signs do the same
+        assert np.abs(np.abs(s.values) - np.abs(values)).max(axis=1).min() == 0
+
+
+def screwed() -> tuple[mg.Mechanism, mg.Mechanism, object, dict[str, float]]:
+    angles = np.linspace(0, 1.5, 6)
+    turned = mg.kinematics(press(), {"A": angles})["D"].position[:, 0]
+    return (
+        press(0.3, 1.0),
+        press(),
+        mg.function("A", "D", np.column_stack([angles, turned])),
+        {"A.pitch": 0.2, "C.point.x": 0.9},
+    )
+
+
+def of_gears() -> tuple[mg.Mechanism, mg.Mechanism, object, dict[str, float]]:
+    angles = np.linspace(0, -0.7, 6)
+    tip = mg.kinematics(geared(), {"A": angles}).link("rod").at("tip").position[:, :2]
+    return geared(0.3, 1.9), geared(), mg.path("rod.tip", tip, at={"A": angles}), {"g.E": 2.0, "g.constant": 0.4}
+
+
+def twisted(*twist: float) -> mg.Mechanism:
+    """A closed RCCC chain."""
+    start = {"O1": 0.7, "O2.Rz": 1.35, "O2.Tz": -0.07, "O3.Rz": 1.79, "O3.Tz": -1.67, "O4.Rz": 1.78, "O4.Tz": -1.67}
+    return mg.chain("RCCC", twist=twist, length=[1, 2, 1.5, 1.8], offset=[0, 0, 0, 0.3]).replace(start=start)
+
+
+def of_twists() -> tuple[mg.Mechanism, mg.Mechanism, object, dict[str, float]]:
+    own, angles = twisted(0.5, 0.9, 1.1, 0.7), np.linspace(0.7, 1.5, 5)
+    turned = mg.kinematics(own, {"O1": angles})["O4"].position[:, 0]
+    rows = [{"O1": a, "O4.Rz": turn} for a, turn in zip(angles, turned, strict=True)]
+    return twisted(0.5, 0.95, 1.1, 0.75), own, mg.positions(rows), {"twist[1]": 0.9, "twist[3]": 0.7}
+
+
+@pytest.mark.parametrize("made", [screwed, of_gears, of_twists])
+@pytest.mark.parametrize("fit", ["least_squares", "minimax"])
+def test_a_mechanism_is_found_again_by_numbers_that_are_no_places(made, fit) -> None:
+    declared, own, task, truth = made()
+    s = mg.synthesize(declared, task, list(truth), fit=fit, starts=1)
+    assert s.values[0] == pytest.approx(list(truth.values()), abs=1e-7)
+    drive, last = own.drives[0].freedom, own.pairs[-1].name
+    begin = s[0].start.get(drive, 0.0)
+    a, b = (mg.kinematics(m, {drive: begin + np.array([0.0, 0.1])})[last].position for m in (own, s[0]))
+    assert a == pytest.approx(b, abs=1e-6)
+
+
+def test_beside_the_best_pitch_and_radius_a_function_that_none_has_is_missed_by_more() -> None:
+    """A gradient that is wrong stops beside the optimum."""
+    angles = np.linspace(0, 1.5, 6)
+    pairs = np.column_stack(
+        [angles, mg.kinematics(press(), {"A": angles})["D"].position[:, 0] + 0.01 * np.cos(9 * angles)]
+    )
+    s = mg.synthesize(press(0.3), mg.function("A", "D", pairs - pairs[0]), ["A.pitch"], fit="least_squares", starts=1)
+    pitch = s.values[0, 0]
+    least, below, above = (
+        np.linalg.norm(mg.kinematics(press(p), {"A": angles})["D"].position[:, 0] - (pairs[:, 1] - pairs[0, 1]))
+        for p in (pitch, pitch - 1e-4, pitch + 1e-4)
+    )
+    assert least < below
+    assert least < above
+    # of a parabola, so that half of the gap in slope is what the optimum is off by
+    assert abs(above - below) < 1e-3 * (above + below - 2 * least)
+
+
+def test_a_sweep_goes_over_pitches() -> None:
+    angles = np.array([0.0, 0.6])
+    turned = mg.kinematics(press(), {"A": angles})["D"].position[:, 0]
+    task = mg.function("A", "D", np.column_stack([angles, turned]))
+    for s, pitch in zip(
+        mg.synthesize(press(C=1.0), task, ["C.point.x"], sweep={"A.pitch": [0.2, 0.3]}), (0.2, 0.3), strict=True
+    ):
+        assert s[0].pair("A").pitch == pytest.approx(pitch, abs=1e-14)
+        assert does(s[0], task) < 1e-10
+
+
+def test_a_start_that_is_not_zero_is_a_row_like_the_others() -> None:
+    """Where pairs are placed by points the mechanism is closed at zero alone, whatever the points are."""
+    m = geared_five_bar().replace(couplings=[mg.Coupling({"A": -1, "E": 2}, constant=0.4)])
+    begin = mg.kinematics(m, {"A": 0.3})
+    start = {name: begin[name].position.item() for name in "ABCDE"}
+    rows = [{"A": 0.3, "C": start["C"]}, {"A": 0.5, "C": mg.kinematics(m, {"A": 0.5})["C"].position.item()}]
+    s = mg.synthesize(m.replace(start=start), mg.positions(rows), ["D.point.x", "D.point.y"])
+    assert np.abs(s.values - [2.8, 1.1]).max(axis=1).min() < 1e-9
+    for one in s:
+        for row in rows:
+            assert mg.kinematics(one, {"A": row["A"]})["C"].position.item() == pytest.approx(row["C"], abs=1e-10)
+
+
+def test_numbers_that_cannot_be_sought_are_told_with_their_reason() -> None:
+    spur = geared_five_bar().replace(couplings=[mg.SpurGears("g", "A", "E", teeth=(20, 40), internal=True)])
+    path = mg.path("rod.tip", [[1.5, 1.5], [1.4, 1.6]], at={"A": [0, -0.2]})
+    with pytest.raises(mg.DeclarationError) as caught:
+        mg.synthesize(spur, path, ["g.teeth.b", "g.helix_angle"], fit="least_squares")
+    assert [fault.split(":")[1].split(";")[0] for fault in caught.value.faults] == [
+        " cannot change by a little",
+        " stands in no equation of closure",
+    ]
+    with pytest.raises(mg.DeclarationError, match="coupling g: ties an angle to a length or by an unknown ratio"):
+        mg.synthesize(geared(), mg.positions([{"A": 0.0}, {"A": 0.2, "C": -0.4}]), ["g.E"])

@@ -179,7 +179,8 @@ class CouplingRows(Rows):
     @cached_property
     def matrix(self) -> Array:
         """The coefficients ``(n, F, B)``."""
-        out = np.zeros((len(self.constant), len(self._state_rows), self.coefficients.shape[1]))
+        shape = len(self.constant), len(self._state_rows), self.coefficients.shape[1]
+        out = np.zeros(shape, dtype=self.coefficients.dtype)
         out[self.term_rows, self.term_columns] = self.coefficients
         return out
 

@@ -23,7 +23,7 @@ from mechgraph.synthesis.system import RowNumbers, RowProblem
 
 def certificates(of: TaskClass, goal: ClassMember, x: Array) -> tuple[Certificate | None, ...]:
     """Certificates of real solutions ``x (nx, n)`` of a task with all rods in their places; None of what they do not serve: rates,
-    factors, second directions, and pairs that are no products of screws and rotations.
+    factors, second directions, numbers that are no places, and pairs that are no products of screws and rotations.
 
     ``apart`` is the distance of points (over L) or unit axes of the markers that are sought.
     """

@@ -445,7 +445,16 @@ class TaskClass:
 
     def fingerprints(self, member: ClassMember, x: Array) -> Array:
         """What tells mechanisms apart: their unknowns."""
-        return x[: self.u]
+        return self.told(x)
+
+    def told(self, x: Array) -> Array:
+        """Unknowns ``(u, T)`` at states, those that count whole turns too as ``exp(2 pi i z / p)`` of their periods ``p``."""
+        out, p = x[: self.u], self.problem.periods[:, None]
+        turning = np.isfinite(p)
+        with np.errstate(over="ignore"):
+            return (
+                np.where(turning, np.exp(2j * np.pi * out / np.where(turning, p, 1.0)), out) if turning.any() else out
+            )
 
     # --- equations ---------------------------------------------------------------------------------------------------
 

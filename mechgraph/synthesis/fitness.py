@@ -22,7 +22,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from mechgraph.determinacy.mobility import free_motion
-from mechgraph.errors import DeclarationError, MechgraphWarning
+from mechgraph.errors import DeclarationError, MechgraphWarning, did_you_mean, near_names
 from mechgraph.kinematics.assembly import closed_start
 from mechgraph.kinematics.motion_path import FARTHEST
 from mechgraph.kinematics.reach import BEYOND_END, beyond
@@ -584,7 +584,15 @@ class Measure:
         if self.output is not None and (fault := m.freedom_fault(self.output, single=True)):
             raise DeclarationError(f"synthesis of {m.name!r}", [f"{what!r}: {fault}"])
         if not self.of_dimensions and self.output is None:
-            named_outputs(m, {str(what): what}, ())
+            try:
+                named_outputs(m, {str(what): what}, ())
+            except DeclarationError as error:
+                own = ("size", "ratio", *(f"transmission {name}" for name in m.freedom_names()))
+                faults = [
+                    f"{one}; {hint}" if (hint := did_you_mean(near_names(str(what), own))) else one
+                    for one in error.faults
+                ]
+                raise DeclarationError(f"synthesis of {m.name!r}", faults) from None
 
     def __call__(self, m: Mechanism, q: Array, driver: str | None, smooth: bool = False) -> Array:
         """Its values ``(k,)`` of a mechanism at positions ``q (n, F)``, NaN where the driver does not lead to one.

@@ -118,8 +118,6 @@ class Fit:
             faults.append("several drivers without timing: give their values at all rows, e.g. mg.path(..., at={...})")
         if not np.isfinite(self.wanted).any():
             faults.append("nothing is asked beside values of drivers")
-        if self.p.unknowns.others:
-            faults.append(f"unknown {listed(self.p.unknowns.others)}: only points and directions can be fitted")
         if faults:
             raise DeclarationError(self.p.name, faults)
 
@@ -400,5 +398,7 @@ class Fit:
             a, b = bounds.get(name, (None, None))
             low[k], high[k] = -np.inf if a is None else a, np.inf if b is None else b
         low, high = (self.p.inside(end[:, None])[:, 0] for end in (low, high))
+        # units of some are negative
+        low, high = np.minimum(low, high), np.maximum(low, high)
         rest = np.full(int(self.open.sum()), np.inf)
         return np.concatenate([low, -rest]), np.concatenate([high, rest])

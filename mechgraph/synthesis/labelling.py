@@ -28,7 +28,7 @@ from mechgraph.modes.family import Array, same_back
 from mechgraph.modes.homotopy import polished
 from mechgraph.synthesis.classes import TaskClass
 from mechgraph.synthesis.legs import ClassMember
-from mechgraph.synthesis.system import RowNumbers, RowProblem
+from mechgraph.synthesis.system import RowProblem
 from mechgraph.variants.numbers import MARKER
 
 
@@ -58,6 +58,11 @@ class TaskLabelling:
             self.of.conditions.tolist(),
             self.of.problem.rows.tolist(),
         ]
+        p, constants = self.of.problem, [c.constant for c in self._whole.couplings]
+        sought = {place.component for own in p.places for place in own if place.array == "couplings"}
+        if sought or any(constants):
+            told.append([0 if i in sought else float(f"{v:.9g}") for i, v in enumerate(p.numbers.couplings[:, 0])])
+            told.append(sorted(sought))
         # the first figure is the version of the files
         return "3-" + hashlib.sha256(json.dumps(told).encode()).hexdigest()[:32]
 
@@ -97,6 +102,8 @@ class TaskLabelling:
         factors = p.factor_of[p.system.pair_of_freedom[p.asked_columns % p.system.n_freedoms] == k]
         asked += [("scaled", *factors.tolist())] if (factors >= 0).any() else []
         unknown = sorted((q.array, q.side, q.component) for own in p.places for q in own if q.pair == k)
+        if pair.type.takes_pitch and ("pitch", 0, 0) not in unknown:
+            asked.append(("pitch", f"{p.numbers.pitch[k, 0]:.9g}"))
         B = of.algebras[place]
         # decimals that a class keeps of the motions by which markers may be moved
         moves: object = (np.round(B @ B.T, 5) + 0.0).tolist() if 0 < B.shape[1] < 6 else B.shape[1]
@@ -124,7 +131,10 @@ class TaskLabelling:
         """For every unknown in canonical order its number."""
         place = np.argsort(self.pairs)
         told = [
-            sorted((int(place[q.pair]), (*MARKER, "factor").index(q.array), q.side, q.component) for q in own)
+            sorted(
+                (int(place[q.pair]), (*MARKER, "factors", "pitch", "couplings").index(q.array), q.side, q.component)
+                for q in own
+            )
             for own in self.of.problem.places
         ]
         return np.array(sorted(range(len(told)), key=told.__getitem__), dtype=np.intp)
@@ -175,7 +185,7 @@ class TaskLabelling:
         back, own, states = np.argsort(self.pairs), np.empty_like(drive), np.empty_like(x)
         numbers = [np.moveaxis(self._side(np.moveaxis(vectors[name][:, :, back], 2, -1)), -1, 2) for name in MARKER]
         own[:, order], states[rows] = sign[:, None] * drive, signs[:, None] * x
-        return ClassMember(RowNumbers.of(*numbers), own), states
+        return ClassMember(self.of.problem.numbers.with_vectors(*numbers), own), states
 
 
 @dataclass(frozen=True)
@@ -240,6 +250,7 @@ def _label(problem: RowProblem, k: int) -> str:
                 for i in range(3)
                 if name != "second"
             ]
+    known.append(f"{problem.numbers.pitch[k, 0]:.9g}")
     s = problem.system
     own = slice(s.first_column[k], s.first_column[k + 1])
     pair = problem.whole.pairs[k]

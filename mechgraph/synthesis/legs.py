@@ -24,6 +24,7 @@ from mechgraph.modes.family import Array
 from mechgraph.modes.homotopy import Corrected, Ways, rounding, solved
 from mechgraph.synthesis.rods import RodProblem
 from mechgraph.synthesis.system import ArrowRows, RowNumbers
+from mechgraph.synthesis.unknowns import UnknownPlace
 from mechgraph.variants.numbers import MARKER
 
 if TYPE_CHECKING:
@@ -79,6 +80,14 @@ class TaskLeg(Ways):
             np.where(of.turning.reshape(2, 1, -1, 1), b - a, 0.0)
             for a, b in zip(begin.numbers.vectors, end.numbers.vectors, strict=True)
         ]
+        sought = {(p.array, *p.index) for own in of.problem.places for p in own}
+        plain = {name: getattr(end.numbers, name) - getattr(begin.numbers, name) for name in ("pitch", "couplings")}
+        self.plain = {
+            UnknownPlace(name, 0, i, i if name == "pitch" else -1): change
+            for name, changes in plain.items()
+            for i, change in enumerate(changes)
+            if change.any() and (name, i) not in sought
+        }
         self._moves = (self._eta != 0).any(axis=(0, 3)) | np.any(
             [(c != 0).any(axis=(1, 3)) for c in self._change], axis=0
         )
@@ -91,15 +100,22 @@ class TaskLeg(Ways):
 
     def prints(self, x: Array, t: Array, tracks: Index) -> Array:
         """What tells mechanisms apart."""
-        return x[: self.equations.u]
+        return self.equations.told(x)
+
+    @cached_property
+    def compiled(self) -> CompiledRows | None:
+        """The rows for the kernel, where it serves this way: members have pitches and numbers of couplings as they are declared."""
+        numbers = [one.numbers for one in (self.begin, self.end, self.equations.problem)]
+        same = all((getattr(one, v) == getattr(numbers[2], v)).all() for one in numbers for v in ("pitch", "couplings"))
+        return self.equations.compiled if same else None
 
     def at(self, x: Array, t: Array, tracks: Index) -> Arrow:
         """The equations at states of tracks at ``t (T,)``."""
-        return (Arrow if self.equations.compiled is None else CompiledArrow)(self, t, tracks, x)
+        return (Arrow if self.compiled is None else CompiledArrow)(self, t, tracks, x)
 
     def corrected(self, x: Array, t: Array, dt: Array, tracks: Index, idle: Array) -> Corrected:
         """See there."""
-        rows = self.equations.compiled
+        rows = self.compiled
         if rows is None:
             return super().corrected(x, t, dt, tracks, idle)
         x, _, v, (*sizes, size) = rows.tracked(self, x, t, tracks, rate=dt)
@@ -123,24 +139,28 @@ class TaskLeg(Ways):
         """On which way each track is."""
         return np.zeros(len(tracks), dtype=np.intp) if self._which is None else self._which[tracks]
 
-    def member(self, t: Array, tracks: Index) -> tuple[ClassMember, Array, Array]:
-        """Members on the way, with the rates of what is asked ``(R, d, T)`` and of all vectors ``(3, 3, 2, P, T)``."""
+    def member(self, t: Array, tracks: Index) -> tuple[ClassMember, Array, Array, dict[UnknownPlace, Array]]:
+        """Members on the way, with the rates of what is asked ``(R, d, T)``, of all vectors ``(3, 3, 2, P, T)``, and of other numbers."""
         if self._which is None:
-            begin, last, eta, change = self.begin, self.end.drive, self._eta, self._change
+            begin, last, eta, change = self.begin, self.end.drive, self._eta, [*self._change, *self.plain.values()]
         else:
-            which = self._which[tracks]
+            which, moved = self._which[tracks], (self.end.drive, self._eta, *self._change, *self.plain.values())
             begin, (last, eta, *change) = (
                 self.begin.taken(which),
-                (v[..., which] if v.shape[-1] > 1 else v for v in (self.end.drive, self._eta, *self._change)),
+                (v[..., which] if v.shape[-1] > 1 else v for v in moved),
             )
+        change, plain = change[:3], dict(zip(self.plain, change[3:], strict=True))
         X = pose_exp(t * eta)
         vectors = begin.numbers.moved(X).vectors
         w, (point, axis, second) = eta[:3], (v.swapaxes(0, 1) for v in vectors)
         rates = np.stack([cross(w, point) + eta[3:], cross(w, axis), cross(w, second)])
         rates = rates + np.stack([c.swapaxes(0, 1) for c in change])
-        numbers = RowNumbers.of(*(v + t * c for v, c in zip(vectors, change, strict=True)))
+        numbers = begin.numbers.with_vectors(*(v + t * c for v, c in zip(vectors, change, strict=True)))
+        if plain:
+            values = np.array([begin.numbers.at([p]) + t * c for p, c in plain.items()])
+            numbers = numbers.with_values([[p] for p in plain], values)
         drive = last - begin.drive
-        return ClassMember(numbers, begin.drive + t * drive), drive, rates
+        return ClassMember(numbers, begin.drive + t * drive), drive, rates, plain
 
 
 class Arrow:
@@ -151,7 +171,7 @@ class Arrow:
         self.rows = self.of.at(self._way[0], x)
 
     @cached_property
-    def _way(self) -> tuple[ClassMember, Array, Array]:
+    def _way(self) -> tuple[ClassMember, Array, Array, dict[UnknownPlace, Array]]:
         return self.leg.member(self._t, self._tracks)
 
     @cached_property
@@ -235,6 +255,8 @@ class Arrow:
         side, pair = self.leg.moving
         if len(side):
             opened = opened + self.rows.moved(side, pair, self._known_rates()).sum(axis=2)
+        for place, change_of in self._way[3].items():
+            opened = opened + self.rows.by_number(place) * change_of
         out = self.solve(-opened)
         whole, factor_of = out[of.head :].reshape(of.R, of.F, -1), of.problem.factor_of
         if (scaled := factor_of >= 0).any() and self.rows.drive is not None:
@@ -300,8 +322,9 @@ class CompiledRows:
     @staticmethod
     def of_class(of: TaskClass) -> CompiledRows | None:
         """Those of a class, where the kernel is there and serves it."""
-        square = sum(of.conditions) == of.u
-        if build.installed() is None or of.problem.rates or not square or why_not(of.problem.system) is not None:
+        p, square = of.problem, sum(of.conditions) == of.u
+        plain = all(q.array in (*MARKER, "factors") for own in p.places for q in own)
+        if build.installed() is None or p.rates or not (square and plain) or why_not(p.system) is not None:
             return None
         return CompiledRows(of)
 
@@ -333,8 +356,8 @@ class CompiledArrow(Arrow):
     """The same from the kernel; rows are made where more is asked for."""
 
     def __init__(self, leg: TaskLeg, t: Array, tracks: Index, x: Array) -> None:
-        assert leg.equations.compiled is not None
-        self.leg, self.of, self._t, self._tracks, self._compiled = leg, leg.equations, t, tracks, leg.equations.compiled
+        assert leg.compiled is not None
+        self.leg, self.of, self._t, self._tracks, self._compiled = leg, leg.equations, t, tracks, leg.compiled
         self.x, self._step, self._led_on, sizes = self._compiled.tracked(leg, x, t, tracks, rates=True)
         self._largest = sizes[2]
 

@@ -71,7 +71,7 @@ class RodProblem(RowProblem):
 
     def __init__(self, full: RowProblem, rods: list[Rod]) -> None:
         vars(self).update(vars(copy(full)))
-        for name in ("places", "at_rest", "loop_signs", "asked_columns"):
+        for name in ("places", "at_rest", "loop_signs", "asked_columns", "turning", "plain_angles"):
             vars(self).pop(name, None)
         self.full, s, m = full, full.system, full.whole
         gone = [end.pair for rod in rods for end in rod]
@@ -172,18 +172,23 @@ class RodArrowRows(ArrowRows):
 
     problem: RodProblem
 
+    def opened(self, side: Index, pair: Index, V: Array) -> Array:
+        """See there; rods grow longer too."""
+        out, system = super().opened(side, pair, V), cast("RodSystem", self.here.system)
+        ways = system.ways[:, pair] * np.where(side == 0, 1.0, -1.0)
+        out[len(out) - len(self.problem.rods) :] = np.einsum(
+            "nk,int,ikt->nkt", ways, system.rod_rows.lines(self.here)[1], V
+        )
+        return out
+
     def moved(self, side: Index, pair: Index, rates: Array) -> Array:
         """See there; markers of rods move their points and lengths."""
         p, here, B = self.problem, self.here, rates.shape[-1]
-        P, n = len(p.whole.pairs), len(p.rods)
-        own = pair < P
+        n, own = len(p.rods), pair < len(p.whole.pairs)
         V = self.twists(side[own], pair[own], rates[:, :, own])
-        system = cast("RodSystem", here.system)
-        W = system.rod_rows.lines(here)[1]
-        out = np.zeros((len(here.residual), len(pair), here.T), dtype=np.result_type(V, W))
-        out[: len(out) - n, own] = self.opened(side[own], pair[own], V)[: len(out) - n]
-        ways = system.ways[:, pair[own]] * np.where(side[own] == 0, 1.0, -1.0)
-        out[len(out) - n :, own] = np.einsum("nk,int,ikt->nkt", ways, W, V)
+        out = np.zeros((len(here.residual), len(pair), here.T), dtype=V.dtype)
+        out[:, own] = self.opened(side[own], pair[own], V)
+        W = cast("RodSystem", here.system).rod_rows.lines(here)[1]
         moves = np.tile(
             np.broadcast_to(rates[0], (3, len(pair), self.T if B > 1 else 1)), self.R * self.N if B > 1 else 1
         )

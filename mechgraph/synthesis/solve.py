@@ -125,13 +125,14 @@ class TaskPencil:
 
     def __init__(self, equations: TaskClass, base: ClassMember, rng: np.random.Generator) -> None:
         self.of, self.base = equations, base
-        row, length = int(np.argmax(equations.conditions)), equations.is_length
+        open_, length = movable(equations), equations.is_length
+        row = int(np.argmax(np.where(open_.any(axis=1), equations.conditions, -1)))
         other = equations.random_members(rng, 1)[0].drive[row, :, 0] - base.drive[row, :, 0]
         part = rng.normal(size=2) @ [0.7, 0.7j]
         self.rate, self.parts = np.zeros(base.drive.shape[:2], dtype=complex), _parts_of_turns(equations)
         self.rate[row] = part * np.where(length, other, np.exp(1j / self.parts * np.where(length, 0.0, other)) - 1.0)
         # one angle, or lengths alone: rational functions of several angles are of much higher degrees
-        given = equations.given[row]
+        given = open_[row]
         moves = given & length if (given & length).any() else np.arange(len(given)) == np.argmax(given)
         self.rate[row] *= moves
         self.weights = rng.normal(size=(equations.u, 2)) @ [1.0, 1.0j]
@@ -149,12 +150,18 @@ class TaskPencil:
         """``z``, the sum and weights at pairs of tasks ``phi (n,)`` to both of which all tracks come."""
         n, N = len(phi), x.shape[1]
         tracked = follow(self.of.leg(self.base, self.members(phi), np.repeat(np.arange(n), N)), np.tile(x, n), Care())
-        g = (self.weights @ tracked.x[: self.of.u]).reshape(n, N)
-        size = np.maximum(1.0, np.abs(tracked.x[: self.of.u]).max(axis=0, initial=1.0)).reshape(n, N).max(axis=1)
+        told = self.of.told(tracked.x)
+        g = (self.weights @ told).reshape(n, N)
+        size = np.maximum(1.0, np.abs(told).max(axis=0, initial=1.0)).reshape(n, N).max(axis=1)
         good = tracked.arrived.reshape(n, N).all(axis=1) & np.isfinite(g).all(axis=1)
         good = np.repeat(good.reshape(-1, 2).all(axis=1), 2)
         z = np.exp(1j * phi)
         return z[good], g.sum(axis=1)[good], (np.maximum(1.0, np.abs(z)) / size)[good]
+
+
+def movable(of: TaskClass) -> Mask:
+    """What is asked ``(R, d)`` in which the equations are linear, or rational in ``exp(i q)``."""
+    return of.given & ~np.isin(of.columns, of.problem.plain_angles[1])
 
 
 def _parts_of_turns(of: TaskClass) -> int:
@@ -186,8 +193,11 @@ def start_set(
     group.move(*tame(of, group.base, group.x, rng))
     if source and group.x.shape[1] == most:
         return TaskStart(group.base, group.x[:, :, None], *known, group.lost, group.followed, NOT_PASSED, source)
-    trace = trace_test(of, group.base, group.x, rng, progress, TaskPencil) if known[1] <= MISSED else NOT_PASSED
-    if not trace.passed:
+    lines = bool(movable(of).any())
+    trace = (
+        trace_test(of, group.base, group.x, rng, progress, TaskPencil) if known[1] <= MISSED and lines else NOT_PASSED
+    )
+    if not trace.passed and lines:
         group.grow(MISSED_AGAIN, rng, progress)
         known = group.quiet, group.chance
         trace = trace_test(of, group.base, group.x, rng, progress, TaskPencil) if known[1] <= MISSED_AGAIN else trace
@@ -504,15 +514,16 @@ def _lead(of: TaskClass, goal: ClassMember, x: Array) -> Mask:
 
 def _matrix(of: TaskClass, goal: ClassMember, x: Array) -> Array:
     """The matrices ``(n, u, u)`` of the unknowns at states; zero where it has no finite number."""
-    return _finite(of.leg(goal, goal).at(x, np.ones(x.shape[1]), np.arange(x.shape[1])).matrix)
+    return finite(of.leg(goal, goal).at(x, np.ones(x.shape[1]), np.arange(x.shape[1])).matrix)
 
 
-def _finite(A: Array) -> Array:
+def finite(A: Array) -> Array:
+    """Zero for what is no finite number."""
     return np.nan_to_num(A, nan=0.0, posinf=0.0, neginf=0.0)
 
 
 def _least(A: Array, b: Array) -> Array:
-    return np.linalg.pinv(_finite(A), MODES.generic) @ _finite(b)
+    return np.linalg.pinv(finite(A), MODES.generic) @ finite(b)
 
 
 def _nearest(of: TaskClass, goal: ClassMember, x: Array) -> tuple[Array, Mask]:

@@ -8,7 +8,8 @@ it: such a choice is that of a smaller chain.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from itertools import chain as joined
 from itertools import combinations, permutations
 from typing import Any
@@ -25,6 +26,7 @@ from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.pair import Link, Pair
 from mechgraph.quantities import shown
+from mechgraph.synthesis.answers import Syntheses, joined_answers
 from mechgraph.synthesis.classes import NoClass, TaskClass
 from mechgraph.synthesis.system import RowProblem
 from mechgraph.synthesis.tasks import FunctionTask, PathTask, PoseTask, asked_of
@@ -258,3 +260,39 @@ def _determined(m: Mechanism, tasks: Any, candidates: Sequence[str], rng: np.ran
     names = [problem.unknowns.names[problem.sought[k]] for k in kept]
     order = [pair.name for pair in m.pairs]
     return tuple(sorted(names, key=lambda name: order.index(name.partition(".")[0])))
+
+
+def of_chains(
+    ask: Callable[..., Any],
+    chains: Iterable[Chain],
+    tasks: Any,
+    unknown: Sequence[str] | None,
+    given: Mapping[str, Any],
+    seed: int,
+    cache: bool,
+    progress: Callable[[str], None] | None,
+) -> Syntheses:
+    """Answers ``ask``ed of all mechanisms that chains make, ranked together; those that refuse the task are told."""
+    if tasks is None or given["sweep"]:
+        raise DeclarationError(WHERE, ["expected tasks, and no sweep: give chains random numbers of another seed"])
+    exact = all(given[name] is None for name in ("fit", "minimize", "maximize"))
+    every, told = structures(chains, tasks, exact, seed)
+    found, refused = list[Syntheses](), list[str]()
+    if progress is not None:
+        for text in [*told, *(f"{one.mechanism.name}: {counted(len(one.unknown), 'unknown')}" for one in every)]:
+            progress(text)
+    for one in every:
+        say = None if progress is None else partial(_said_of, one.mechanism.name, progress)
+        try:
+            found.append(
+                ask(one.mechanism, tasks, unknown or one.unknown, **given, seed=seed, cache=cache, progress=say)
+            )
+        except DeclarationError as error:
+            refused += [f"{one.mechanism.name}: {fault}" for fault in error.faults]
+    if not found:
+        raise DeclarationError(WHERE, [*told, *refused])
+    return joined_answers(found, [f"{text}." for text in [*told, *refused]])
+
+
+def _said_of(name: str, progress: Callable[[str], None], text: str) -> None:
+    progress(f"{name}: {text}")

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextvars import copy_context
 from dataclasses import fields, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import combinations
 from typing import Any, get_args
 
@@ -29,7 +29,6 @@ from mechgraph.synthesis.answers import (
     Degenerate,
     Syntheses,
     SynthesesOver,
-    joined_answers,
 )
 from mechgraph.synthesis.certified import certificates
 from mechgraph.synthesis.classes import NoClass, TaskClass
@@ -45,17 +44,21 @@ from mechgraph.synthesis.solve import (
     doing_all,
     endless,
     ends,
+    finite,
     kept,
+    movable,
     real_states,
     start_of,
     unfolded,
 )
-from mechgraph.synthesis.structures import WHERE, structures
+from mechgraph.synthesis.structures import of_chains
 from mechgraph.synthesis.system import RowNumbers, RowProblem
 from mechgraph.synthesis.tasks import FunctionTask, function, path, poses, positions
 from mechgraph.synthesis.unknowns import Unknowns
 
-NO_SCREWS = "a screw ties an angle to a length: the equations are not algebraic, their number of solutions has no end"
+NO_SCREWS = "ties an angle to a length or by an unknown ratio: the equations are not algebraic, their number of solutions has no end"
+NO_ARRAY = "the equations are not algebraic in it; exact synthesis does not serve it, fits do (fit=)"
+NO_LINE = "All that is asked stands in the equations as a number beside its sine and cosine: no trace test serves."
 NO_CONTACTS = "curves and surfaces are made of pieces: solutions on one cannot be led to those on all others"
 
 
@@ -80,30 +83,26 @@ class Synthesis:
         seed: int,
         cache: bool,
         progress: Progress,
+        faults: list[str],
     ) -> None:
         self.problem, self.rng, self.cache, self.progress = problem, np.random.default_rng(seed), cache, progress
         self.tasks = tasks
-        p, m, faults = problem, problem.m, list[str]()
-        faults += [
-            f"unknown {name!r}: is no component of a point, an axis or a second direction" for name in p.unknowns.others
-        ]
+        p, m = problem, problem.m
+        faults += [f"unknown {name!r}: {NO_ARRAY}" for name in p.unknowns.others]
         faults += [
             f"function with scale='free': the output {name} turns; of angles times an unknown factor there is no finite number of "
             "solutions; give the scale, or fit (fit=)"
             for name in (p.tasks.scaled if p.tasks else ())
             if p.system.m.turns(name)
         ]
-        screws = [pair.name for pair in m.pairs if pair.type.takes_pitch]
         contacts = [pair.name for pair in m.pairs if pair.contact is not None]
-        for named, why in ((screws, NO_SCREWS), (contacts, NO_CONTACTS)):
-            faults += [f"pairs {', '.join(named)}: {why}; exact synthesis does not serve them"] if named else []
+        faults += [f"{name}: {NO_SCREWS}; ask for the angle at all rows, or fit (fit=)" for name in p.plain_angles[0]]
+        faults += [f"pairs {', '.join(contacts)}: {NO_CONTACTS}; fit (fit=)"] if contacts else []
         self.sweep = Unknowns(m, p.whole, list(sweep), faults)
         faults += [
             f"sweep {name!r}: is unknown; leave it out there" for name in self.sweep.names if name in p.unknowns.names
         ]
-        faults += [
-            f"sweep {name!r}: is no component of a point, an axis or a second direction" for name in self.sweep.others
-        ]
+        faults += [f"sweep {name!r}: {NO_ARRAY}" for name in self.sweep.others]
         read = [real_array(v) for v in sweep.values()]
         columns = [np.atleast_1d(v) for v in read if v is not None and v.ndim < 2 and np.isfinite(v).all()]
         if len({len(c) for c in columns}) > 1 or len(columns) != len(self.sweep.names):
@@ -163,20 +162,45 @@ class Synthesis:
             fault = f"{counts}: {wanted - p.u} too many; leave something unasked, let more numbers be unknown, or fit (fit=)"
         raise DeclarationError(p.name, [fault])
 
-    def answers(self) -> list[Syntheses]:
-        """For every value swept."""
-        p = self.problem
-        start = start_of(self.of, self.rng, self.cache, self.progress)
-        start = replace(start, against=int((~doing_all(self.of, start.member, start.x)).sum()))
-        n, own = self.swept.shape[1], self.of.problem
-        numbers = own.numbers.taken(np.zeros(n, dtype=np.intp))
+    @cached_property
+    def goals(self) -> ClassMember:
+        """The task at hand, for every value swept."""
+        p, own = self.problem, self.of.problem
+        numbers = own.numbers.taken(np.zeros(self.swept.shape[1], dtype=np.intp))
         if self.sweep.names:
             numbers = numbers.with_values(own.placed(self.sweep.places), p.scaled(self.sweep.places, self.swept))
-        goals = self.of.goal(numbers)
+        return self.of.goal(numbers)
+
+    @cached_property
+    def foretold(self) -> list[str]:
+        """What is seen of the task before it is solved: rows that ask the same, and conditions that depend on each other there.
+
+        Where the matrix of the unknowns has a lower rank at random dimensions and positions, closed or not, it has so at all solutions.
+        """
+        p, of, n = self.problem, self.of, self.swept.shape[1]
+        asked = np.concatenate([p.asked, *p.rates], axis=1)
+        told = [
+            f"Rows {one} and {other} ask the same."
+            for one, other in combinations(range(len(asked)), 2)
+            if np.array_equal(asked[one], asked[other], equal_nan=True)
+        ]
+        at = of.leg(self.goals, self.goals, np.arange(n)).at(np.tile(of.x[:, None], n), np.ones(n), np.arange(n))
+        rank = int(np.linalg.matrix_rank(finite(at.matrix), rtol=MODES.generic).min()) if p.u else 0
+        if rank < p.u:
+            told.append(
+                f"Here {rank} of {p.u} conditions are independent: there is no solution, or there are some without end."
+            )
+        return told
+
+    def answers(self) -> list[Syntheses]:
+        """For every value swept."""
+        start = start_of(self.of, self.rng, self.cache, self.progress)
+        start = replace(start, against=int((~doing_all(self.of, start.member, start.x)).sum()))
+        n, goals = self.swept.shape[1], self.goals
         found = ends(self.of, start, goals, self.rng, self.progress)
         apart = start.x.shape[1]
         if start.each == 1:
-            apart = len(orbits(start.x[: self.of.u], self.symmetries, motions_of(self.of, start.member, start.x)))
+            apart = len(orbits(self.of.told(start.x), self.symmetries, motions_of(self.of, start.member, start.x)))
         return [
             self._answer(start, apart, goals.taken(np.array([i])) if n > 1 else goals, one, i)
             for i, one in enumerate(found)
@@ -193,18 +217,13 @@ class Synthesis:
         power = 1 if self.of.problem is p else 2
         closed_to = CLOSED_TO * np.maximum(1.0, np.abs(x[: self.of.u]).max(axis=0, initial=0.0)) ** power
         fits = error <= closed_to
-        told = [*start.evidence, self._tracks(start, found)]
-        asked = np.concatenate([p.asked, *p.rates], axis=1)
-        told += [
-            f"Rows {one} and {other} ask the same."
-            for one, other in combinations(range(len(asked)), 2)
-            if np.array_equal(asked[one], asked[other], equal_nan=True)
-        ]
+        told = [*start.evidence, self._tracks(start, found), *self.foretold]
+        told += [NO_LINE] * (not movable(self.of).any())
         told += [f"Of {start.each} mechanisms each that do the same all real ones are listed."] * (start.each > 1)
         told += [f"{missing} of these were not found."] * (missing > 0)
         condition, motions = self._conditions(goal, x[:, fits]), motions_of(self.of, goal, x[:, fits].astype(complex))
         free = endless(self.of, goal, found.singular)
-        goal, x = self.of.lifted(goal, x[:, fits])
+        goal, x = self.of.lifted(goal, self._near_start(x[:, fits]))
         done = of.error(of.at(goal, x.astype(complex))) <= closed_to[fits]
         x, error = self._upright(goal, x)
         against, merged = done & (error > closed_to[fits]), done & self._merged(goal, x)
@@ -261,6 +280,18 @@ class Synthesis:
         # of a sweep nothing is said of fitness, which takes longer than the solutions, until it is asked for
         return out if self.sweep.names else out._sorted
 
+    def _near_start(self, x: Array) -> Array:
+        """Real states ``(nx, n)`` with angles that are asked nowhere by whole turns near to the start, and constants that go with them."""
+        of, out = self.of, x.copy()
+        s = of.problem.system
+        rows, start = out[of.head :].reshape(of.R, of.nx, -1), s.start_coordinates(s.m.start)
+        for k, (columns, by) in of.problem.turning.items():
+            for column, c in zip(columns.tolist(), by.tolist(), strict=True):
+                turns = 2 * np.pi * np.round((rows[0, s.single_rows[column]] - start[column]) / (2 * np.pi))
+                rows[:, s.single_rows[column]] -= turns
+                out[k] -= c * turns
+        return out
+
     def _tracks(self, start: TaskStart, found: TaskEnds) -> str:
         N = start.x.shape[1]
         return (
@@ -292,7 +323,9 @@ class Synthesis:
 
     def _merged(self, goal: ClassMember, x: Array) -> Mask:
         """Which solutions ``(n,)`` have elements of a link that fall together, where those of a random mechanism do not."""
-        of, pairs = self.of.full, _neighbors(self.problem.m)
+        # how elements that are known lie to each other was declared
+        changed = {q.pair for own in (*self.problem.places, *self.sweep.places) for q in own}
+        of, pairs = self.of.full, [ends for ends in _neighbors(self.problem.m) if changed.intersection(ends)]
         here, there = of.at(of.start, of.x[:, None]).here, of.at(goal, x.astype(complex)).here
         s, out = here.system, np.zeros(x.shape[1], dtype=bool)
         for i, j in pairs:
@@ -325,6 +358,7 @@ class Synthesis:
         asked = np.zeros((q.shape[0], s.n_freedoms), dtype=bool)
         asked[:, p.columns] = ~np.isnan(p.asked)
         free = np.isfinite(period) & (s.single_rows >= 0)
+        free[s.coupled_freedoms] = False
         whole = np.where(free, np.round((q - start) / np.where(free, period, 1.0)), 0.0)
         q = np.where(asked, q, q - whole * np.where(free, period, 0.0))
         numbers = goal.numbers.with_values(p.places, x[: of.u, None])
@@ -373,11 +407,13 @@ def subset_values(
     rng, given = np.random.default_rng(seed), ~np.isnan(problem.asked)
     alike = 1 + np.flatnonzero((given[1:] == given[1]).all(axis=1))
     try:
+        if problem.unknowns.others or not problem.closed_at_start:
+            raise NoClass
         each = int(TaskClass(problem.with_rows(np.array([0, alike[0]])), rng).conditions.sum())
         R = problem.u // max(each, 1)
-        if not 0 < R < len(alike) or R * each != problem.u or not problem.closed_at_start:
+        if not 0 < R < len(alike) or R * each != problem.u:
             raise NoClass
-        of = Synthesis(problem.with_rows(np.append(0, alike[:R])), tasks, {}, seed, cache, None).of
+        of = Synthesis(problem.with_rows(np.append(0, alike[:R])), tasks, {}, seed, cache, None, []).of
     except (NoClass, DeclarationError):
         return np.zeros((0, len(problem.unknowns.names)))
     if not cache or (start := kept(of)) is None:
@@ -395,16 +431,38 @@ def subset_values(
 class FittedSynthesis:
     """What a fit asks, and its answers."""
 
-    def __init__(self, m: Mechanism, tasks: Any, unknown: Sequence[str], bounds: Mapping[str, Any], over: Any) -> None:
-        self.problem = RowProblem(m, tasks, unknown)
+    def __init__(self, problem: RowProblem, tasks: Any, over: Any, faults: list[str]) -> None:
+        self.problem, self.over = problem, over
         # exact ones come back in their own frames; the error of a place is that of the origin of its frame, which is another one here
-        if elsewhere := list(self.problem.first.poses):
+        if elsewhere := list(problem.first.poses):
             first = f"the first pose of {', '.join(map(repr, elsewhere))} is not the identity"
-            raise DeclarationError(
-                self.problem.name, [f"{first}: a fit begins there; measure its poses from the first one"]
-            )
-        self.fit, self.bounds, self.over = Fit(self.problem, tasks), bounds, over
-        self.driver, self.output = driver_of(m, tasks)
+            faults.append(f"{first}: a fit begins there; measure its poses from the first one")
+        try:
+            self.fit = Fit(problem, tasks)
+        except DeclarationError as error:
+            faults += error.faults
+        if faults:
+            raise DeclarationError(problem.name, faults)
+        self.driver, self.output = driver_of(problem.m, tasks)
+
+    def answered(
+        self,
+        fit: FitName | None,
+        bounds: Mapping[str, Any],
+        limits: Sequence[Any],
+        goals: Sequence[tuple[Measure, float]],
+        starts: int,
+        seed: int,
+        progress: Progress,
+        exact: Iterable[Array],
+    ) -> Syntheses:
+        """What comes nearest to what is asked, or meets it and is best in something else."""
+        goal = self.measured(*goals[0]) if goals else None
+        limited = [
+            (self.measured(measure, none=1e3 if least is None else -1e3, most=least is None), least, most)
+            for _, measure, least, most in limits
+        ]
+        return self.answer(fitted(self.fit, fit, starts, bounds, goal, limited, seed, progress, exact))
 
     def rows(self, here: FitPoint) -> tuple[Mechanism, Array]:
         """The mechanism of fitted rows, and its coordinates ``(rows, F)``."""
@@ -414,10 +472,9 @@ class FittedSynthesis:
         return m.replace(start=dict(zip(m.freedom_names(), q[0].tolist(), strict=True))), q
 
     def measured(
-        self, what: Any, sign: float = 1.0, none: float = 1e3, most: bool = True
+        self, measure: Measure, sign: float = 1.0, none: float = 1e3, most: bool = True
     ) -> Callable[[FitPoint], Array]:
         """A quantity of fitted rows, times a sign; ``none`` where it has no value. ``most``: that must not be large."""
-        measure = what if isinstance(what, Measure) else Measure(self.problem.m, what, self.over)
         return lambda here: np.nan_to_num(sign * measure(*self.rows(here), self.driver, most and sign > 0), nan=none)
 
     def answer(self, found: Fitted) -> Syntheses:
@@ -482,7 +539,8 @@ def synthesize(
         ``poses``, ``path``, ``function``, ``positions``; row 0 is the declared configuration. Default: all that ``m.synthesis``
         holds, but for what is given here.
     unknown : list of str
-        Numbers as ``study`` names them (``"B.point.x"``), or elements: ``"B.point"``, ``"B.axis"``, ``"coupler.tip"``, ``"B"``. Default,
+        Numbers as ``study`` names them on which positions depend (``"B.point.x"``, ``"A.pitch"``, ``"g.constant"``, ``"length[2]"``,
+        in fits ``"K.curve.radius"``), or elements: ``"B.point"``, ``"B.axis"``, ``"coupler.tip"``, ``"B"``. Default,
         of chains: as many numbers of pins as there are conditions, moving pins first, the others at random; of fits all pins.
     fit : {"least_squares", "minimax"}, optional
         Make the sum of the squares of the errors of all positions least, or the largest of them. Default: all are met exactly.
@@ -542,7 +600,7 @@ def synthesize(
         context.run(ELSEWHERE.set, executor)
         return context.run(partial(synthesize, m, tasks, unknown, **given, seed=seed, cache=cache, progress=progress))
     if not isinstance(m, Mechanism):
-        return _of_chains(m, tasks, unknown, given, int(seed), cache, progress)
+        return of_chains(synthesize, m, tasks, unknown, given, int(seed), cache, progress)
     where, faults = f"synthesis of {m.name!r}", list[str]()
     if tasks is None and unknown is None and m.synthesis is not None:
         own = {name: value for name, value in given.items() if value != _USUAL[name]}
@@ -552,15 +610,19 @@ def synthesize(
     unknown = [unknown] if isinstance(unknown, str) else list(unknown)
     require = items_of(require, "require", faults)
     faults += [] if unknown else ["unknown: nothing is sought; name numbers or elements"]
-    limits, within = limits_of(m, conditions, over, faults), dict(bounds or {})
-    goals = [(what, sign) for what, sign in ((minimize, 1.0), (maximize, -1.0)) if what is not None]
-    fitting = fit is not None or bool(goals)
+    limits, within, goals = limits_of(m, conditions, over, faults), dict(bounds or {}), list[tuple[Measure, float]]()
+    fitting = any(one is not None for one in (fit, minimize, maximize))
+    for name, what, sign in (("minimize", minimize, 1.0), ("maximize", maximize, -1.0)):
+        try:
+            goals += [] if what is None else [(Measure(m, what, over), sign)]
+        except DeclarationError as error:
+            faults += [f"{name}: {fault}" for fault in error.faults]
     faults += [
         wrong(name, "require", ", ".join(map(repr, get_args(DefectName))))
         for name in require
         if name not in get_args(DefectName)
     ]
-    if len(goals) > 1 or (goals and fit is not None):
+    if sum(one is not None for one in (fit, minimize, maximize)) > 1:
         faults.append("fit, minimize, maximize: expected one of them")
     if fit is not None and fit not in get_args(FitName):
         faults.append(wrong(fit, "fit", " or ".join(map(repr, get_args(FitName)))))
@@ -568,25 +630,28 @@ def synthesize(
     if fitting and sweep:
         faults.append("sweep: expected for exact syntheses alone; give the numbers values in the mechanism")
     faults += _faults_of_bounds(within, fitting)
-    if faults:
-        raise DeclarationError(where, faults)
-    changed = {end for p in m.pairs if any(name.split(".")[0] == p.name for name in unknown) for end in (p.a, p.b)}
+    problem = RowProblem(m, tasks, unknown, faults)
+    faults += _other_names(problem, within)
+    moved = {m.pairs[q.pair].name for own in problem.unknowns.places for q in own if 0 <= q.pair < len(m.pairs)}
+    moved |= {name.split(".")[0] for name in unknown}
+    changed = {end for p in m.pairs if p.name in moved for end in (p.a, p.b)}
     heavy = [link.name for link in m.links if link.name in changed and link.mass]
     if heavy or m.loads:
         of = " and ".join([f"masses and mass centers of {', '.join(heavy)}"] * bool(heavy) + ["loads"] * bool(m.loads))
         warnings.warn(f"{where}: {of} stay as declared, whatever the dimensions", MechgraphWarning, stacklevel=3)
-    if fitting:
-        return _fitted(
-            m, tasks, unknown, fit, within, limits, goals, require, over, int(starts), int(seed), cache, progress
-        )
-    problem = RowProblem(m, tasks, unknown)
     # a whole turn more or less changes nothing, and many take long to follow
     most = np.nan_to_num(np.abs(problem.asked[:, ~problem.system.is_length[problem.columns]])).max(initial=0.0)
-    if most > 4 * np.pi:
+    if not fitting and most > 4 * np.pi:
         told = f"{where}: an angle of {most:.4g} rad is asked, {most / (2 * np.pi):.3g} turns; angles are in radians, not degrees"
         warnings.warn(told, MechgraphWarning, stacklevel=3)
-    found = Synthesis(problem, tasks, dict(sweep or {}), int(seed), cache, progress)
-    _refuse_other_names(found.problem, within)
+    if fitting:
+        fits, numbers = FittedSynthesis(problem, tasks, over, faults), (int(starts), int(seed))
+        exact = subset_values(RowProblem(m, tasks, unknown), tasks, *numbers, cache, progress) if fit else ()
+        answer = fits.answered(fit, within, limits, goals, *numbers, progress, exact)
+        return answer._kept(require, within, limits, fits.driver)
+    found = Synthesis(problem, tasks, dict(sweep or {}), int(seed), cache, progress, faults)
+    for text in found.foretold:
+        warnings.warn(f"{where}: {text}", MechgraphWarning, stacklevel=3)
     driver, _ = driver_of(m, tasks)
     answers = [one._kept(require, within, limits, driver) for one in found.answers()]
     if sweep:
@@ -605,41 +670,6 @@ def _faults_of_bounds(bounds: Mapping[str, Any], fitting: bool) -> list[str]:
     return out
 
 
-def _of_chains(
-    chains: Iterable[Chain],
-    tasks: Any,
-    unknown: Sequence[str] | None,
-    given: Mapping[str, Any],
-    seed: int,
-    cache: bool,
-    progress: Progress,
-) -> Syntheses:
-    """Answers of all mechanisms that chains make, ranked together; those that refuse the task are told."""
-    if tasks is None or given["sweep"]:
-        raise DeclarationError(WHERE, ["expected tasks, and no sweep: give chains random numbers of another seed"])
-    exact = all(given[name] is None for name in ("fit", "minimize", "maximize"))
-    every, told = structures(chains, tasks, exact, seed)
-    found, refused = list[Syntheses](), list[str]()
-    if progress is not None:
-        for text in [*told, *(f"{one.mechanism.name}: {counted(len(one.unknown), 'unknown')}" for one in every)]:
-            progress(text)
-    for one in every:
-        say = None if progress is None else partial(_said_of, one.mechanism.name, progress)
-        try:
-            found.append(
-                synthesize(one.mechanism, tasks, unknown or one.unknown, **given, seed=seed, cache=cache, progress=say)
-            )
-        except DeclarationError as error:
-            refused += [f"{one.mechanism.name}: {fault}" for fault in error.faults]
-    if not found:
-        raise DeclarationError(WHERE, [*told, *refused])
-    return joined_answers(found, [f"{text}." for text in [*told, *refused]])
-
-
-def _said_of(name: str, progress: Callable[[str], None], text: str) -> None:
-    progress(f"{name}: {text}")
-
-
 _USUAL = {one.name: one.default for one in fields(SynthesisSetup)}
 
 
@@ -653,36 +683,7 @@ def _stored(setup: SynthesisSetup) -> dict[str, Any]:
     }
 
 
-def _refuse_other_names(p: RowProblem, bounds: Mapping[str, Any]) -> None:
-    others = [name for name in bounds if name not in p.unknowns.names]
-    if others:
-        known = ", ".join(p.unknowns.names)
-        raise DeclarationError(p.name, [f"bounds[{name!r}]: is not unknown; unknown are {known}" for name in others])
-
-
-def _fitted(
-    m: Mechanism,
-    tasks: Any,
-    unknown: list[str],
-    fit: FitName | None,
-    bounds: Mapping[str, Any],
-    limits: Sequence[Any],
-    goals: Sequence[tuple[Any, float]],
-    require: Sequence[DefectName],
-    over: Any,
-    starts: int,
-    seed: int,
-    cache: bool,
-    progress: Progress,
-) -> Syntheses:
-    """What comes nearest to what is asked, or meets it and is best in something else."""
-    of = FittedSynthesis(m, tasks, unknown, bounds, over)
-    _refuse_other_names(of.problem, bounds)
-    exact = subset_values(RowProblem(m, tasks, unknown), tasks, starts, seed, cache, progress) if fit else ()
-    goal = of.measured(*goals[0]) if goals else None
-    limited = [
-        (of.measured(measure, none=1e3 if least is None else -1e3, most=least is None), least, most)
-        for _, measure, least, most in limits
-    ]
-    found = fitted(of.fit, fit, starts, bounds, goal, limited, seed, progress, exact)
-    return of.answer(found)._kept(require, bounds, limits, of.driver)
+def _other_names(p: RowProblem, bounds: Mapping[str, Any]) -> list[str]:
+    """Bounds of what is not unknown, as faults."""
+    known = ", ".join(p.unknowns.names)
+    return [f"bounds[{name!r}]: is not unknown; unknown are {known}" for name in bounds if name not in p.unknowns.names]

@@ -15,23 +15,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
+from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from math import gcd, lcm
+from typing import Any, cast
 
 import numpy as np
 
 from mechgraph.errors import DeclarationError
 from mechgraph.kinematics.prescribed import DriverMotion
-from mechgraph.kinematics.state import Configuration, close, user_poses
+from mechgraph.kinematics.state import Configuration, close
 from mechgraph.kinematics.system import System
 from mechgraph.maths.se3 import Array, Index, cross, move_twist, rotation_exp, turn_tangent
 from mechgraph.memo import dataclass
 from mechgraph.model.gears import moving_lines
 from mechgraph.model.mechanism import Mechanism
-from mechgraph.model.pair import Marker, Pair
-from mechgraph.model.parameters import Declared, declared
-from mechgraph.synthesis.tasks import PoseTask, asked_of
-from mechgraph.synthesis.unknowns import UnknownPlace, Unknowns, marker_twists, norms_of, unit_rates
+from mechgraph.model.parameters import Declared, coupling_places, declared
+from mechgraph.modes.homotopy import TRACKS_TOGETHER
+from mechgraph.synthesis.tasks import FirstPoses, asked_of
+from mechgraph.synthesis.unknowns import UnknownPlace, Unknowns, marker_twists, norms_of, per_turn, unit_rates
 from mechgraph.variants.numbers import MARKER
 
 
@@ -39,20 +41,24 @@ from mechgraph.variants.numbers import MARKER
 class RowNumbers:
     """``point, axis, second (2, 3, P, B)`` of all markers, points over L about the origin of the problem; complex for members.
 
-    ``norms (2, 2, P, B)`` are those of both directions, see ``unknowns.norms_of``; ``factors (n, B)`` are those of what is asked up to one.
+    ``norms (2, 2, P, B)`` are those of both directions, see ``unknowns.norms_of``; ``pitch (P, B)`` over L, numbers of ``couplings
+    (K, B)`` over ``RowProblem.coupling_units``; ``factors (n, B)`` are those of what is asked up to one; ``others (k, B)``: see
+    ``unknowns.UnknownPlace``.
     """
 
     point: Array
     axis: Array
     second: Array
     norms: Array
+    pitch: Array
+    couplings: Array
     factors: Array
+    others: Array
 
-    @staticmethod
-    def of(point: Array, axis: Array, second: Array, near: Array | None = None) -> RowNumbers:
-        """Numbers with norms, nearest to others."""
+    def with_vectors(self, point: Array, axis: Array, second: Array, near: Array | None = None) -> RowNumbers:
+        """The same with other points and directions, the norms of these nearest to others."""
         norms = norms_of(axis.swapaxes(0, 1), second.swapaxes(0, 1), near)
-        return RowNumbers(point, axis, second, norms, np.zeros((0, norms.shape[-1])))
+        return RowNumbers(point, axis, second, norms, *(_many(getattr(self, n), norms.shape[-1]) for n in PLAIN))
 
     @staticmethod
     def joined(numbers: Sequence[RowNumbers]) -> RowNumbers:
@@ -67,7 +73,7 @@ class RowNumbers:
     def of_pairs(self, order: Index) -> RowNumbers:
         """Those of some pairs, in that order."""
         point, axis, second, norms = (v[:, :, order] for v in (*self.vectors, self.norms))
-        return RowNumbers(point, axis, second, norms, self.factors)
+        return replace(self, point=point, axis=axis, second=second, norms=norms, pitch=self.pitch[order])
 
     @property
     def vectors(self) -> tuple[Array, Array, Array]:
@@ -76,31 +82,26 @@ class RowNumbers:
 
     def at(self, places: Sequence[UnknownPlace]) -> Array:
         """What stands at the places of a number, ``(B,)``."""
-        p = places[0]
-        if p.array == "factor":
-            return np.asarray(self.factors[p.component])
-        return np.asarray(getattr(self, p.array)[p.side, p.component, p.pair])
+        return np.asarray(getattr(self, places[0].array)[places[0].index])
 
     def moved(self, X: Array) -> RowNumbers:
         """Markers moved rigidly by poses ``X (3, 4, 2, P, B)``."""
         point, axis, second = (np.einsum("ijspb,sjpb->sipb", X[:, :3], v) for v in self.vectors)
         norms = np.broadcast_to(self.norms, (*self.norms.shape[:-1], X.shape[-1]))
-        return RowNumbers(point + X[:, 3].swapaxes(0, 1), axis, second, norms, self.factors)
+        return replace(self, point=point + X[:, 3].swapaxes(0, 1), axis=axis, second=second, norms=norms)
 
     def with_values(self, places: Sequence[Sequence[UnknownPlace]], z: Array, near: Array | None = None) -> RowNumbers:
         """The same with unknowns ``z (u, B)`` at their places, and norms nearest to others."""
-        B, out = z.shape[1], []
-        for v in self.vectors:
-            out.append(np.array(np.broadcast_to(v, (*v.shape[:-1], B)), dtype=np.result_type(v, z)))
-        factors = z[np.array([any(p.array == "factor" for p in own) for own in places], dtype=bool)]
+        out = {name: _many(v, z.shape[1]) for name, v in vars(self).items()}
+        for name in {p.array for own in places for p in own}:
+            out[name] = np.array(out[name], dtype=np.result_type(out[name], z))
         for value, own in zip(z, places, strict=True):
-            for p in (p for p in own if p.array in MARKER):
-                out[MARKER.index(p.array)][p.side, p.component, p.pair] = value
-        point, axis, second = out
-        if not any(p.turns for own in places for p in own):
-            norms = np.broadcast_to(self.norms, (*self.norms.shape[:-1], B))
-            return RowNumbers(point, axis, second, norms, factors)
-        return replace(RowNumbers.of(point, axis, second, near), factors=factors)
+            for p in own:
+                out[p.array][p.index] = value
+        if any(p.turns for own in places for p in own):
+            axis, second = (out[name].swapaxes(0, 1) for name in MARKER[1:])
+            out["norms"] = norms_of(axis, second, near)
+        return RowNumbers(**out)
 
     @property
     def poses(self) -> Array:
@@ -114,72 +115,13 @@ class RowNumbers:
         return self.point, z, (self.second - (z * self.second).sum(axis=1, keepdims=True) * z) / self.norms[1][:, None]
 
 
-class FirstPoses:
-    """Links that begin at other poses than the identity, ``poses (4, 4)`` by link.
+def _many(values: Array, B: int) -> Array:
+    """One for all ``B`` as one for each."""
+    return values if values.shape[-1] == B else np.broadcast_to(values, (*values.shape[:-1], B))
 
-    Pairs by point and axis want the frames of their links on the global one at row 0. So a link with such pairs is sought in a frame of its
-    own that lies there, ``m`` and ``tasks``; what is found comes ``back`` in the frame that was declared, its pairs by markers.
-    """
 
-    def __init__(self, declared: Mechanism, tasks: Any, unknown: Sequence[str], faults: list[str]) -> None:
-        every = tasks if isinstance(tasks, list | tuple) else [tasks]
-        found = [(task.link, task.first(declared)) for task in every if isinstance(task, PoseTask)]
-        at_once = {link for pair in declared.pairs if pair.on_a is None for link in (pair.a, pair.b)}
-        known = [(link, X) for link, X in found if X is not None and link in at_once]
-        self.declared, self.poses = declared, dict(known)
-        self.m, self.tasks = declared, tasks
-        if not self.poses:
-            return
-        faults += [
-            f"unknown {name!r}: is a point of a link of which the first pose is not the identity; begin there, or give the point"
-            for name in unknown
-            for link in self.poses
-            if name.startswith(f"{link}.")
-        ]
-        faults += [
-            f"pair {pair.name!r}: is placed on each link by itself, others of its link are not, and its first pose is not the identity; "
-            "place all of them alike"
-            for pair in declared.pairs
-            if pair.on_a is not None and self.poses.keys() & {pair.a, pair.b}
-        ]
-        moved = [
-            link.replace(points={name: X[:3, :3] @ p + X[:3, 3] for name, p in link.points.items()})
-            if (X := self.poses.get(link.name)) is not None
-            else link
-            for link in declared.links
-        ]
-        self.m = declared.replace(links=moved)
-        self.tasks = [
-            task.after(declared, self.poses[task.link], faults)
-            if isinstance(task, PoseTask) and task.link in self.poses
-            else task
-            for task in every
-        ]
-
-    def back(self, m: Mechanism) -> Mechanism:
-        """A mechanism found, in the frames that were declared."""
-        if not self.poses:
-            return m
-        links = [old if old.name in self.poses else new for old, new in zip(self.declared.links, m.links, strict=True)]
-        return m.replace(links=links, pairs=[self._by_markers(pair) for pair in m.pairs])
-
-    def _by_markers(self, pair: Pair) -> Pair:
-        if pair.on_a is not None or not self.poses.keys() & {pair.a, pair.b}:
-            return pair
-        sides = []
-        for link, marker in zip((pair.a, pair.b), pair.markers, strict=True):
-            X = self.poses.get(link, np.eye(4))
-            axis, second = (np.asarray(v) @ X[:3, :3] for v in (marker.axis, marker.second))
-            sides.append(Marker((np.asarray(marker.point) - X[:3, 3]) @ X[:3, :3], axis, second))
-        return pair.replace(point=None, axis=None, second=None, on_a=sides[0], on_b=sides[1])
-
-    def poses_of(self, here: Configuration) -> Array:
-        """Poses ``(T, N, 4, 4)`` of the links as declared."""
-        X = np.moveaxis(user_poses(here), 1, 0)
-        for link, X0 in self.poses.items():
-            k = self.declared.link_names().index(link)
-            X[:, k] = X[:, k] @ X0
-        return X
+PLAIN = ("pitch", "couplings", "factors", "others")
+"""Numbers beside those of markers."""
 
 
 class RowProblem:
@@ -196,11 +138,13 @@ class RowProblem:
     Raises
     ------
     DeclarationError
-        with all that is wrong with tasks and unknowns.
+        with all that is wrong with tasks and unknowns, behind what is ``told`` already; faults that are no reason to stop reading are
+        put there.
     """
 
-    def __init__(self, m: Mechanism, tasks: Any, unknown: Sequence[str]) -> None:
-        faults: list[str] = []
+    def __init__(self, m: Mechanism, tasks: Any, unknown: Sequence[str], told: list[str] | None = None) -> None:
+        faults = list[str]() if told is None else told
+        before = len(faults)
         self.first = FirstPoses(m, tasks, unknown, faults)
         self.m = m = self.first.m
         self.own = len(m.pairs)
@@ -226,7 +170,7 @@ class RowProblem:
             if m.start.get(name, 0.0)
         ]
         self.unknowns = Unknowns(m, self.whole, unknown, faults, self.tasks.scaled)
-        if faults:
+        if len(faults) > before:
             raise DeclarationError(self.name, faults)
         # of every column that is asked, and of its rates, the number of its factor, -1 where it has none
         factor_of = [self.tasks.scaled.index(name) if name in self.tasks.scaled else -1 for name in given.names]
@@ -246,17 +190,53 @@ class RowProblem:
             np.array([rates.get(name, rates.get(self._user_name(name), none)) for name in given.names]).T / unit / k
             for k, rates in zip(factor, self.tasks.rates, strict=False)
         ]
-        self.numbers = RowNumbers.of(
-            (numbers.point - self.origin[:, None, None]) / self.L, numbers.axis, numbers.second
+        self.coupling_units = self._coupling_units()
+        start = self.unknowns.declared[:, None]
+        others = [
+            own[0].scale * v for own, v in zip(self.unknowns.places, start, strict=True) if own[0].array == "others"
+        ]
+        point, axis, second = (numbers.point - self.origin[:, None, None]) / self.L, numbers.axis, numbers.second
+        self.numbers = RowNumbers(
+            point,
+            axis,
+            second,
+            norms_of(axis.swapaxes(0, 1), second.swapaxes(0, 1)),
+            par.pitch,
+            numbers.couplings / self.coupling_units,
+            np.ones((len(self.tasks.scaled), 1)),
+            np.array(others).reshape(-1, 1),
         )
         self.order: Index = np.arange(len(self.whole.pairs))
-        self.closed_at_start = all(pair.on_a is None and pair.contact is None for pair in m.pairs)
+        self._built: dict[bytes, System | None] = {}
+        self.closed_at_start = self._closed_at_start()
         self.rows: Index = np.arange(self.tasks.rows)[self._row_counts :]
-        self._read_declared_row()
+        faults += self._read_declared_row()
+        if faults and told is None:
+            raise DeclarationError(self.name, faults)
+
+    def _closed_at_start(self) -> bool:
+        """Whether the declared configuration is closed whatever the dimensions: pairs stand by point and axis and begin at zero, no
+        coupling has a constant.
+        """
+        m, constants = self.m, {own.stop for own in coupling_places(self.m)}
+        sought = {p.component for own in self.unknowns.places for p in own if p.array == "couplings"}
+        plain = all(pair.on_a is None and pair.contact is None for pair in m.pairs)
+        return plain and not (any(m.start.values()) or any(c.constant for c in m.couplings) or sought & constants)
+
+    def _coupling_units(self) -> Array:
+        """Units ``(K, 1)`` of the numbers of couplings in which a relation is of size one where lengths are."""
+        s, out = self.system, np.ones((len(self.system.par.couplings), 1))
+        for g, own in enumerate(coupling_places(self.m)):
+            columns = s.columns_of(self.m.couplings[g].freedoms)
+            unit = np.where(s.is_length[columns], self.L, 1.0)
+            size = float(np.abs(s.par.couplings[own, 0] * unit).max(initial=0.0)) or 1.0
+            out[own, 0], out[own.stop] = size / unit, size
+        return out
 
     def with_rows(self, rows: Index) -> RowProblem:
         """The same of some rows, the declared one first."""
         out = copy(self)
+        vars(out).pop("turning", None), vars(out).pop("plain_angles", None)
         out.asked, out.rates = self.asked[rows], [rates[rows] for rates in self.rates]
         out.rows = np.arange(len(rows))[out._row_counts :]
         return out
@@ -288,12 +268,15 @@ class RowProblem:
         size = float(np.abs(every - middle).max(initial=0.0))
         return middle, size or 1.0
 
-    def _read_declared_row(self) -> None:
-        """What is asked at row 0 has to be so there, where that row is closed by itself; unknown points stand where they are asked."""
-        s, faults = self.system, []
+    def _read_declared_row(self) -> list[str]:
+        """What is asked at row 0 has to be so there, where that row is closed by itself; unknown points stand where they are asked.
+
+        Faults are returned.
+        """
+        s, faults = self.system, list[str]()
         self.known: dict[int, float] = {}
         if not self.closed_at_start:
-            return
+            return faults
         pinned = {
             (p.pair, p.component): k
             for k, places in enumerate(self.unknowns.places)
@@ -317,9 +300,10 @@ class RowProblem:
                     "begin there" + (", or let the point be unknown" if s.is_length[column] else "")
                 )
         if faults:
-            raise DeclarationError(self.name, faults)
+            return faults
         places = [self.unknowns.places[k] for k in self.known]
         self.numbers = self.numbers.with_values(places, np.array(list(self.known.values())).reshape(-1, 1))
+        return faults
 
     @cached_property
     def at_rest(self) -> Array:
@@ -360,10 +344,19 @@ class RowProblem:
     @cached_property
     def _scales(self) -> tuple[Array, Array]:
         """Origins and units ``(u, 1)`` of the unknowns: points are counted in L from the origin of the problem."""
-        origin, unit = (np.full((len(self.unknowns.names), 1), value) for value in (0.0, 1.0))
-        for k, places in enumerate(self.unknowns.places):
-            if places and places[0].array == "point":
-                origin[k], unit[k] = self.origin[places[0].component], self.L
+        return self.scales_of(self.unknowns.places)
+
+    def scales_of(self, places: Sequence[Sequence[UnknownPlace]]) -> tuple[Array, Array]:
+        """The same of numbers at some places."""
+        origin, unit = (np.full((len(places), 1), value) for value in (0.0, 1.0))
+        for k, (p, *_) in enumerate(places):
+            if p.array == "point":
+                origin[k], unit[k] = self.origin[p.component], self.L
+            elif p.array == "pitch":
+                unit[k] = self.L
+            elif p.array == "couplings":
+                unit[k] = self.coupling_units[p.component]
+            origin[k], unit[k] = origin[k] / p.scale, unit[k] / p.scale
         return origin, unit
 
     def inside(self, values: Array) -> Array:
@@ -385,13 +378,62 @@ class RowProblem:
         return self.unknowns.mechanism(values)
 
     def scaled(self, places: Sequence[Sequence[UnknownPlace]], values: Array) -> Array:
-        """Values ``(n, B)`` of components of points and directions, of the user, in internal units."""
-        out = np.array(values)
-        for row, own in zip(out, places, strict=True):
-            if own[0].array == "point":
-                row -= self.origin[own[0].component]
-                row /= self.L
+        """Values ``(n, B)`` of numbers of the user in internal units."""
+        origin, unit = self.scales_of(places)
+        return np.asarray((values - origin) / unit)
+
+    @cached_property
+    def turning(self) -> dict[int, tuple[Index, Array]]:
+        """Unknown constants of couplings of which angles that are asked nowhere count whole turns: columns of these, and how far the
+        constant changes with them.
+        """
+        s, out = self.system, dict[int, tuple[Index, Array]]()
+        couplings, every = s.m.couplings, [s.columns_of(c.freedoms) for c in s.m.couplings]
+        asked = self.columns[~np.isnan(self.asked).all(axis=0)]
+        for k, (p, *_) in enumerate(self.places):
+            for g, own in enumerate(coupling_places(s.m) if p.array == "couplings" else []):
+                others = np.concatenate([asked, *(c for i, c in enumerate(every) if i != g)])
+                free = ~s.is_length[every[g]] & ~np.isin(every[g], others)
+                if own.stop == p.component and free.any():
+                    out[k] = every[g][free], np.array(couplings[g].coefficients)[free] / self.coupling_units[own.stop]
         return out
+
+    @cached_property
+    def periods(self) -> Array:
+        """By how much the unknowns ``(u,)`` may grow while nothing changes but whole turns; infinite where they may not."""
+        out = np.full(self.u, np.inf)
+        for k, (_, by) in self.turning.items():
+            # teeth of which ratios are made
+            parts = [Fraction(float(c / by[0])).limit_denominator(1000) for c in by]
+            whole = lcm(*(one.denominator for one in parts))
+            out[k] = 2 * np.pi * abs(by[0]) * gcd(*(int(one * whole) for one in parts)) / whole
+        return out
+
+    @cached_property
+    def plain_angles(self) -> tuple[list[str], Index]:
+        """Screws and couplings by which an angle that is not asked at all rows stands in the equations as a number too, not by sine and
+        cosine alone, and columns of what is asked that may not go along a line in the trace test for such reasons.
+        """
+        s, m, sought = (
+            self.system,
+            self.system.m,
+            {p.component for own in self.places for p in own if p.array == "couplings"},
+        )
+        given = self.columns[~np.isnan(self.asked[self.rows]).any(axis=0)]
+        told, bound = list[str](), list[int]()
+        for k, pair in enumerate(m.pairs):
+            columns = s.first_column[k] + np.flatnonzero([any(f.per_pitch) for f in pair.type.freedoms])
+            told += [f"pair {pair.name}"] if not np.isin(columns, given).all() else []
+            bound += columns.tolist()
+        for c, own in zip(m.couplings, coupling_places(m), strict=True):
+            columns = s.columns_of(c.freedoms)
+            known, length = np.isin(columns, given), s.is_length[columns]
+            ratio = bool(sought & set(range(own.start, own.stop))) or bool((length & ~known).any())
+            if (open_ := (~length & ~known).any()) and ratio:
+                told.append(f"coupling {c.name}")
+            if open_ or ratio or own.stop in sought:
+                bound += columns[known & (length if open_ else ~length)].tolist()
+        return told, np.array(bound, dtype=np.intp)
 
     @cached_property
     def loop_signs(self) -> Array:
@@ -411,9 +453,45 @@ class RowProblem:
         return [[replace(p, pair=at[p.pair]) for p in own] for own in places]
 
     def system_with(self, numbers: RowNumbers) -> System:
-        """The system with other markers."""
-        X = numbers.poses
-        return self.system.with_parameters(replace(self.system.par, marker_a=X[:, :, 0], marker_b=X[:, :, 1]))
+        """The system with other numbers; of one mechanism where it has to be built from these."""
+        X, plain = numbers.poses, {"pitch": numbers.pitch, "couplings": self.coupling_units * numbers.couplings}
+        markers = {"marker_a": X[:, :, 0], "marker_b": X[:, :, 1]}
+        if not len(numbers.others) or (built := self._system_built(numbers)) is None:
+            return self.system.with_parameters(replace(self.system.par, **cast("Any", markers | plain)))
+        # other points of links stand in free pairs
+        own = np.arange(len(self.whole.pairs))[:, None] < self.own
+        markers = {name: np.where(own, getattr(built.par, name), value) for name, value in markers.items()}
+        return built.with_parameters(replace(built.par, **cast("Any", markers)))
+
+    def is_built(self, numbers: RowNumbers) -> bool:
+        """Whether there is a mechanism with the numbers of one."""
+        return self._system_built(numbers) is not None
+
+    def _system_built(self, numbers: RowNumbers) -> System | None:
+        """The system of a mechanism built with the numbers of one; None where there is none. Those of many numbers are kept."""
+        z = np.array([numbers.at(places)[0] for places in self.places])
+        if z.tobytes() not in self._built:
+            if len(self._built) > TRACKS_TOGETHER:
+                self._built.clear()
+            try:
+                m = self.unknowns.mechanism(self.outside(z[:, None])[:, 0])
+            except DeclarationError:
+                self._built[z.tobytes()] = None
+            else:
+                pairs = [*m.pairs, *self.whole.pairs[self.own :]]
+                whole = self.whole.replace(pairs=pairs, couplings=m.couplings, gears=m.gears)
+                par, old = declared(whole), self.system.par
+                self._built[z.tobytes()] = System(whole, None, par.parameters(whole, old.offset, old.origin, old.L))
+        return self._built[z.tobytes()]
+
+    def configuration(self, numbers: RowNumbers, states: Array) -> Configuration:
+        """Mechanisms ``T`` at states ``(nx, n T)``, those of one set of ``T`` after the other."""
+        T = numbers.point.shape[-1]
+        if len(numbers.others):
+            return cast("Configuration", Apart(self, numbers, states.reshape(len(states), -1, T)))
+        system = self.system_with(numbers)
+        many = states.shape[1] > T and system.par.batch > 1
+        return Configuration(system.cases(np.tile(np.arange(T), states.shape[1] // T)) if many else system, states)
 
     @cached_property
     def asked_columns(self) -> Index:
@@ -434,6 +512,41 @@ class RowProblem:
         freedoms, order by order.
         """
         return ArrowRows(self, numbers, x, drive)
+
+
+class Apart:
+    """Configurations of mechanisms that differ in more than arrays, as one; of numbers of which there is no mechanism nothing closes."""
+
+    def __init__(self, problem: RowProblem, numbers: RowNumbers, states: Array) -> None:
+        self.x, self.system, self._parts = states.reshape(len(states), -1), problem.system, list[Configuration]()
+        self._built = np.ones(states.shape[2], dtype=bool)
+        for t in range(states.shape[2]):
+            one = numbers.taken(np.array([t]))
+            self._built[t] = problem.is_built(one)
+            self._parts.append(Configuration(problem.system_with(one), states[:, :, t]))
+
+    @property
+    def T(self) -> int:
+        """Number of positions."""
+        return self.x.shape[1]
+
+    @property
+    def residual(self) -> Array:
+        """What is left open."""
+        return np.where(np.tile(self._built, self.T // len(self._built)), self._joined("residual"), np.inf)
+
+    @property
+    def row_scale(self) -> Array:
+        """See ``System.row_scale``."""
+        every = np.concatenate([one.system.row_scale for one in self._parts], axis=1)
+        return np.tile(every, self.T // len(self._built))
+
+    def _joined(self, name: str) -> Array:
+        every = np.stack([getattr(one, name) for one in self._parts], axis=-1)
+        return every.reshape(*every.shape[:-2], -1)
+
+    def __getattr__(self, name: str) -> Array:
+        return self._joined(name)
 
 
 class ArrowRows:
@@ -461,13 +574,11 @@ class ArrowRows:
     @cached_property
     def here(self) -> Configuration:
         """All rows and nodes in one batch."""
-        system, s = self.problem.system_with(self.numbers), self.problem.system
+        s = self.problem.system
         states = np.moveaxis(self.x[:, : s.n_state, None], 1, 0)
         if self._steps is not None:
-            states = system.advance(np.broadcast_to(states, (s.n_state, self.R, self.N, self.T)), self._steps)
-        if self.R * self.N > 1 and system.par.batch > 1:
-            system = system.cases(np.tile(np.arange(self.T), self.R * self.N))
-        return Configuration(system, states.reshape(s.n_state, -1))
+            states = s.advance(np.broadcast_to(states, (s.n_state, self.R, self.N, self.T)), self._steps)
+        return self.problem.configuration(self.numbers, states.reshape(s.n_state, -1))
 
     def _by_row(self, values: Array) -> Array:
         """``(n, ..., R N T) -> (R, n, ..., T)``, where rates are asked with all orders of ``n`` one after the other."""
@@ -518,10 +629,51 @@ class ArrowRows:
         for i, k in enumerate(which):
             out[:, :, k] += each[:, :, i]
         for k, (p, *_) in enumerate(places):
-            if p.array == "factor" and self.drive is not None:
-                scaled = self.problem.factor_of == p.component
-                J = self.by_coordinates[:, :, self.problem.asked_columns[scaled]]
-                out[:, :, k] += np.einsum("rndt,rdt->rnt", J, self.drive[:, scaled])
+            if p.array not in MARKER:
+                out[:, :, k] = self.by_number(p)
+        return out
+
+    def by_number(self, p: UnknownPlace) -> Array:
+        """Derivatives ``(R, n, T)`` by what stands at a place that is none of a marker."""
+        problem, here, s = self.problem, self.here, self.problem.system
+        if p.array == "factors":
+            if self.drive is None:
+                return np.zeros_like(self.residual)
+            scaled = problem.factor_of == p.component
+            J = self.by_coordinates[:, :, problem.asked_columns[scaled]]
+            return np.asarray(np.einsum("rndt,rdt->rnt", J, self.drive[:, scaled]))
+        if p.array == "pitch":
+            columns = np.arange(s.first_column[p.pair], s.first_column[p.pair + 1])
+            along = here.S[:3, columns] * (per_turn(s.m.pairs[p.pair])[:, None] * here.x[s.single_rows[columns]])
+            V = np.concatenate([np.zeros_like(along), along]).sum(axis=1)
+            return self._by_row(self.opened(np.array([0]), np.array([p.pair]), V[:, None]))[:, :, 0]
+        if p.array == "couplings":
+            return self._by_row(self._of_coupling(p.component))
+        # central differences: the third derivative times the square of the step, and rounding over it, are alike
+        step, ends = 1e-5, []
+        for side in (step, -step):
+            others = self.numbers.others.copy()
+            others[p.index] += side
+            ends.append(problem.configuration(replace(self.numbers, others=others), here.x).residual)
+        # at the end of what can be built one side is left
+        sides = sum(np.isfinite(end) for end in ends)
+        a, b = (np.where(np.isfinite(end), end, here.residual) for end in ends)
+        return self._by_row((a - b) / (step * np.maximum(sides, 1)))
+
+    def _of_coupling(self, number: int) -> Array:
+        """Derivatives ``(n, R N T)`` of all rows by a number of the couplings: the coordinate behind it, or minus one of a constant."""
+        here, s, m = self.here, self.problem.system, self.problem.m
+        g, own = next((g, own) for g, own in enumerate(coupling_places(m)) if number <= own.stop)
+        value: Array | float = -1.0
+        if number < own.stop:
+            (column,) = s.columns_of([m.couplings[g].freedoms[number - own.start]])
+            value = here.x[s.single_rows[column]] * (self.problem.L if s.is_length[column] else 1.0)
+            if m.couplings[g].constant is None:
+                value = value - s.start_coordinates(m.start)[column]
+        row = s.graph.loop_rows + g
+        out = np.zeros(here.residual.shape, dtype=here.residual.dtype)
+        scale = here.row_scale if isinstance(here, Apart) else here.system.row_scale
+        out[row] = value * scale[row] * self.problem.coupling_units[number]
         return out
 
     def moved(self, side: Index, pair: Index, rates: Array) -> Array:

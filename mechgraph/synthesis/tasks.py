@@ -13,10 +13,12 @@ from typing import Any, Literal
 import numpy as np
 
 from mechgraph.kinematics.prescribed import Target, coordinate, parts_of, target_of
+from mechgraph.kinematics.state import Configuration, user_poses
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.pair import Marker, Pair
 from mechgraph.quantities import door, items_of, real_array, shown, wrong
 
 
@@ -477,3 +479,71 @@ def asked_of(m: Mechanism, tasks: Any, faults: list[str]) -> Asked | None:
         faults.append("tasks: nothing is asked beyond the declared configuration; give two positions or more")
         return None
     return Asked(values[0], tuple(scaled), values[1 : 1 + orders])
+
+
+class FirstPoses:
+    """Links that begin at other poses than the identity, ``poses (4, 4)`` by link.
+
+    Pairs by point and axis want the frames of their links on the global one at row 0. So a link with such pairs is sought in a frame of its
+    own that lies there, ``m`` and ``tasks``; what is found comes ``back`` in the frame that was declared, its pairs by markers.
+    """
+
+    def __init__(self, declared: Mechanism, tasks: Any, unknown: Sequence[str], faults: list[str]) -> None:
+        every = tasks if isinstance(tasks, list | tuple) else [tasks]
+        found = [(task.link, task.first(declared)) for task in every if isinstance(task, PoseTask)]
+        at_once = {link for pair in declared.pairs if pair.on_a is None for link in (pair.a, pair.b)}
+        known = [(link, X) for link, X in found if X is not None and link in at_once]
+        self.declared, self.poses = declared, dict(known)
+        self.m, self.tasks = declared, tasks
+        if not self.poses:
+            return
+        faults += [
+            f"unknown {name!r}: is a point of a link of which the first pose is not the identity; begin there, or give the point"
+            for name in unknown
+            for link in self.poses
+            if name.startswith(f"{link}.")
+        ]
+        faults += [
+            f"pair {pair.name!r}: is placed on each link by itself, others of its link are not, and its first pose is not the identity; "
+            "place all of them alike"
+            for pair in declared.pairs
+            if pair.on_a is not None and self.poses.keys() & {pair.a, pair.b}
+        ]
+        moved = [
+            link.replace(points={name: X[:3, :3] @ p + X[:3, 3] for name, p in link.points.items()})
+            if (X := self.poses.get(link.name)) is not None
+            else link
+            for link in declared.links
+        ]
+        self.m = declared.replace(links=moved)
+        self.tasks = [
+            task.after(declared, self.poses[task.link], faults)
+            if isinstance(task, PoseTask) and task.link in self.poses
+            else task
+            for task in every
+        ]
+
+    def back(self, m: Mechanism) -> Mechanism:
+        """A mechanism found, in the frames that were declared."""
+        if not self.poses:
+            return m
+        links = [old if old.name in self.poses else new for old, new in zip(self.declared.links, m.links, strict=True)]
+        return m.replace(links=links, pairs=[self._by_markers(pair) for pair in m.pairs])
+
+    def _by_markers(self, pair: Pair) -> Pair:
+        if pair.on_a is not None or not self.poses.keys() & {pair.a, pair.b}:
+            return pair
+        sides = []
+        for link, marker in zip((pair.a, pair.b), pair.markers, strict=True):
+            X = self.poses.get(link, np.eye(4))
+            axis, second = (np.asarray(v) @ X[:3, :3] for v in (marker.axis, marker.second))
+            sides.append(Marker((np.asarray(marker.point) - X[:3, 3]) @ X[:3, :3], axis, second))
+        return pair.replace(point=None, axis=None, second=None, on_a=sides[0], on_b=sides[1])
+
+    def poses_of(self, here: Configuration) -> Array:
+        """Poses ``(T, N, 4, 4)`` of the links as declared."""
+        X = np.moveaxis(user_poses(here), 1, 0)
+        for link, X0 in self.poses.items():
+            k = self.declared.link_names().index(link)
+            X[:, k] = X[:, k] @ X0
+        return X

@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 import scipy
 
+from mechgraph.errors import DeclarationError
 from mechgraph.fields import XYZ
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
@@ -22,16 +23,20 @@ from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import Array, cross, move_twist
 from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
-from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.mechanism import Mechanism, chain_numbers
+from mechgraph.model.pair import Pair
 from mechgraph.model.parameters import declared
 from mechgraph.modes.family import span
 from mechgraph.quantities import wrong
 from mechgraph.variants.numbers import (
     MARKER,
+    PLACED,
     SIDES,
     AnyField,
+    ChainField,
     Field,
     ItemField,
+    chain_marker,
     clashes,
     field_values,
     find_field,
@@ -41,17 +46,29 @@ from mechgraph.variants.numbers import (
 
 @dataclass(frozen=True)
 class UnknownPlace:
-    """A component of ``point``, ``axis`` or ``second`` of the marker of a pair on a side; of no pair (-1) a ``factor`` of what is asked."""
+    """A component of ``point``, ``axis`` or ``second`` of the marker of a pair on a side, or the ``pitch`` of a pair; of no pair (-1) a
+    number of the ``couplings``, one of the ``factors`` of what is asked, or one of ``others``, from which the mechanism is built.
+
+    What stands there is ``scale`` times the number.
+    """
 
     array: str
     side: int
     component: int
     pair: int
+    scale: float = 1.0
 
     @property
     def turns(self) -> bool:
         """Whether directions change with it."""
         return self.array in MARKER[1:]
+
+    @property
+    def index(self) -> tuple[int, ...]:
+        """Where it stands in its array."""
+        if self.array in MARKER:
+            return self.side, self.component, self.pair
+        return (self.component if self.pair < 0 else self.pair,)
 
 
 class Unknowns:
@@ -77,6 +94,26 @@ class Unknowns:
                 else:
                     self.fields[one] = found
         faults += clashes(m, self.fields)
+        self.others = [name for name, field in self.fields.items() if not self._places_of(name, field)]
+        faults += [f"unknown {name!r}: {why}" for name in self.others if (why := self._why_not(name))]
+
+    def _why_not(self, name: str) -> str:
+        """Why a number is none to be sought: no position depends on it, or it cannot change by a little; empty where it is one."""
+        at, why = list(self.fields).index(name), ""
+        # a change that is seen in the last digits of what follows from the number
+        for change in (1e-3, -1e-3):
+            values = self.declared.copy()
+            values[at] += change * (1.0 + abs(values[at]))
+            try:
+                other = self.mechanism(values)
+            except DeclarationError as error:
+                why = f"cannot change by a little: {error.faults[0]}"
+                continue
+            a, b = (declared(one) for one in (self.m, other))
+            same = all(np.array_equal(getattr(a, part), getattr(b, part)) for part in (*PLACED, "couplings"))
+            same &= [p.type for p in self.m.pairs] == [p.type for p in other.pairs]
+            return "stands in no equation of closure; no position depends on it" if same else ""
+        return why
 
     def _expanded(self, name: str) -> list[str]:
         """The numbers of an element: of a pair, of its point or direction, of a named point; a number is itself."""
@@ -106,20 +143,28 @@ class Unknowns:
         return np.array([*field_values(self.m, self.fields).values(), *(1.0 for _ in self.factors)], dtype=float)
 
     @cached_property
-    def others(self) -> list[str]:
-        """Those that are no components of points and directions: the closure is no algebraic function of them."""
-        return [name for name, places in zip(self.names, self.places, strict=True) if not places]
-
-    @cached_property
     def places(self) -> list[list[UnknownPlace]]:
-        """For every number its places, of which none is known for others than components of points and directions."""
-        own = [self._places_of(name, field) for name, field in self.fields.items()]
-        return own + [[UnknownPlace("factor", 0, i, -1)] for i in range(len(self.factors))]
+        """For every number its places; of ``others``, in whose arrays nothing else is, the place among these."""
+        own = []
+        for name, field in self.fields.items():
+            unit = 1.0 / (abs(field_values(self.m, {name: field})[name]) or 1.0)
+            own.append(
+                self._places_of(name, field) or [UnknownPlace("others", 0, self.others.index(name), -1, scale=unit)]
+            )
+        return own + [[UnknownPlace("factors", 0, i, -1)] for i in range(len(self.factors))]
 
     def _places_of(self, name: str, field: AnyField) -> list[UnknownPlace]:
+        """Places of a number in arrays in which the closure is linear but for motions; none where it follows otherwise."""
         if isinstance(field, Field) and field.array in MARKER:
             (side, component, pair), *_ = field.places
             return [UnknownPlace(field.array, s, component, pair) for s in ((0, 1) if side == slice(None) else (side,))]
+        if isinstance(field, Field) and field.array == "pitch":
+            k = int(field.places[0][-1])
+            return [UnknownPlace("pitch", 0, 0, k, field.scale)] if per_turn(self.m.pairs[k]).any() else []
+        if isinstance(field, Field) and field.array == "couplings":
+            return [UnknownPlace("couplings", 0, int(field.places[0][0]), -1)]
+        if isinstance(field, ChainField):
+            return self._place_in_chain(field)
         if isinstance(field, ItemField) and field.what == "links":
             at = field.place[0]
             owner = name.rpartition(".")[0]
@@ -129,6 +174,23 @@ class Unknowns:
                 if pair.name.rstrip("'") == owner
             ]
         return []
+
+    def _place_in_chain(self, field: ChainField) -> list[UnknownPlace]:
+        """See ``model.mechanism.markers_of_chain``: length and offset of all links but the last are x and z of a point on link a."""
+        side, pair = chain_marker(self.m, field)
+        numbers, along = self.m.once(chain_numbers), {1: 0, 2: 2}.get(field.kind)
+        if along is None or numbers is None:
+            return []
+        if not side or along == 0:
+            return [UnknownPlace("point", side, along, pair, 1.0 - 2.0 * side)]
+        twist, varies = (
+            numbers[0, field.index],
+            any(
+                isinstance(other, ChainField) and not other.kind and other.index == field.index
+                for other in self.fields.values()
+            ),
+        )
+        return [] if np.sin(twist) or varies else [UnknownPlace("point", side, along, pair, -np.cos(twist))]
 
     def mechanism(self, values: Array) -> Mechanism:
         """The mechanism with the numbers ``values (u,)``."""
@@ -147,6 +209,14 @@ class Unknowns:
             assert isinstance(field, ItemField)
             links[field.index] = field.changed(links[field.index], float(value))
         return m.replace(links=links)
+
+
+def per_turn(pair: Pair) -> Array:
+    """Advance ``(f,)`` of the freedoms of a pair along their axes for a pitch of one; all zero where a pitch moves them otherwise."""
+    rows = [(np.array(f.twist[:3]), np.array(f.per_pitch)) for f in pair.type.freedoms]
+    out = np.array([w @ per[3:] for w, per in rows])
+    alike = all(np.array_equal(per, [0, 0, 0, *(one * w)]) for one, (w, per) in zip(out, rows, strict=True))
+    return out if alike else np.zeros(len(out))
 
 
 def _on_link(field: AnyField) -> bool:
