@@ -257,6 +257,23 @@ def test_a_second_crank_has_the_two_phases_with_which_a_dyad_closes() -> None:
         assert abs(one.start["E.Rz"]) <= np.pi
 
 
+def test_turns_of_all_wheels_of_a_train_count_once() -> None:
+    """``E = (F + .2) / 2`` of an idler with ``F = (A + k) / 3``: E has turned once where F has twice and ``k`` has grown by ``12 pi``."""
+    idler = mg.Pair("F", "R", "frame", "idler", point=(5, 0))
+    m = geared().replace(links=[*geared().links, mg.Link("idler")], pairs=[*geared().pairs, idler])
+
+    def train(constant: float) -> mg.Mechanism:
+        first = mg.Coupling({"A": -1, "F": 3}, name="g", constant=constant)
+        return m.replace(couplings=[first, mg.Coupling({"F": -1, "E": 2}, name="h", constant=0.2)])
+
+    q = mg.kinematics(train(0.3), {"A": 0.0})["C"].position.item()
+    s = mg.synthesize(train(0.1), mg.positions([{"A": 0.0, "C": q}, {}]), ["g.constant"])
+    assert (s.total, s.completeness, len(s)) == (2, "tested", 2)
+    assert np.abs(s.field("g.constant") - 0.3).min() < 1e-9
+    for one in s:
+        assert mg.kinematics(one, {"A": 0.0})["C"].position.item() == pytest.approx(q, abs=1e-10)
+
+
 def test_a_gauge_has_the_two_constants_of_both_ways_in_which_the_slider_closes() -> None:
     """``F - k = r cos a +- (l^2 - r^2 sin^2 a)^(1/2)``."""
     s = mg.synthesize(slide(0.2), mg.positions([{"A": 0.5, "F": 4.0}, {}]), ["g.constant"])

@@ -448,13 +448,14 @@ class TaskClass:
         return self.told(x)
 
     def told(self, x: Array) -> Array:
-        """Unknowns ``(u, T)`` at states, those that count whole turns too as ``exp(2 pi i z / p)`` of their periods ``p``."""
-        out, p = x[: self.u], self.problem.periods[:, None]
-        turning = np.isfinite(p)
-        with np.errstate(over="ignore"):
-            return (
-                np.where(turning, np.exp(2j * np.pi * out / np.where(turning, p, 1.0)), out) if turning.any() else out
-            )
+        """Unknowns ``(u, T)`` at states; those that whole turns change as what is the same for all of these."""
+        turns, out = self.problem.turns, x[: self.u]
+        if turns.whole:
+            told = turns.told @ out[turns.which]
+            told[: turns.whole] = np.exp(2j * np.pi * told[: turns.whole])
+            out = out.astype(complex)
+            out[turns.which] = told
+        return out
 
     # --- equations ---------------------------------------------------------------------------------------------------
 

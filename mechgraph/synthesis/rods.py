@@ -71,7 +71,7 @@ class RodProblem(RowProblem):
 
     def __init__(self, full: RowProblem, rods: list[Rod]) -> None:
         vars(self).update(vars(copy(full)))
-        for name in ("places", "at_rest", "loop_signs", "asked_columns", "turning", "plain_angles"):
+        for name in ("places", "at_rest", "loop_signs", "asked_columns", "turns", "plain_angles"):
             vars(self).pop(name, None)
         self.full, s, m = full, full.system, full.whole
         gone = [end.pair for rod in rods for end in rod]

@@ -129,12 +129,14 @@ class TaskPencil:
         row = int(np.argmax(np.where(open_.any(axis=1), equations.conditions, -1)))
         other = equations.random_members(rng, 1)[0].drive[row, :, 0] - base.drive[row, :, 0]
         part = rng.normal(size=2) @ [0.7, 0.7j]
-        self.rate, self.parts = np.zeros(base.drive.shape[:2], dtype=complex), _parts_of_turns(equations)
-        self.rate[row] = part * np.where(length, other, np.exp(1j / self.parts * np.where(length, 0.0, other)) - 1.0)
         # one angle, or lengths alone: rational functions of several angles are of much higher degrees
         given = open_[row]
         moves = given & length if (given & length).any() else np.arange(len(given)) == np.argmax(given)
-        self.rate[row] *= moves
+        coupled = equations.problem.system.coupled_freedoms
+        self.parts = _parts_of_turns(equations) if np.isin(equations.columns[moves], coupled).any() else 1
+        grown = np.where(length, other, np.exp(1j / self.parts * np.where(length, 0.0, other)) - 1.0)
+        self.rate = np.zeros(base.drive.shape[:2], dtype=complex)
+        self.rate[row] = part * grown * moves
         self.weights = rng.normal(size=(equations.u, 2)) @ [1.0, 1.0j]
 
     def members(self, phi: Array) -> ClassMember:

@@ -282,14 +282,14 @@ class Synthesis:
 
     def _near_start(self, x: Array) -> Array:
         """Real states ``(nx, n)`` with angles that are asked nowhere by whole turns near to the start, and constants that go with them."""
-        of, out = self.of, x.copy()
-        s = of.problem.system
-        rows, start = out[of.head :].reshape(of.R, of.nx, -1), s.start_coordinates(s.m.start)
-        for k, (columns, by) in of.problem.turning.items():
-            for column, c in zip(columns.tolist(), by.tolist(), strict=True):
-                turns = 2 * np.pi * np.round((rows[0, s.single_rows[column]] - start[column]) / (2 * np.pi))
-                rows[:, s.single_rows[column]] -= turns
-                out[k] -= c * turns
+        of, out, turns = self.of, x.copy(), self.of.problem.turns
+        s, n = of.problem.system, x.shape[1]
+        rows, at = out[of.head :].reshape(of.R, of.nx, n), s.single_rows[turns.columns]
+        start = s.start_coordinates(s.m.start)[turns.columns, None]
+        for way, by in zip(turns.ways.T[:, :, None], turns.by.T, strict=True):
+            back = np.round((way * (rows[0, at] - start)).sum(axis=0) / (2 * np.pi * (way**2).sum()))
+            rows[:, at] -= 2 * np.pi * way * back
+            out[turns.which] -= by[:, None] * back
         return out
 
     def _tracks(self, start: TaskStart, found: TaskEnds) -> str:

@@ -15,17 +15,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
-from fractions import Fraction
 from functools import cached_property
-from math import gcd, lcm
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
+import scipy.linalg
 
 from mechgraph.errors import DeclarationError
 from mechgraph.kinematics.prescribed import DriverMotion
 from mechgraph.kinematics.state import Configuration, close
 from mechgraph.kinematics.system import System
+from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Array, Index, cross, move_twist, rotation_exp, turn_tangent
 from mechgraph.memo import dataclass
 from mechgraph.model.gears import moving_lines
@@ -33,8 +33,31 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.parameters import Declared, coupling_places, declared
 from mechgraph.modes.homotopy import TRACKS_TOGETHER
 from mechgraph.synthesis.tasks import FirstPoses, asked_of
-from mechgraph.synthesis.unknowns import UnknownPlace, Unknowns, marker_twists, norms_of, per_turn, unit_rates
+from mechgraph.synthesis.unknowns import (
+    UnknownPlace,
+    Unknowns,
+    echelon,
+    marker_twists,
+    norms_of,
+    per_turn,
+    unit_rates,
+    whole_numbers,
+)
 from mechgraph.variants.numbers import MARKER
+
+
+class Turns(NamedTuple):
+    """Unknowns ``which (k,)`` that whole turns change; combinations ``told (k, k)`` of these, the first ``whole`` of which grow by whole
+    numbers and the others not at all; ``columns (m,)`` of the angles, independent ``ways (m, n)`` to turn them, and what each adds to the
+    unknowns, ``by (k, n)``.
+    """
+
+    which: Index
+    told: Array
+    whole: int
+    columns: Index
+    ways: Array
+    by: Array
 
 
 @dataclass(frozen=True)
@@ -236,7 +259,7 @@ class RowProblem:
     def with_rows(self, rows: Index) -> RowProblem:
         """The same of some rows, the declared one first."""
         out = copy(self)
-        vars(out).pop("turning", None), vars(out).pop("plain_angles", None)
+        vars(out).pop("turns", None), vars(out).pop("plain_angles", None)
         out.asked, out.rates = self.asked[rows], [rates[rows] for rates in self.rates]
         out.rows = np.arange(len(rows))[out._row_counts :]
         return out
@@ -383,31 +406,27 @@ class RowProblem:
         return np.asarray((values - origin) / unit)
 
     @cached_property
-    def turning(self) -> dict[int, tuple[Index, Array]]:
-        """Unknown constants of couplings of which angles that are asked nowhere count whole turns: columns of these, and how far the
-        constant changes with them.
-        """
-        s, out = self.system, dict[int, tuple[Index, Array]]()
-        couplings, every = s.m.couplings, [s.columns_of(c.freedoms) for c in s.m.couplings]
-        asked = self.columns[~np.isnan(self.asked).all(axis=0)]
-        for k, (p, *_) in enumerate(self.places):
-            for g, own in enumerate(coupling_places(s.m) if p.array == "couplings" else []):
-                others = np.concatenate([asked, *(c for i, c in enumerate(every) if i != g)])
-                free = ~s.is_length[every[g]] & ~np.isin(every[g], others)
-                if own.stop == p.component and free.any():
-                    out[k] = every[g][free], np.array(couplings[g].coefficients)[free] / self.coupling_units[own.stop]
-        return out
-
-    @cached_property
-    def periods(self) -> Array:
-        """By how much the unknowns ``(u,)`` may grow while nothing changes but whole turns; infinite where they may not."""
-        out = np.full(self.u, np.inf)
-        for k, (_, by) in self.turning.items():
-            # teeth of which ratios are made
-            parts = [Fraction(float(c / by[0])).limit_denominator(1000) for c in by]
-            whole = lcm(*(one.denominator for one in parts))
-            out[k] = 2 * np.pi * abs(by[0]) * gcd(*(int(one * whole) for one in parts)) / whole
-        return out
+    def turns(self) -> Turns:
+        """What whole turns of angles that are asked nowhere change: unknown constants of couplings, no known ones."""
+        s, every = self.system, coupling_places(self.system.m)
+        number = {p.component: k for k, (p, *_) in enumerate(self.places) if p.array == "couplings"}
+        mine = [g for g, own in enumerate(every) if own.stop in number]
+        asked, C = self.columns[~np.isnan(self.asked).all(axis=0)], s.coupling_matrix[:, :, 0]
+        columns = complement(np.union1d(asked, np.flatnonzero(s.is_length | ~C.any(axis=0))), s.n_freedoms)
+        if not mine:
+            return Turns(
+                np.zeros(0, dtype=np.intp), np.zeros((0, 0)), 0, columns[:0], np.zeros((0, 0)), np.zeros((0, 0))
+            )
+        # a row of the matrix is over the unit of its constant
+        whole, unit = zip(*(whole_numbers(row) for row in C[:, columns]), strict=True)
+        rows = np.array(whole, dtype=object).reshape(len(C), len(columns))
+        _, U, rank = echelon(rows[[g for g in range(len(C)) if g not in mine]])
+        shifts, ways = rows[mine] @ U[:, rank:], U[:, rank:].astype(float)
+        lattice, _, rank = echelon(shifts)
+        basis, size = lattice[:, :rank].astype(float), 2 * np.pi * np.array([unit[g] for g in mine])
+        told = np.concatenate([np.linalg.pinv(basis), scipy.linalg.null_space(basis.T).T]) / size
+        which = np.array([number[every[g].stop] for g in mine], dtype=np.intp)
+        return Turns(which, told, rank, columns, ways, size[:, None] * shifts.astype(float))
 
     @cached_property
     def plain_angles(self) -> tuple[list[str], Index]:

@@ -10,7 +10,10 @@ sought that tell these apart best; the others stay as they are declared.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from fractions import Fraction
 from functools import cached_property
+from math import lcm
+from typing import Any
 
 import numpy as np
 import scipy
@@ -209,6 +212,33 @@ class Unknowns:
             assert isinstance(field, ItemField)
             links[field.index] = field.changed(links[field.index], float(value))
         return m.replace(links=links)
+
+
+def whole_numbers(row: Array) -> tuple[list[int], float]:
+    """Whole numbers that are to each other as those of a row, as the teeth of which ratios are made, and their unit."""
+    first = next((float(c) for c in row if c), 1.0)
+    parts = [Fraction(float(c) / first).limit_denominator(1000) for c in row]
+    many = lcm(*(one.denominator for one in parts))
+    return [int(one * many) for one in parts], first / many
+
+
+def echelon(A: Any) -> tuple[Any, Any, int]:
+    """Columns of whole numbers ``A (k, m)`` combined so that those behind the rank are zero, ``A U``; the matrix ``U (m, m)``, of which the
+    inverse has whole numbers too; and the rank (Hermite).
+    """
+    A, rank = A.copy(), 0
+    U = np.eye(A.shape[1], dtype=int).astype(object)
+    for row in range(len(A)):
+        while len(some := [j for j in range(rank, A.shape[1]) if A[row, j]]) > 1:
+            least = min(some, key=lambda j: abs(A[row, j]))
+            for j in some:
+                times = A[row, j] // A[row, least] if j != least else 0
+                A[:, j], U[:, j] = A[:, j] - times * A[:, least], U[:, j] - times * U[:, least]
+        for j in some:
+            for M in (A, U):
+                M[:, [rank, j]] = M[:, [j, rank]]
+            rank += 1
+    return A, U, rank
 
 
 def per_turn(pair: Pair) -> Array:
