@@ -433,12 +433,10 @@ class RowProblem:
         """Screws and couplings by which an angle that is not asked at all rows stands in the equations as a number too, not by sine and
         cosine alone, and columns of what is asked that may not go along a line in the trace test for such reasons.
         """
-        s, m, sought = (
-            self.system,
-            self.system.m,
-            {p.component for own in self.places for p in own if p.array == "couplings"},
-        )
+        s, m = self.system, self.system.m
+        sought = {p.component for own in self.places for p in own if p.array == "couplings"}
         given = self.columns[~np.isnan(self.asked[self.rows]).any(axis=0)]
+        asked = self.columns[~np.isnan(self.asked).all(axis=0)]
         told, bound = list[str](), list[int]()
         for k, pair in enumerate(m.pairs):
             columns = s.first_column[k] + np.flatnonzero([any(f.per_pitch) for f in pair.type.freedoms])
@@ -448,8 +446,10 @@ class RowProblem:
             columns = s.columns_of(c.freedoms)
             known, length = np.isin(columns, given), s.is_length[columns]
             ratio = bool(sought & set(range(own.start, own.stop))) or bool((length & ~known).any())
-            if (open_ := (~length & ~known).any()) and ratio:
-                told.append(f"coupling {c.name}")
+            told += [f"coupling {c.name}"] if ratio and (~length & ~known).any() else []
+            # an angle that is asked at one row says what a constant is
+            known = np.isin(columns, asked)
+            open_ = bool((~length & ~known).any())
             if open_ or ratio or own.stop in sought:
                 bound += columns[known & (length if open_ else ~length)].tolist()
         return told, np.array(bound, dtype=np.intp)
