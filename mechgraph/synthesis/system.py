@@ -46,7 +46,7 @@ from mechgraph.synthesis.unknowns import (
 from mechgraph.variants.numbers import MARKER
 
 
-class Turns(NamedTuple):
+class WholeTurns(NamedTuple):
     """Unknowns ``which (k,)`` that whole turns change; combinations ``told (k, k)`` of these, the first ``whole`` of which grow by whole
     numbers and the others not at all; ``columns (m,)`` of the angles, independent ``ways (m, n)`` to turn them, and what each adds to the
     unknowns, ``by (k, n)``.
@@ -406,7 +406,7 @@ class RowProblem:
         return np.asarray((values - origin) / unit)
 
     @cached_property
-    def turns(self) -> Turns:
+    def turns(self) -> WholeTurns:
         """What whole turns of angles that are asked nowhere change: unknown constants of couplings, no known ones."""
         s, every = self.system, coupling_places(self.system.m)
         number = {p.component: k for k, (p, *_) in enumerate(self.places) if p.array == "couplings"}
@@ -414,7 +414,7 @@ class RowProblem:
         asked, C = self.columns[~np.isnan(self.asked).all(axis=0)], s.coupling_matrix[:, :, 0]
         columns = complement(np.union1d(asked, np.flatnonzero(s.is_length | ~C.any(axis=0))), s.n_freedoms)
         if not mine:
-            return Turns(
+            return WholeTurns(
                 np.zeros(0, dtype=np.intp), np.zeros((0, 0)), 0, columns[:0], np.zeros((0, 0)), np.zeros((0, 0))
             )
         # a row of the matrix is over the unit of its constant
@@ -426,7 +426,7 @@ class RowProblem:
         basis, size = lattice[:, :rank].astype(float), 2 * np.pi * np.array([unit[g] for g in mine])
         told = np.concatenate([np.linalg.pinv(basis), scipy.linalg.null_space(basis.T).T]) / size
         which = np.array([number[every[g].stop] for g in mine], dtype=np.intp)
-        return Turns(which, told, rank, columns, ways, size[:, None] * shifts.astype(float))
+        return WholeTurns(which, told, rank, columns, ways, size[:, None] * shifts.astype(float))
 
     @cached_property
     def plain_angles(self) -> tuple[list[str], Index]:
