@@ -163,7 +163,8 @@ class TaskPencil:
 
 def movable(of: TaskClass) -> Mask:
     """What is asked ``(R, d)`` in which the equations are linear, or rational in ``exp(i q)``."""
-    return of.given & ~np.isin(of.columns, of.problem.plain_angles[1])
+    _, endless, bound = of.problem.plain_angles
+    return of.given & ~np.isin(of.columns, bound) & (not endless)
 
 
 def _parts_of_turns(of: TaskClass) -> int:

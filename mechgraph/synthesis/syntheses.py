@@ -57,7 +57,7 @@ from mechgraph.synthesis.unknowns import Unknowns
 
 NO_SCREWS = "ties an angle to a length or by an unknown ratio: the equations are not algebraic, their number of solutions has no end"
 NO_ARRAY = "the equations are not algebraic in it; exact synthesis does not serve it, fits do (fit=)"
-NO_LINE = "All that is asked stands in the equations as a number beside its sine and cosine: no trace test serves."
+NO_LINE = "All that is asked stands beside angles that are numbers in the equations too: no trace test serves."
 NO_CONTACTS = "curves and surfaces are made of pieces: solutions on one cannot be led to those on all others"
 
 
@@ -217,6 +217,7 @@ class Synthesis:
         closed_to = CLOSED_TO * np.maximum(1.0, np.abs(x[: self.of.u]).max(axis=0, initial=0.0)) ** power
         fits = error <= closed_to
         told = [*start.evidence, self._tracks(start, found), *self.foretold]
+        told += [f"{name}: {NO_SCREWS}." for name in p.plain_angles[1]]
         told += [NO_LINE] * (not movable(self.of).any())
         told += [f"Of {start.each} mechanisms each that do the same all real ones are listed."] * (start.each > 1)
         told += [f"{missing} of these were not found."] * (missing > 0)

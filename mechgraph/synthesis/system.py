@@ -429,15 +429,16 @@ class RowProblem:
         return WholeTurns(which, told, rank, columns, ways, size[:, None] * shifts.astype(float))
 
     @cached_property
-    def plain_angles(self) -> tuple[list[str], Index]:
-        """Screws and couplings by which an angle that is not asked at all rows stands in the equations as a number too, not by sine and
-        cosine alone, and columns of what is asked that may not go along a line in the trace test for such reasons.
+    def plain_angles(self) -> tuple[list[str], list[str], Index]:
+        """Screws and couplings of unknown ratios, then other couplings, by which an angle that is not asked at all rows stands in the
+        equations as a number too, not by sine and cosine alone; and columns of what is asked that may not go along a line in the trace
+        test for such reasons.
         """
         s, m = self.system, self.system.m
         sought = {p.component for own in self.places for p in own if p.array == "couplings"}
         given = self.columns[~np.isnan(self.asked[self.rows]).any(axis=0)]
         asked = self.columns[~np.isnan(self.asked).all(axis=0)]
-        told, bound = list[str](), list[int]()
+        told, endless, bound = list[str](), list[str](), list[int]()
         for k, pair in enumerate(m.pairs):
             columns = s.first_column[k] + np.flatnonzero([any(f.per_pitch) for f in pair.type.freedoms])
             told += [f"pair {pair.name}"] if not np.isin(columns, given).all() else []
@@ -445,14 +446,16 @@ class RowProblem:
         for c, own in zip(m.couplings, coupling_places(m), strict=True):
             columns = s.columns_of(c.freedoms)
             known, length = np.isin(columns, given), s.is_length[columns]
-            ratio = bool(sought & set(range(own.start, own.stop))) or bool((length & ~known).any())
-            told += [f"coupling {c.name}"] if ratio and (~length & ~known).any() else []
+            unknown, angle = bool(sought & set(range(own.start, own.stop))), bool((~length & ~known).any())
+            ratio = unknown or bool((length & ~known).any())
+            told += [f"coupling {c.name}"] if unknown and angle else []
+            endless += [f"coupling {c.name}"] if ratio and angle and not unknown else []
             # an angle that is asked at one row says what a constant is
             known = np.isin(columns, asked)
             open_ = bool((~length & ~known).any())
             if open_ or ratio or own.stop in sought:
                 bound += columns[known & (length if open_ else ~length)].tolist()
-        return told, np.array(bound, dtype=np.intp)
+        return told, endless, np.array(bound, dtype=np.intp)
 
     @cached_property
     def loop_signs(self) -> Array:
