@@ -876,7 +876,8 @@ def _wrenches(s: Solution, link: str, guide: str) -> list[tuple[Array, Array, Ar
         if link in (pair.a, pair.b) and pair.name != guide:
             # totals act on link b, forces of gears on the second one
             total = s[pair.name].total if link == pair.b else -s[pair.name].total
-            p = s.contact(pair.name).center if pair.type.touching else s.link(pair.b).point(pair.markers[1].point)[0]
+            own = s._values.pair_point(m.pair_index[pair.name])
+            p = s.contact(pair.name).center if pair.type.touching else own
             found.append((total[..., 3:], total[..., :3] - np.cross(p, total[..., 3:]), p))
     for coupling in m.couplings:
         if coupling.steps and link in (gears := coupling.gears(m)):
