@@ -322,12 +322,6 @@ class Trajectory:
         found = self._evaluated(lambda block: block.here.frames[number][k][:, 3, i])
         return self._out(par.L * found + par.origin.reshape(3, 1))
 
-    def pair_point(self, pair: int) -> Array:
-        """Origin of the marker of a pair on link b, of every variant its own, global, ``(..., 3)``."""
-        par = self._system.par
-        found = self._evaluated(lambda block: block.here.pair_points[:, pair])
-        return self._out(par.L * found + par.origin.reshape(3, 1))
-
     def screws(self, pair: int) -> Array:
         """Twists of the freedoms of a pair at unit rates about the global origin, ``(..., 6, f)``."""
         columns = self._columns(pair)
