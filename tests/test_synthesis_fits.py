@@ -130,6 +130,21 @@ def test_fits_begin_with_exact_solutions_of_parts_of_the_task() -> None:
     assert any("do a part of the positions exactly" in text for text in s.evidence)
 
 
+def test_a_fit_under_a_bound_of_transmission_comes_to_the_bound() -> None:
+    angles = np.linspace(0.0, 1.2, 7)
+    other = replaced(four_bar(), C=(2.8, 2.2))
+    task = mg.function("A", "D", np.column_stack([angles, mg.kinematics(other, {"A": angles})["D"].position[:, 0]]))
+
+    def least(m: mg.Mechanism) -> float:
+        return float(mg.transmission(mg.kinematics(m, {"A": angles}), "D").transmission_angle.min())
+
+    bound = least(other) + 0.02
+    conditions = {"transmission D": (bound, None)}
+    s = mg.synthesize(four_bar(), task, ["C.point"], fit="least_squares", conditions=conditions, starts=1)
+    assert least(s[0]) == pytest.approx(bound, abs=1e-5)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("over", [None, {"A": np.linspace(0.0, 2 * np.pi, 36)}], ids=["at the points", "over a turn"])
 def test_a_fit_keeps_conditions_and_is_best_among_all_near_by_that_do(over: dict[str, np.ndarray] | None) -> None:
     """Without conditions links of a path along an ellipse grow without end; with them the bound of size is reached."""

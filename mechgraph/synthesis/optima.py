@@ -340,7 +340,8 @@ def constrained(
     came = True
     if limits and (way == "least_squares" or not all(limit.kept(begin) for limit in limits)):
         begin, came = within(fit, begin, low, high, limits, 60)
-    if way == "least_squares":
+    # no error is less than none
+    if way == "least_squares" or (way is not None and np.abs(fit.residual(begin)).max(initial=0.0) < 1e-9):
         return (begin if all(limit.kept(begin) for limit in limits) else None), came
     course = _RowCourse(fit, begin, way, goal)
     constraints = [{"type": "ineq", "fun": f, "jac": df} for f, df in course.ends(low, high)]
@@ -354,7 +355,7 @@ def constrained(
     constraints += [course.limit(limit, *end) for limit in limits for end in limit.ends]
     aim, slope = course.aim
     found: Any = scipy.optimize.minimize(  # type: ignore[call-overload]  # the stubs know no constraints as tables
-        aim, course.begin, jac=slope, constraints=constraints, method="SLSQP", options={"maxiter": 100, "ftol": 1e-12}
+        aim, course.begin, jac=slope, constraints=constraints, method="SLSQP", options={"maxiter": 60, "ftol": 1e-9}
     )
     here = course.point(found.x)
     if way is None:  # met to rounding, where the optimizer leaves off before
