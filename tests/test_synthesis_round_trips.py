@@ -285,17 +285,18 @@ def test_a_gauge_has_the_two_constants_of_both_ways_in_which_the_slider_closes()
 
 
 def test_lengths_of_a_chain_are_those_of_freudensteins_equation() -> None:
-    """``|a1 + a2 e^(i q2) + ...|``: with angles of first and last pair given, squares of lengths are linear in three numbers."""
+    """``|e^(i A) + a_3 e^(-i D) + a_4| = a_2``: over ``2 a_3 a_4`` linear in three numbers, of which lengths follow but for signs."""
     own, A = bars(1.0, 3.0, 2.5, 3.2), np.array([0.8, 1.0, 1.25])
     D = mg.kinematics(own, {"O1": A})["O4"].position[:, 0]
     rows = [{"O1": a, "O4": d} for a, d in zip(A, D, strict=True)]
     s = mg.synthesize(bars(1.0, 3.1, 2.6, 3.3), mg.positions(rows), ["length[1]", "length[2]", "length[3]"])
-    # ends of the middle bar are r e^(i a) and that of the last one, seen from the frame: c^2 = |d + b e^(-i d) + e^(i a)|^2
-    assert np.abs(s.values - [3.0, 2.5, 3.2]).max(axis=1).min() < 1e-9
-    for one, values in zip(s, s.values, strict=True):
+    K, over_a4, over_a3 = np.linalg.solve(np.column_stack([np.ones(3), np.cos(A + D), np.cos(A)]), -np.cos(D))
+    a3, a4 = 1.0 / over_a3, 1.0 / over_a4
+    wanted = np.abs([np.sqrt(1.0 + a3**2 + a4**2 - 2.0 * a3 * a4 * K), a3, a4])
+    assert wanted == pytest.approx([3.0, 2.5, 3.2], abs=1e-9)
+    assert np.abs(s.values) == pytest.approx(np.tile(wanted, (len(s), 1)), abs=1e-9)
+    for one in s:
         assert np.abs(mg.kinematics(one, {"O1": A})["O4"].position[:, 0] - D).max() < 1e-10
-        # lengths of both signs do the same
-        assert np.abs(np.abs(s.values) - np.abs(values)).max(axis=1).min() == 0
 
 
 def screwed() -> tuple[mg.Mechanism, mg.Mechanism, object, dict[str, float]]:
