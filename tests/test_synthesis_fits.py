@@ -199,7 +199,7 @@ def formula(z: np.ndarray, targets: np.ndarray) -> float:
 @pytest.mark.slow
 def test_a_path_of_sixty_points_is_met_no_worse_than_by_ten_thousand_evaluations_of_differential_evolution() -> None:
     points = ellipse(60)
-    s = mg.synthesize(four_bar(), mg.path("coupler.tip", points), EVERYTHING, fit="least_squares", starts=4)
+    s = mg.synthesize(four_bar(), mg.path("coupler.tip", points), EVERYTHING, fit="least_squares", starts=8)
     other = scipy.optimize.differential_evolution(
         formula, [(-4, 4)] * 10, args=(points,), maxiter=66, popsize=15, polish=False, rng=1, tol=0
     )
