@@ -1,6 +1,7 @@
-/* Tracks of synthesis (synthesis/legs.py), one after the other, in complex numbers: the closure at all rows of a task with unknown dimensions,
- * eliminated row by row. A row is a state of the mechanism; its equations are those of loops and couplings and, behind them, of rods
- * (d^2 - l^2) / 2 (synthesis/rods.py). The state of a track: unknowns, norms of directions where any are unknown, then all rows. Part of derivative.c.
+/* Tracks of synthesis (synthesis/legs.py) and of assemblies (modes/homotopy.py), one after the other, in complex numbers: the closure at all
+ * rows of a task with unknown dimensions, eliminated row by row; of assemblies there is one row and no unknown. A row is a state of the
+ * mechanism; its equations are those of loops and couplings and, behind them, of rods (d^2 - l^2) / 2 (synthesis/rods.py). The state of a
+ * track: unknowns, norms of directions where any are unknown, then all rows. Part of derivative.c.
  *
  * A   rows, unknowns, head, states of a row, pairs with those of rods, rods, moved, asked, then one after the other:
  *       side[links]                             the pose among identity, markers A and markers B in which a link stands
@@ -471,8 +472,8 @@ static void made_normal(const Track *t, number *x) {
   }
 }
 
-/* Tracks at states x[state] on their ways `which`, at `at` of these: the step of Newton's method step[head + rows columns] and, unless NULL,
- * the rates; x then has what is asked and the norms of its directions. Where `rate` is not NULL x is a prediction: it is corrected by two
+/* Tracks at states x[state] on their ways `which`, at `at` of these: the step of Newton's method step[head + rows columns] and the
+ * rates; x then has what is asked and the norms of its directions. Where `rate` is not NULL x is a prediction: it is corrected by two
  * steps, the sizes of which are size[0..1], and rates are those of the states, times `rate`. size[2]: the largest number in a pose. */
 void mgk_tracks(const int *I, const double *P, int numbers, const int *A, const number *mixing, const number *const *leg, int ways, int tracks,
                 const int *which, const number *at, const number *rate, number *x, number *step, number *rates, double *size, number *memory) {
@@ -489,15 +490,14 @@ void mgk_tracks(const int *I, const double *P, int numbers, const int *A, const 
       advance_track(&t, t.x, t.step);
       size[k] = size_of_step(&t, t.x, t.step);
     }
-    size[2 * T + k] = linearized(&t, t.x, mixing, rates ? 2 : 1);
+    size[2 * T + k] = linearized(&t, t.x, mixing, 2);
     if (rate) {
       size[T + k] = size_of_step(&t, t.x, t.step);
       state_rates(&t, t.x, t.step + length, t.moved);
       FOR(j, t.size) rates[j * T + k] = rate[k] * t.moved[j];
       advance_track(&t, t.x, t.step);
     } else {
-      FOR(j, length) step[j * T + k] = t.step[j];
-      FOR(j, rates ? length : 0) rates[j * T + k] = t.step[length + j];
+      FOR(j, length) step[j * T + k] = t.step[j], rates[j * T + k] = t.step[length + j];
     }
     FOR(j, t.size) x[j * T + k] = t.x[j];
   }

@@ -19,7 +19,7 @@ import numpy as np
 
 from mechgraph.errors import DeclarationError
 from mechgraph.kinematics.state import Configuration
-from mechgraph.maths.se3 import Array, homogeneous, rotation_log
+from mechgraph.maths.se3 import Array, Mask, homogeneous, rotation_log
 from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.motion import Drive, Motion
@@ -315,10 +315,8 @@ class Prescription:
         """Motions of a link's coordinates for its poses, its twist about the global origin and that one's rate."""
         R = poses[..., :3, :3]
         first: Array | None = None
-        gap = np.abs(R @ np.swapaxes(R, -1, -2) - np.eye(3)).max(initial=0.0)
         chart: Array | None = None
-        # largest entry of ``R R^T - 1`` of a pose
-        if gap > 1e-6 or (np.linalg.det(R) < 0).any() or (poses[..., 3, :] != (0, 0, 0, 1)).any():
+        if not is_pose(poses).all():
             fault = "expected poses with a proper rotation and the last row 0 0 0 1"
         elif change is not None and twist is None:
             fault = "has an acceleration and no velocity; give both"
@@ -510,6 +508,14 @@ def actuators(m: Mechanism, actuate: Actuators) -> tuple[str, ...]:
     if faults:
         raise DeclarationError(f"solve {m.name!r}", faults)
     return names
+
+
+def is_pose(X: Array) -> Mask:
+    """Whether matrices ``(..., 4, 4)`` are poses: a proper rotation, and the last row 0 0 0 1."""
+    R = X[..., :3, :3]
+    # largest entry of ``R R^T - 1`` of a pose
+    turns = ~(np.abs(R @ np.swapaxes(R, -1, -2) - np.eye(3)).max(axis=(-2, -1)) > 1e-6) & ~(np.linalg.det(R) < 0)
+    return np.asarray(turns & (X[..., 3, :] == (0, 0, 0, 1)).all(axis=-1))
 
 
 class DriverMotion:

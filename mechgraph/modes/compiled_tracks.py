@@ -106,9 +106,9 @@ class CompiledTracks:
         return int(_library().mgk_tracks_size(self.I.ctypes.data, self.A.ctypes.data, len(self.P)))
 
     def tracked(
-        self, ways: LegNumbers, which: Index, t: Array, x: Array, rates: bool = True, rate: Array | None = None
+        self, ways: LegNumbers, which: Index, t: Array, x: Array, rate: Array | None = None
     ) -> tuple[Array, Array, Array, Array]:
-        """States ``x (nx, T)`` with what is asked of them, steps of Newton's method, rates where asked for, and sizes ``(3, T)``.
+        """States ``x (nx, T)`` with what is asked of them, steps of Newton's method, rates, and sizes ``(3, T)``.
 
         ``rate (T,)``: ``x`` are predictions to be corrected by two steps, and rates are those of states, times it; see ``kernel/tracks.c``.
         """
@@ -124,7 +124,7 @@ class CompiledTracks:
         _library().mgk_tracks(
             self.I.ctypes.data, self.P.ctypes.data, len(self.P), self.A.ctypes.data, self.mixing.ctypes.data, legs.ctypes.data,
             ways.begin.shape[-1], T, which.ctypes.data, t.ctypes.data, None if dt is None else dt.ctypes.data, x.ctypes.data,
-            step.ctypes.data, grown.ctypes.data if rates else None, sizes.ctypes.data, memory.ctypes.data,
+            step.ctypes.data, grown.ctypes.data, sizes.ctypes.data, memory.ctypes.data,
         )  # fmt: skip
         return x, step, grown, sizes
 

@@ -312,10 +312,10 @@ class Syntheses(Shown, Sequence[Mechanism]):
         keep, out = [], list(self.rejected)
         for i, m in enumerate(self):
             lacks = self.fitness[i].lacks(require) if require else ()
-            why = [f"no {name}" if name == "full_turn" else f"{name} defect" for name in lacks]
+            why = [_lack(name, getattr(self.fitness[i], name)) for name in lacks]
             for name, (least, most) in bounds.items():
                 value = self.field(name)[i]
-                why += [] if keeps(value, least, most) else [f"{name} = {value:.6g}"]
+                why += [] if keeps(value, least, most) else [f"{name} = {value:.6g} is out of its bounds"]
             for name, measure, least, most in limits:
                 values = measure(m, self.coordinates[i], driver)
                 if not keeps(values, least, most):
@@ -447,7 +447,7 @@ class SynthesesOver(Shown, Sequence[Syntheses]):
         return len(self.positions)
 
     def __getitem__(self, k: int | slice) -> Any:
-        return self.positions[k]
+        return _one_of(self.positions, k, "value")
 
     @property
     def completeness(self) -> str:
@@ -530,11 +530,18 @@ def joined_answers(found: Sequence[Syntheses], told: Sequence[str]) -> Syntheses
     return out._sorted
 
 
-def _one_of(items: Sequence[Any], i: int | slice) -> Any:
+def _one_of(items: Sequence[Any], i: int | slice, what: str = "mechanism") -> Any:
     try:
         return items[i]
     except IndexError:
-        raise IndexError(f"{i}: there are {counted(len(items), 'mechanism')}, counted from 0") from None
+        raise IndexError(f"{i}: there are {counted(len(items), what)}, counted from 0") from None
+
+
+def _lack(name: str, known: bool | None) -> str:
+    """Why a mechanism is left out that lacks what is required; where it is not ``known`` that is said."""
+    if known is None:
+        return f"{name.replace('_', ' ')} not determined"
+    return "no full turn" if name == "full_turn" else f"{name} defect"
 
 
 def _cell(value: Any, turns: bool = False) -> str:

@@ -306,7 +306,14 @@ def limits_of(
         try:
             out.append((getattr(what, "__name__", str(what)), Measure(m, what, over), least, most))
         except DeclarationError as error:
-            faults += error.faults
+            faults += [f"conditions: {fault}" for fault in error.faults]
+        else:
+            if out[-1][1].output is not None and (least or 0.0) > np.pi / 2:
+                faults.append(
+                    wrong(
+                        ends, f"conditions[{what!r}]", "transmission angles in radians, 1.5708 (a right angle) at most"
+                    )
+                )
     return out
 
 

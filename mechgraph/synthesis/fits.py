@@ -426,6 +426,11 @@ class Fit:
             by_z[:, :, k, column] -= np.nan_to_num(self.wanted[:, k, None])
         return by_z, np.where(self.open[:, None, None], by_theta, 0.0)
 
+    @property
+    def spare(self) -> int:
+        """How many unknowns and open drivers there are more than numbers asked; what is asked of a row closed by itself counts for none."""
+        return len(self.z0) + int(self.open.sum()) - int(np.isin(self.asked[0], self.p.rows).sum())
+
     def residual(self, here: FitPoint) -> Array:
         """By how much each is missed by one mechanism ``(a,)``."""
         return self.missed(here)[:, 0][self.asked]

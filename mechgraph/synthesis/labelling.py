@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Hashable, Iterator
+from collections.abc import Hashable, Iterator, Sequence
 from copy import copy
 from functools import cached_property, partial
 from itertools import permutations
@@ -299,18 +299,26 @@ def same_motions(motions: Array, i: int) -> Mask:
     return np.abs(motions - motions[:, [i]]).max(axis=0) < MODES.most_noise if len(motions) else np.arange(n) == i
 
 
-def placed(of: TaskClass, member: ClassMember, z: Array, rng: np.random.Generator, near: Array) -> tuple[Array, Mask]:
-    """States ``(nx, n)`` of unknowns ``z (u, n)``, which may be rounded, at a task that they do, from the positions ``near (nx, n)`` and
-    then from random ones; which close.
+def placed(
+    of: TaskClass,
+    member: ClassMember,
+    z: Array,
+    rng: np.random.Generator,
+    near: Sequence[Array],
+    imaginary: float = 0.5,
+) -> tuple[Array, Mask]:
+    """States ``(nx, n)`` of unknowns ``z (u, n)``, which may be rounded, at a task that they do, from positions ``near (R, nx, n)``, then
+    from random ones with such an ``imaginary`` part; which close.
     """
     p, s, n = of.problem, of.problem.system, z.shape[1]
     numbers = p.numbers.with_values(p.places, z)
     X, open_ = np.zeros((of.R, of.nx, n), dtype=complex), np.ones((of.R, n), dtype=bool)
     # positions, and Gauss-Newton steps from them
     for attempt in range(16):
-        trial = near[of.head :].reshape(X.shape)
-        if attempt:
-            some = rng.normal(size=(s.n_freedoms, of.R * n, 2)) @ [1.0, 0.5j]
+        if attempt < len(near):
+            trial = near[attempt]
+        else:
+            some = rng.normal(size=(s.n_freedoms, of.R * n, 2)) @ [1.0, imaginary * 1j]
             states = s.advance(np.repeat(p.at_rest[:, None].astype(complex), of.R * n, axis=1), some)
             trial = np.zeros_like(X)
             trial[:, : of.states] = np.moveaxis(states.reshape(of.states, of.R, n), 0, 1)

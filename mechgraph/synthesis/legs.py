@@ -85,14 +85,12 @@ class TaskLeg(Ways):
             for i, change in enumerate(changes)
             if change.any() and (name, i) not in sought
         }
-        self._moves = (self._eta != 0).any(axis=(0, 3)) | np.any(
-            [(c != 0).any(axis=(1, 3)) for c in self._change], axis=0
-        )
 
     @cached_property
     def moving(self) -> tuple[Index, Index]:
         """Sides and pairs of the markers that move."""
-        side, pair = np.nonzero(self._moves)
+        changes = np.any([(c != 0).any(axis=(1, 3)) for c in self._change], axis=0)
+        side, pair = np.nonzero((self._eta != 0).any(axis=(0, 3)) | changes)
         return side, pair
 
     def prints(self, x: Array, t: Array, tracks: Index) -> Array:

@@ -215,7 +215,7 @@ def fitted(
         if narrow or way != "least_squares" or limits:
             end, came = constrained(fit, begin, low, high, way, goal, [*limits, wide] if narrow else limits)
             early += end is not None and not came
-        if end is None:
+        if end is None or (goal is not None and not np.isfinite(goal.of(end)).all()):
             lost += 1
         elif not fit.safe(end):
             unsafe += 1

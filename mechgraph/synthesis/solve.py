@@ -596,7 +596,8 @@ def unfolded(
     x, exchanges = alike_at(of, start, goal, found.x[:, real], progress), symmetries(of.whole)
     swapped = [x[: of.u][np.argsort(one.places)] for one in exchanges]
     if swapped and x.size:
-        turned, closed = placed(of, goal, np.concatenate(swapped, axis=1), rng, np.tile(x, len(swapped)))
+        begin = np.tile(x[of.head :].reshape(of.R, of.nx, -1), len(swapped))
+        turned, closed = placed(of, goal, np.concatenate(swapped, axis=1), rng, [begin])
         x = np.concatenate([x, turned[:, closed]], axis=1)
     return np.concatenate([found.x[:, ~real], x], axis=1), int(real.sum()) * start.each - x.shape[1]
 
@@ -647,20 +648,40 @@ def doing_all(of: TaskClass, member: ClassMember, x: Array) -> Mask:
 
 
 def real_states(of: TaskClass, goal: ClassMember, x: Array) -> tuple[Array, Array, Array]:
-    """Real ones of solutions ``x (nx, n)`` of a task, closed to rounding, their errors in all rows, and which these are ``(n,)``."""
-    size = np.maximum(1.0, np.abs(x[: of.u]).max(axis=0, initial=0.0))
-    near = np.flatnonzero(_imaginary(x[: of.u]) < MODES.real_singular)
-    if not near.size:
-        return x[:, near].real, np.zeros(0), near
-    leg, t, tracks = of.leg(goal, goal), np.ones(len(near)), np.arange(len(near))
+    """Real ones of solutions ``x (nx, n)`` of a task, closed to rounding, their errors in all rows, and which these are ``(n,)``.
+
+    Of a row that leaves the mechanism a choice, of a motion or of assemblies, a track may end at a complex position where there are real
+    ones: these are looked for from where other rows stand, and then at random.
+    """
+    which = np.flatnonzero(_imaginary(x[: of.u]) < MODES.real_singular)
+    states, error, good = _closed_real(of, goal, x[:, which])
+    if left := int((~good).sum()):
+        rows = states[of.head :, ~good].reshape(of.R, of.nx, left)
+        rest = np.concatenate([of.problem.at_rest, np.zeros(of.nx - of.states)])
+        near = [np.broadcast_to(rest[:, None], rows.shape), *(np.roll(rows, k, axis=0) for k in range(1, of.R))]
+        z = x[: of.u, which[~good]].real.astype(complex)
+        again, came = placed(of, goal, z, np.random.default_rng(0), np.nan_to_num(near), 0.0)
+        at = np.flatnonzero(~good)[came]
+        states[:, at], error[at], good[at] = _closed_real(of, goal, again[:, came])
+        # another mechanism, to which unknowns were led from there, is none of these
+        size = np.maximum(1.0, np.abs(x[: of.u, which]).max(axis=0, initial=0.0))
+        good &= np.abs(states[: of.u] - x[: of.u, which]).max(axis=0, initial=0.0) < MODES.real_singular * size
+    return states[:, good], error[good], which[good]
+
+
+def _closed_real(of: TaskClass, goal: ClassMember, x: Array) -> tuple[Array, Array, Mask]:
+    """Real states near others ``(nx, n)`` by Newton's method, their errors in all rows, and which of them are solutions near by."""
+    if not x.shape[1]:
+        return x.real, np.zeros(0), np.zeros(0, dtype=bool)
+    leg, t, tracks = of.leg(goal, goal), np.ones(x.shape[1]), np.arange(x.shape[1])
     with np.errstate(all="ignore"):
-        here = leg.at(x[:, near].real.astype(complex), t, tracks)
+        here = leg.at(x.real.astype(complex), t, tracks)
         # Newton steps to rounding, in real numbers: there one that has no real solution near by does not come to rest
         for _ in range(8):
             step = here.newton(here.idle()).real
             here = here.again(of.advance(here.x, step).real.astype(complex))
-    error = of.error(here.rows)
-    moved = np.abs(here.x[: of.u] - x[: of.u, near]).max(axis=0, initial=0.0)
-    good = (moved < MODES.real_singular * size[near]) & (of.size(here.x, step) < np.sqrt(MODES.real_closed))
+    error, size = of.error(here.rows), np.maximum(1.0, np.abs(x[: of.u]).max(axis=0, initial=0.0))
+    moved = np.abs(here.x[: of.u] - x[: of.u]).max(axis=0, initial=0.0)
+    good = (moved < MODES.real_singular * size) & (of.size(here.x, step) < np.sqrt(MODES.real_closed))
     good &= np.isfinite(here.x).all(axis=0)
-    return here.x[:, good].real, error[good], near[good]
+    return here.x.real, error, good

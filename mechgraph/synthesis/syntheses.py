@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextvars import copy_context
 from dataclasses import fields, replace
@@ -103,7 +103,7 @@ class Synthesis:
         ]
         faults += [f"sweep {name!r}: {NO_ARRAY}" for name in self.sweep.others]
         read = [real_array(v) for v in sweep.values()]
-        columns = [np.atleast_1d(v) for v in read if v is not None and v.ndim < 2 and np.isfinite(v).all()]
+        columns = [np.atleast_1d(v) for v in read if v is not None and v.ndim < 2 and v.size and np.isfinite(v).all()]
         if len({len(c) for c in columns}) > 1 or len(columns) != len(self.sweep.names):
             faults.append(
                 "sweep: expected single numbers by name, with one list of finite values each, all of the same length"
@@ -541,41 +541,27 @@ def synthesize(
             goals += [] if what is None else [(Measure(m, what, over), sign)]
         except DeclarationError as error:
             faults += [f"{name}: {fault}" for fault in error.faults]
-    faults += [
-        wrong(name, "require", ", ".join(map(repr, get_args(DefectName))))
-        for name in require
-        if name not in get_args(DefectName)
-    ]
-    if sum(one is not None for one in (fit, minimize, maximize)) > 1:
-        faults.append("fit, minimize, maximize: expected one of them")
-    if fit is not None and fit not in get_args(FitName):
-        faults.append(wrong(fit, "fit", " or ".join(map(repr, get_args(FitName)))))
-    faults += [f"over: {fault}" for name in over or () if (fault := m.freedom_fault(name, single=True))]
+    faults += _faults_of_options(m, fit, len(goals), require, over)
     if fitting and sweep:
         faults.append("sweep: expected for exact syntheses alone; give the numbers values in the mechanism")
     faults += _faults_of_bounds(within, fitting)
     problem = RowProblem(m, tasks, unknown, faults)
     faults += _other_names(problem, within)
-    moved = {m.pairs[q.pair].name for own in problem.unknowns.places for q in own if 0 <= q.pair < len(m.pairs)}
-    moved |= {name.split(".")[0] for name in unknown}
-    changed = {end for p in m.pairs if p.name in moved for end in (p.a, p.b)}
-    heavy = [link.name for link in m.links if link.name in changed and link.mass]
-    if heavy or m.loads:
-        of = " and ".join([f"masses and mass centers of {', '.join(heavy)}"] * bool(heavy) + ["loads"] * bool(m.loads))
-        warnings.warn(f"{where}: {of} stay as declared, whatever the dimensions", MechgraphWarning, stacklevel=3)
-    # a whole turn more or less changes nothing, and many take long to follow
-    most = np.nan_to_num(np.abs(problem.asked[:, ~problem.system.is_length[problem.columns]])).max(initial=0.0)
-    if not fitting and most > 4 * np.pi:
-        told = f"{where}: an angle of {most:.4g} rad is asked, {most / (2 * np.pi):.3g} turns; angles are in radians, not degrees"
-        warnings.warn(told, MechgraphWarning, stacklevel=3)
+    for text in _foretold(problem, unknown):
+        warnings.warn(f"{where}: {text}", MechgraphWarning, stacklevel=3)
     if fitting:
         # sizes are the same everywhere
         moving = not all(
             measure.of_dimensions for measure in (*(limit[1] for limit in limits), *(goal[0] for goal in goals))
         )
         ends_of = (None, None) if faults else driver_of(m, tasks)
-        fits = FittedSynthesis(problem, tasks, over if moving else None, *ends_of, faults)
-        numbers = int(starts), int(seed)
+        fits, numbers = (
+            FittedSynthesis(problem, tasks, over if moving else None, *ends_of, faults),
+            (int(starts), int(seed)),
+        )
+        if fit is not None and (spare := fits.fit.spare) > 0:
+            told = f"fit: {counted(spare, 'number')} of {', '.join(problem.unknowns.names)} would stay open: leave as many out of unknown"
+            raise DeclarationError(where, [f"{told}, ask for more, or spend the freedom by minimize= or maximize="])
         exact = subset_values(RowProblem(m, tasks, unknown), tasks, *numbers, cache, progress) if fit else ()
         answer = fits.answered(fit, within, limits, goals, *numbers, progress, exact)
         return answer._kept(require, within, limits, fits.driver)
@@ -587,6 +573,39 @@ def synthesize(
     if sweep:
         return SynthesesOver(dict(zip(found.sweep.names, found.swept, strict=True)), tuple(answers))
     return answers[0]
+
+
+def _faults_of_options(m: Mechanism, fit: Any, goals: int, require: Sequence[Any], over: Any) -> list[str]:
+    """What is wrong with names of defects and kinds of fits, and with values of drivers."""
+    known = ", ".join(map(repr, get_args(DefectName)))
+    out = [wrong(name, "require", known) for name in require if name not in get_args(DefectName)]
+    if goals + (fit is not None) > 1:
+        out.append("fit, minimize, maximize: expected one of them")
+    if fit is not None and fit not in get_args(FitName):
+        out.append(wrong(fit, "fit", " or ".join(map(repr, get_args(FitName)))))
+    for name, values in (over or {}).items():
+        given = real_array(values)
+        if fault := m.freedom_fault(name, single=True):
+            out.append(f"over: {fault}")
+        elif given is None or not given.size or not np.isfinite(given).all():
+            out.append(wrong(values, f"over[{name!r}]", "finite values, one at least"))
+    return out
+
+
+def _foretold(p: RowProblem, unknown: Sequence[str]) -> Iterator[str]:
+    """What users should know of a task before it is solved."""
+    m = p.m
+    moved = {m.pairs[q.pair].name for own in p.unknowns.places for q in own if 0 <= q.pair < len(m.pairs)}
+    moved |= {name.split(".")[0] for name in unknown}
+    changed = {end for pair in m.pairs if pair.name in moved for end in (pair.a, pair.b)}
+    heavy = [link.name for link in m.links if link.name in changed and link.mass]
+    if heavy or m.loads:
+        of = " and ".join([f"masses and mass centers of {', '.join(heavy)}"] * bool(heavy) + ["loads"] * bool(m.loads))
+        yield f"{of} stay as declared, whatever the dimensions"
+    # a whole turn more or less changes nothing, and many take long to follow
+    most = np.nan_to_num(np.abs(p.asked[:, ~p.system.is_length[p.columns]])).max(initial=0.0)
+    if most > 4 * np.pi:
+        yield f"an angle of {most:.4g} rad is asked, {most / (2 * np.pi):.3g} turns; angles are in radians, not degrees"
 
 
 def _faults_of_bounds(bounds: Mapping[str, Any], fitting: bool) -> list[str]:

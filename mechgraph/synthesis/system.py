@@ -195,22 +195,37 @@ class RowProblem:
         self.unknowns = Unknowns(m, self.whole, unknown, faults, self.tasks.scaled)
         if len(faults) > before:
             raise DeclarationError(self.name, faults)
+        self._lay_out(given.names)
+        self.order: Index = np.arange(len(self.whole.pairs))
+        self._built: dict[bytes, System | None] = {}
+        self.closed_at_start = self._closed_at_start()
+        self.rows: Index = np.arange(self.tasks.rows)[self._row_counts :]
+        faults += self._read_declared_row()
+        if faults and told is None:
+            raise DeclarationError(self.name, faults)
+
+    def _lay_out(self, names: tuple[str, ...]) -> None:
+        """Places and internal values of what is asked of freedoms, and of all numbers."""
+        assert self.tasks is not None
+        values = self.tasks.values
         # of every column that is asked, and of its rates, the number of its factor, -1 where it has none
-        factor_of = [self.tasks.scaled.index(name) if name in self.tasks.scaled else -1 for name in given.names]
+        factor_of = [self.tasks.scaled.index(name) if name in self.tasks.scaled else -1 for name in names]
         self.factor_of = np.tile(factor_of, 1 + len(self.tasks.rates))
-        user = np.array([values.get(name, values.get(self._user_name(name))) for name in given.names]).T
+        user = np.array([values.get(name, values.get(self._user_name(name))) for name in names]).T
         numbers = declared(self.whole)
         self.origin, self.L = self._unit(numbers)
-        par = numbers.parameters(self.whole, np.repeat(self.origin[:, None], len(m.links), axis=1), self.origin, self.L)
+        par = numbers.parameters(
+            self.whole, np.repeat(self.origin[:, None], len(self.m.links), axis=1), self.origin, self.L
+        )
         self.system = System(self.whole, None, par)
         s = self.system
-        self.columns: Index = s.columns_of(given.names)
+        self.columns: Index = s.columns_of(names)
         unit = np.where(s.is_length[self.columns], self.L, 1.0)
         self.asked = user / unit
         none, factor = np.full(self.tasks.rows, np.nan), (1.0, 2.0)
         # Taylor coefficients ``(rows, d)``, one array for each order of rates that are asked
         self.rates = [
-            np.array([rates.get(name, rates.get(self._user_name(name), none)) for name in given.names]).T / unit / k
+            np.array([rates.get(name, rates.get(self._user_name(name), none)) for name in names]).T / unit / k
             for k, rates in zip(factor, self.tasks.rates, strict=False)
         ]
         self.coupling_units = self._coupling_units()
@@ -229,13 +244,6 @@ class RowProblem:
             np.ones((len(self.tasks.scaled), 1)),
             np.array(others).reshape(-1, 1),
         )
-        self.order: Index = np.arange(len(self.whole.pairs))
-        self._built: dict[bytes, System | None] = {}
-        self.closed_at_start = self._closed_at_start()
-        self.rows: Index = np.arange(self.tasks.rows)[self._row_counts :]
-        faults += self._read_declared_row()
-        if faults and told is None:
-            raise DeclarationError(self.name, faults)
 
     def _closed_at_start(self) -> bool:
         """Whether the declared configuration is closed whatever the dimensions: pairs stand by point and axis and begin at zero, no

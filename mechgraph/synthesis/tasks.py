@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from mechgraph.kinematics.prescribed import Target, coordinate, parts_of, target_of
+from mechgraph.kinematics.prescribed import Target, coordinate, is_pose, parts_of, target_of
 from mechgraph.kinematics.state import Configuration, user_poses
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import MODES
@@ -150,7 +150,9 @@ class PoseTask(RatedTask):
     def first(self, m: Mechanism) -> Array | None:
         """The first pose ``(4, 4)``, where it is whole and not the identity."""
         X = self._whole(m)
-        return None if X is None or np.isnan(X[0]).any() or np.allclose(X[0], np.eye(4), atol=1e-9) else X[0]
+        if X is None or np.isnan(X[0]).any() or not is_pose(X[0]) or np.allclose(X[0], np.eye(4), atol=1e-9):
+            return None
+        return np.asarray(X[0])
 
     def after(self, m: Mechanism, X0: Array, faults: list[str]) -> PoseTask:
         """The same asked of the link in another frame, which lies on the global one where the link stands at ``X0``."""
@@ -178,9 +180,11 @@ class PoseTask(RatedTask):
     def _coordinates(self, m: Mechanism, X: Array, faults: list[str]) -> Array:
         R = X[:, :3, :3]
         asked = ~np.isnan(R).any(axis=(1, 2))
-        # largest entry of ``R R^T - 1`` of a pose
-        if np.abs(R[asked] @ R[asked].swapaxes(1, 2) - np.eye(3)).max(initial=0.0) > 1e-6:
-            faults.append(f"poses of {self.link!r}: expected proper rotations")
+        # a place may be asked for without the rest of a matrix
+        wrong_at = np.flatnonzero(asked)[~is_pose(np.where(np.isnan(X), np.eye(4), X)[asked])].tolist()
+        if wrong_at:
+            rows = ", ".join(map(str, wrong_at))
+            faults.append(f"poses of {self.link!r}: row {rows}: expected a proper rotation and the last row 0 0 0 1")
         elif m.planar and np.abs(X[asked, 2] - (0, 0, 1, 0)).max(initial=0.0) > 1e-9 * max(1.0, np.abs(X[asked]).max()):
             faults.append(f"poses of {self.link!r}: leave the x-y plane")
         if m.planar:
