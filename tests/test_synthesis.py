@@ -99,6 +99,8 @@ def test_centre_points_of_four_poses_lie_on_one_cubic() -> None:
     )
     x, y = np.array([v for one in s for v in zip(one.field("A.point.x"), one.field("A.point.y"), strict=True)]).T
     assert {one.total for one in s} == {3}
+    with pytest.raises(IndexError, match="9: there are 6 values"):
+        s[9]
     assert [one.total for one in pickle.loads(pickle.dumps(s))] == [one.total for one in s]
     assert len(x) > 9
     terms = np.array([x**i * y**j for i in range(4) for j in range(4 - i)]).T
@@ -122,6 +124,8 @@ def test_faults_of_tasks_and_unknowns_are_told_together() -> None:
     with pytest.raises(mg.DeclarationError) as caught:
         mg.synthesize(four_bar(), tasks, ["B.point"])
     assert len(caught.value.faults) == 2
+    with pytest.raises(mg.DeclarationError, match="fit: 1 number of B.point.x, B.point.y would stay open"):
+        mg.synthesize(four_bar(), mg.function("A", "D", [[0, 0], [1, 1]]), ["B.point"], fit="least_squares")
     with pytest.raises(mg.DeclarationError, match="is asked, and is"):
         mg.synthesize(four_bar(), mg.path("coupler.tip", [[0, 0], [1, 1]]), ["B.point"])
     everything = {
@@ -131,7 +135,15 @@ def test_faults_of_tasks_and_unknowns_are_told_together() -> None:
     }
     with pytest.raises(mg.DeclarationError) as caught:
         mg.synthesize(four_bar(), mg.path("coupler.tip", [[0, 0], [1, 1]]), ["B.point"], **everything)
-    of = ["'siz'", "bounds['B.point.x']", "row 0", "row 0", "bounds['A.point.x']", "unknown 'C.point.z'", "sweep"]
+    of = [
+        "conditions: 'siz'",
+        "bounds['B.point.x']",
+        "row 0",
+        "row 0",
+        "bounds['A.point.x']",
+        "unknown 'C.point.z'",
+        "sweep",
+    ]
     assert [fault for fault, start in zip(caught.value.faults, of, strict=True) if not fault.startswith(start)] == []
     with pytest.raises(
         mg.DeclarationError, match=r"synthesis of 'four-bar': 1 fault\n  minimize: 'siz': .*did you mean size"
@@ -143,9 +155,10 @@ def test_faults_of_tasks_and_unknowns_are_told_together() -> None:
         mg.synthesize(heavy, mg.function("A", "D", [[0, 0], [1, 1]]), ["coupler.mass"])
 
 
-def test_what_is_not_finite_is_told_with_its_place() -> None:
-    X = turned(3, 1.0)
+def test_numbers_that_are_none_of_their_kind_are_told_with_their_place() -> None:
+    X, mirrored = turned(3, 1.0), turned(3, 1.0)
     X[1, 0, 3] = np.inf
+    mirrored[2, :3, 0] *= -1
     balls = spatial("S-S", ("S", (0, 0, 0), None), ("S", (1, 0.3, 0.1), None))
     rows = [{}, {"coupler": (1, np.inf, 0)}, {"coupler.tip": "no"}, {"A": np.inf}]
     pairs = mg.function("A", "D", [[0, 0], [0.3, 0.2]])
@@ -155,6 +168,12 @@ def test_what_is_not_finite_is_told_with_its_place() -> None:
         (balls, mg.poses("body", X), {}, ["inf at row 1, entry (0, 3)"]),
         (four_bar(), mg.positions(rows), {}, ["row 1: poses of 'coupler': inf at column 1", "got ['no']", "row 3: at['A']: inf;"]),
         (four_bar(), pairs, {"sweep": {"B.point.y": [1, np.nan]}}, ["one list of finite values each"]),
+        (four_bar(), pairs, {"sweep": {"B.point.y": []}}, ["one list of finite values each"]),
+        (four_bar(), pairs, {"over": {"A": [0, np.nan]}}, ["over['A'] = [0, nan]: expected finite values, one at least"]),
+        (four_bar(), pairs, {"over": {"A": []}}, ["over['A'] = []: expected finite values, one at least"]),
+        (four_bar(), pairs, {"conditions": {"transmission D": (40, None)}}, ["transmission angles in radians, 1.5708"]),
+        (balls, mg.poses("body", mirrored), {}, ["row 2: expected a proper rotation"]),
+        (balls, mg.poses("body", np.zeros((3, 4, 4))), {}, ["row 0, 1, 2: expected a proper rotation"]),
         (four_bar(), pairs, {"bounds": {"B.point.x": (2, 1)}}, ["bounds['B.point.x'] = (2, 1): expected (least, greatest)"]),
         (four_bar(), pairs, {"conditions": {"size": (np.nan, 1)}}, ["conditions['size'] = (nan, 1)"]),
     ]  # fmt: skip
@@ -272,6 +291,24 @@ def test_a_geared_five_bar_is_found_again_from_its_path() -> None:
     # two cranks that turn by given angles: each is unique for three places
     assert (s.total, s.completeness) == (1, "tested")
     assert s.values == pytest.approx(np.array([[0.3, 1.0, 2.7, 1.2]]), abs=1e-9)
+
+
+def test_real_mechanisms_are_found_where_a_row_asks_nothing() -> None:
+    """The second row leaves the crank free. In the first one the pin of both rods lies on two circles: twice that turn, less the crank's, is asked."""
+    at = {"A": (-0.039, -0.011), "B": (0.014, 0.898), "C": (1.454, 1.452), "D": (2.843, 1.222), "E": (2.89, -0.063)}
+    ends = {"A": "fa", "B": "ab", "C": "bc", "D": "cd", "E": "fd"}
+    pairs = [mg.Pair(name, "R", *ends[name], point=at[name]) for name in at]
+    gears = mg.Coupling({"A": -1, "E": 2}, name="g", constant=0.2)
+    m = mg.Mechanism("geared", pairs=pairs, drives=["A"], planar=True, frame="f", couplings=[gears])
+    turn, bend = 0.3716, 0.1835
+    # of this seed the track of one of both ends at a complex angle of the free crank
+    s = mg.synthesize(m, mg.positions([{"A": turn, "C": bend}, {}]), ["g.constant"], seed=6, cache=False)
+    a, b, c, d, e = (complex(*at[name]) for name in at)
+    reach, apart = abs(c - b + (d - c) * np.exp(1j * bend)), e - (a + (b - a) * np.exp(1j * turn))
+    along = (reach**2 - abs(d - e) ** 2 + abs(apart) ** 2) / (2 * abs(apart))
+    pins = e - apart + apart / abs(apart) * (along + np.array([1j, -1j]) * np.sqrt(reach**2 - along**2))
+    constants = np.sort((2 * np.angle((pins - e) / (d - e)) - turn) % (4 * np.pi))
+    assert np.sort(s.field("g.constant") % (4 * np.pi)) == pytest.approx(constants, abs=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from ladder import LADDER
 from mechanisms import FourBarFormula
 
 import mechgraph as mg
@@ -172,6 +173,9 @@ def test_without_a_driver_nothing_is_said_of_defects() -> None:
     assert (found.branch, found.circuit, found.order, found.full_turn, found.good) == (None, None, None, None, True)
     assert np.isnan(found.transmission)
     assert found.lacks(["branch", "full_turn"]) == ("branch", "full_turn")
+    m, task, unknown, _ = LADDER["R-R dyad, 5 poses"]()
+    s = mg.synthesize(m, task, unknown, require=["full_turn"])
+    assert {one.reasons for one in s.rejected} == {("full turn not determined",)}
 
 
 def test_from_a_dead_point_a_driver_leads_nowhere_and_two_drivers_leave_defects_unknown() -> None:

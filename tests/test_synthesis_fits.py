@@ -107,16 +107,23 @@ def test_where_no_start_leads_through_all_rows_nothing_is_found_and_that_is_said
     """The shortest of a frame of 3, a crank of 3, a coupler of some 3.1 and a rocker of 2.5 is the rocker: the crank swings (Grashof)."""
     angles = np.linspace(0.0, 2 * np.pi, 9)
     task = mg.function("A", "D", np.column_stack([angles, 0.3 * np.sin(angles)]))
-    s = mg.synthesize(
-        replaced(four_bar(), B=(0, 3)),
-        task,
-        ["C.point.x"],
-        fit="least_squares",
-        starts=2,
-        bounds={"C.point.x": (3, 3.1)},
-    )
+    m, asked = replaced(four_bar(), B=(0, 3)), {"starts": 2, "bounds": {"C.point.x": (3, 3.1)}}
+    s = mg.synthesize(m, task, ["C.point.x"], fit="least_squares", **asked)
     assert len(s) == 0
     assert s.evidence[0].startswith("0 starts of 2 led to all rows")
+    with pytest.warns(mg.MechgraphWarning, match="360 rad is asked, 57.3 turns; angles are in radians"):
+        degrees = mg.function("A", "D", np.column_stack([np.rad2deg(angles), 0.3 * np.sin(angles)]))
+        assert len(mg.synthesize(m, degrees, ["C.point.x"], fit="least_squares", **asked)) == 0
+
+
+def test_mechanisms_for_which_a_quantity_is_no_number_are_no_answers() -> None:
+    task = mg.function("A", "D", [[0, 0], [0.3, 0.2]])
+
+    def unknown(s: mg.Solution) -> float:
+        return np.nan
+
+    s = mg.synthesize(four_bar(), task, ["C.point"], minimize=unknown, starts=1)
+    assert len(s) == 0
 
 
 def test_fits_begin_with_exact_solutions_of_parts_of_the_task() -> None:
@@ -146,7 +153,7 @@ def test_a_fit_under_a_bound_of_transmission_comes_to_the_bound() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("over", [None, {"A": np.linspace(0.0, 2 * np.pi, 36)}], ids=["at the points", "over a turn"])
-def test_a_fit_keeps_conditions_and_is_best_among_all_near_by_that_do(over: dict[str, np.ndarray] | None) -> None:
+def test_a_fit_keeps_conditions_and_comes_to_their_bounds(over: dict[str, np.ndarray] | None) -> None:
     """Without conditions links of a path along an ellipse grow without end; with them the bound of size is reached."""
     points = ellipse(10)
     least, most = np.deg2rad(35), 4.0

@@ -26,7 +26,7 @@ def told_first(chains: Any, task: Any) -> list[str]:
         told.append(text)
 
     with pytest.raises(Enough):
-        mg.synthesize(chains, task, fit="least_squares", progress=listen)
+        mg.synthesize(chains, task, minimize="size", progress=listen)
     return told
 
 
