@@ -40,7 +40,11 @@ def near_names(name: str, known: Iterable[str], least: float = 0.5) -> list[str]
     # characters of a wrong name that are compared with known ones
     import difflib
 
-    return difflib.get_close_matches(name[:100], list(known), n=4, cutoff=least)
+    folded: dict[str, list[str]] = {}
+    for one in known:
+        folded.setdefault(one.casefold(), []).append(one)
+    near = difflib.get_close_matches(name[:100].casefold(), folded, n=4, cutoff=least)
+    return [one for key in near for one in folded[key]][:4]
 
 
 def did_you_mean(near: Sequence[str]) -> str:

@@ -60,6 +60,19 @@ def test_a_file_is_read_with_its_degrees_and_keeps_the_schema(tmp_path: Path) ->
     assert np.allclose(task.pairs, np.deg2rad([[0, 0], [20, 31], [45, 52]]), rtol=0, atol=1e-15)
 
 
+def test_faults_of_a_task_in_a_file_stand_alone_with_its_name(tmp_path: Path) -> None:
+    path = tmp_path / "function.toml"
+    for wrong, fault in (
+        (FILE.replace('kind = "function"\n', ""), "synthesis.task 1: field kind missing"),
+        (FILE.replace("[20, 31]", "[20]"), "synthesis.task 1.pairs_deg = [[0, 0], [20], [45, 52]]: expected numbers"),
+        (FILE.replace('output = "D"', 'output = "D"\noutpt = "D"'), "synthesis.task 1: unknown field 'outpt'; did you mean output?"),
+    ):  # fmt: skip
+        path.write_text(wrong, encoding="utf-8")
+        with pytest.raises(mg.DeclarationError) as caught:
+            mg.load(path)
+        assert [told[: len(fault)] for told in caught.value.faults] == [fault]
+
+
 ASKED = {
     "function": mg.SynthesisSetup(mg.function("A", "D", [(0, 0), (0.2, 0.3)]), "B.point.x", fit="minimax", starts=3),
     "path": mg.SynthesisSetup(

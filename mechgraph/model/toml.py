@@ -34,7 +34,7 @@ from mechgraph.maths.se3 import Array
 from mechgraph.model.file_format import DEGREES, KINDS, OF_SCHEMA_2, SCHEMA, TABLES_OF_FILE, USUAL
 from mechgraph.model.mechanism import Mechanism, chain
 from mechgraph.model.motion import Motion
-from mechgraph.model.plane import in_file
+from mechgraph.model.plane import in_file, pair_in_plane
 from mechgraph.pairs.contact_types import travels
 from mechgraph.pairs.curves import Curve
 from mechgraph.pairs.pair_type import TABLE as PAIR_TABLE
@@ -194,7 +194,7 @@ class _Reader:
             elif table.fields[key].kind is BY_FREEDOM:
                 fields[key] = self.by_freedom(value, f"{where}.{key}")
             elif table.fields[key].kind is TABLES and kind in NESTED:
-                fields[key] = self.items(table.fields[key].table, value, f"{where}.")
+                fields[key] = self.items(table.fields[key].table, value, f"{where}.{key}")
         if kind in READ_FIRST and len(self.faults) == before:
             READ_FIRST[kind](self, fields, where)
         if any(key not in fields for key in table.needed) or (len(self.faults) > before and kind in READ_FIRST):
@@ -207,16 +207,17 @@ class _Reader:
             self.faults.append(f"{where}: {error}")
         return None
 
-    def items(self, key: str, raw: Any, of: str = "") -> list[Any]:
-        """The objects of an array of tables (``of`` a table above); those at fault are left out."""
+    def items(self, key: str, raw: Any, named: str = "") -> list[Any]:
+        """The objects of an array of tables, ``named`` otherwise than their kind in a table above; those at fault are left out."""
+        named = named or key
         if not isinstance(raw, list):
-            self.faults.append(wrong(raw, f"[[{of}{key}]]", "an array of tables"))
+            self.faults.append(wrong(raw, f"[[{named}]]", "an array of tables"))
             self.left_out = True
             return []
         out = []
         for i, entry in enumerate(raw):
             name = shown(entry.get("name", i + 1)) if isinstance(entry, Mapping) else i + 1
-            where = f"{of}{key} {name}"
+            where = f"{named} {name}"
             out.append(self.of_kind(key, entry, where) if key in KINDS else self.item(key, entry, where))
         made = [item for item in out if item is not None]
         self.left_out |= len(made) < len(raw)
@@ -334,9 +335,9 @@ def parse(data: Mapping[str, Any], subject: str) -> Mechanism:
     chained = reader.fields("chain", top["chain"], "chain") if "chain" in top else {}
     if reader.left_out or ("chain" in top and "pairs" not in chained):
         found = [fault for link in arguments.get("links", ()) for fault in link.faults()]
-        found += [
-            fault for pair in arguments.get("pairs", ()) for fault in pair.faults(sound_tol(arguments.get("tol")))
-        ]
+        pairs = arguments.get("pairs", ())
+        pairs = map(pair_in_plane, pairs) if arguments.get("planar") is True else pairs
+        found += [fault for pair in pairs for fault in pair.faults(sound_tol(arguments.get("tol")))]
         raise DeclarationError(subject, reader.faults + found)
     arguments = {"name": "?", **arguments}
     try:

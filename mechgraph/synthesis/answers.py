@@ -45,7 +45,7 @@ class Degenerate:
     text: str
 
 
-class Deferred(Shown, Sequence[Any]):
+class PerMechanism(Shown, Sequence[Any]):
     """What is found of mechanisms when it is first asked for: fitness, certificates."""
 
     _every_method_is_a_door = False
@@ -57,7 +57,7 @@ class Deferred(Shown, Sequence[Any]):
         return len(self._makers)
 
     def __getitem__(self, i: int | slice) -> Any:
-        return Deferred(self._makers[i]) if isinstance(i, slice) else _one_of(self._makers, i)()
+        return PerMechanism(self._makers[i]) if isinstance(i, slice) else _one_of(self._makers, i)()
 
     def document(self) -> Document:
         """A table, a row per mechanism, of verdicts and numbers, without what is as usual of all."""
@@ -74,18 +74,18 @@ class Deferred(Shown, Sequence[Any]):
         return Document(title, (Table(("", *header), tuple((str(i), *row) for i, row in enumerate(rows))),))
 
     @classmethod
-    def at_once(cls, find: Callable[[], Sequence[Any]], count: int) -> Deferred:
+    def at_once(cls, find: Callable[[], Sequence[Any]], count: int) -> PerMechanism:
         """Those that are found together."""
         found = cache(find)
         return cls([partial(lambda k: found()[k], i) for i in range(count)])
 
     @classmethod
-    def known(cls, found: Sequence[Any]) -> Deferred:
+    def known(cls, found: Sequence[Any]) -> PerMechanism:
         """Those that are known."""
         return cls([partial(found.__getitem__, i) for i in range(len(found))])
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Deferred.known, (tuple(self),)  # before they go elsewhere
+        return PerMechanism.known, (tuple(self),)  # before they go elsewhere
 
 
 @dataclass(frozen=True)
@@ -260,8 +260,8 @@ class Syntheses(Shown, Sequence[Mechanism]):
             copies=tuple(tuple(sorted(place[j] for j in self.copies[i] if j in place)) for i in k if self.copies),
             mechanisms=tuple(self.mechanisms[i] for i in k),
             sources=tuple(self.sources[i] for i in k if self.sources),
-            fitness=Deferred([partial(self.fitness.__getitem__, i) for i in k]),
-            certificates=Deferred([partial(self.certificates.__getitem__, i) for i in k if self.certificates]),
+            fitness=PerMechanism([partial(self.fitness.__getitem__, i) for i in k]),
+            certificates=PerMechanism([partial(self.certificates.__getitem__, i) for i in k if self.certificates]),
             **{name: getattr(self, name)[k] for name in ("values", "poses", "coordinates", "residual", "condition")},
         )
 
@@ -518,14 +518,14 @@ def joined_answers(found: Sequence[Syntheses], told: Sequence[str]) -> Syntheses
         weakest(s.completeness for s in found),
         (*told, *(f"{s.mechanism.name}: {text}" for s in found for text in s.evidence)),
         np.concatenate([s.condition for s in found]),
-        Deferred([partial(s.fitness.__getitem__, k) for s in found for k in range(len(s))]),
+        PerMechanism([partial(s.fitness.__getitem__, k) for s in found for k in range(len(s))]),
         whole("classes"),
         tuple(one for s in found for one in s.symmetries),
         tuple(tuple(n + k for k in mine) for n, s in zip(first, found, strict=False) for mine in s.copies),
         tuple(one for s in found for one in s.rejected),
         tuple(s.mechanism for s in found for _ in s),
         found[0].driver,
-        Deferred([partial(s.certificates.__getitem__, k) for s in found for k in range(len(s.certificates))]),
+        PerMechanism([partial(s.certificates.__getitem__, k) for s in found for k in range(len(s.certificates))]),
     )
     return out._sorted
 

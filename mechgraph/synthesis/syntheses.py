@@ -25,7 +25,7 @@ from mechgraph.quantities import Count, door, items_of, real_array, wrong
 from mechgraph.quantities import Index as Seed
 from mechgraph.synthesis.answers import (
     ComplexSyntheses,
-    Deferred,
+    PerMechanism,
     Degenerate,
     Syntheses,
     SynthesesOver,
@@ -268,14 +268,14 @@ class Synthesis:
             "searched" if found.lost or missing else "tested" if found.infinite or found.singular.size else start.word,
             tuple(told),
             condition,
-            Deferred.at_once(
+            PerMechanism.at_once(
                 partial(self._fitness, [m for m, _, _ in made], np.array([q for _, q, _ in made])), len(made)
             ),
             apart,
             (*self.symmetries, *cognates(alike, self.symmetries, motions)),
             tuple(tuple(copies[k]) for k in range(len(values))),
             driver=driver_of(p.m, self.tasks)[0],
-            certificates=Deferred.at_once(partial(certificates, of, goal, x), len(values)),
+            certificates=PerMechanism.at_once(partial(certificates, of, goal, x), len(values)),
         )
         # of a sweep nothing is said of fitness, which takes longer than the solutions, until it is asked for
         return out if self.sweep.names else out._sorted
