@@ -64,6 +64,20 @@ def test_chains_of_four_links_do_what_declared_four_bars_do_and_are_ranked_toget
     assert mine.data.mechanism_of == (m.name,) * 3
 
 
+@pytest.mark.slow
+def test_six_bars_of_all_choices_do_a_function_exactly_whatever_pins_are_given() -> None:
+    angles = np.linspace(0, 1.2, 4)
+    asked = 0.5 * angles + 0.15 * np.sin(2 * angles)
+    task = mg.function("input", "output", np.column_stack([angles, asked]))
+    for seed in range(2):
+        s = mg.synthesize(mg.atlas(6, 1), task, seed=seed)
+        assert s.total == 204
+        for m, fitness in zip(s, s.fitness, strict=True):
+            if fitness.good:
+                turned = mg.kinematics(m, {"input": angles})["output"].position[:, 0]
+                assert np.abs(np.exp(1j * (turned - asked)) - 1).max() < 1e-9
+
+
 def test_what_chains_cannot_be_asked_is_told() -> None:
     with pytest.raises(mg.DeclarationError, match="expected turning pairs"):
         mg.synthesize(mg.atlas(4, 1, types=("R", "P")), FUNCTION)

@@ -175,6 +175,7 @@ class Synthesis:
         """What is seen of the task before it is solved: rows that ask the same, and conditions that depend on each other there.
 
         Where the matrix of the unknowns has a lower rank at random dimensions and positions, closed or not, it has so at all solutions.
+        Rows that lie close together are nearly dependent, and no less determine a mechanism.
         """
         p, of, n = self.problem, self.of, self.swept.shape[1]
         asked = np.concatenate([p.asked, *p.rates], axis=1)
@@ -184,7 +185,7 @@ class Synthesis:
             if np.array_equal(asked[one], asked[other], equal_nan=True)
         ]
         at = of.leg(self.goals, self.goals, np.arange(n)).at(np.tile(of.x[:, None], n), np.ones(n), np.arange(n))
-        rank = int(np.linalg.matrix_rank(finite(at.matrix), rtol=MODES.generic).min()) if p.u else 0
+        rank = int(np.linalg.matrix_rank(finite(at.matrix), rtol=MODES.real_closed).min()) if p.u else 0
         if rank < p.u:
             told.append(
                 f"Here {rank} of {p.u} conditions are independent: there is no solution, or there are some without end."
