@@ -512,15 +512,21 @@ def _random(rng: np.random.Generator, n: int) -> Array:
 
 
 def _closed(system: System, x: Array) -> tuple[Array, Array]:
-    """States ``(nx, T)`` after limited Gauss-Newton steps, and their closure errors: most random ones close."""
+    """States ``(nx, T)`` of as many cases after limited Gauss-Newton steps, and their closure errors: most random ones close."""
+    out, going = x.copy(), np.arange(x.shape[1])
     with np.errstate(all="ignore"):
         # steps after which one that is not closed is given up
         for _ in range(20):
-            here = Configuration(system, x)
+            here = Configuration(system.cases(going), x)
             step = least_norm_steps(here.J, here.residual, MODES.generic)
             size = np.abs(step).max(axis=0)
-            x = system.advance(x, step * np.minimum(1.0, 0.5 / np.maximum(size, 1e-300)))
-        return x, Configuration(system, x).closure
+            out[:, going] = x = system.advance(x, step * np.minimum(1.0, 0.5 / np.maximum(size, 1e-300)))
+            # a step to rounding from what its square is left of
+            left = size > 1e-9
+            going, x = going[left], x[:, left]
+            if not going.size:
+                break
+        return out, Configuration(system, out).closure
 
 
 def _rank(A: Array) -> int:

@@ -282,12 +282,11 @@ def _told(m: Mechanism, k: int, side: int) -> Array:
     alone = Mechanism(pair.name, [m.link(pair.a), m.link(pair.b)], [pair], planar=m.planar)
     zero = np.zeros((3, 2))
     s = System(alone, None, declared(alone).parameters(alone, zero, zero[:, 0], 1.0))
-    rng, rows = np.random.default_rng(0), []
     # positions at which the motions are compared, each of which may tell in one direction alone
-    for _ in range(8):
-        dq = rng.uniform(-1.0, 1.0, (s.n_freedoms, 1))
-        here = Configuration(s, s.advance(s.state_of(np.zeros((s.n_freedoms, 1))), dq))
-        D, basis = here.poses, span(here.S[:, :, 0])
+    dq = np.random.default_rng(0).uniform(-1.0, 1.0, (8, s.n_freedoms)).T
+    here, rows = Configuration(s, s.advance(s.state_of(np.zeros((s.n_freedoms, 8))), dq)), []
+    for i in range(8):
+        D, basis = here.poses[..., [i]], span(here.S[:, :, i])
         if pair.on_a is None:
             change = np.eye(6) - move_twist(D[:, :, s.b[0]], np.eye(6))
         else:
