@@ -116,7 +116,7 @@ def test_where_no_start_leads_through_all_rows_nothing_is_found_and_that_is_said
         bounds={"C.point.x": (3, 3.1)},
     )
     assert len(s) == 0
-    assert s.evidence[0].startswith("0 starts of 2 led to all rows")
+    assert s.evidence[0].startswith("0 starts of 5 led to all rows")
 
 
 def test_fits_begin_with_exact_solutions_of_parts_of_the_task() -> None:
