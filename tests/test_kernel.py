@@ -34,6 +34,7 @@ from mechgraph.modes import compiled_tracks
 from mechgraph.modes.homotopy import Leg, Ways
 from mechgraph.outcome import Options
 from mechgraph.synthesis.classes import TaskClass
+from mechgraph.synthesis.fits import Fit
 from mechgraph.synthesis.legs import Arrow, CompiledArrow, TaskLeg
 from mechgraph.synthesis.system import RowProblem
 
@@ -532,7 +533,13 @@ def turning_rod() -> tuple[mg.Mechanism, Any, list[str]]:
     )
 
 
-OWN = {"a rod that turns about itself": turning_rod, "a plane in space": parallel}
+def of_points() -> tuple[mg.Mechanism, Any, list[str]]:
+    """A four-bar and points of which nothing tells the crank angles."""
+    points = [[1.5, 1.2], [1.3, 1.3], [1.1, 1.3], [0.9, 1.2]]
+    return four_bar(), mg.path("coupler.tip", points), ["A.point", "B.point", "C.point", "D.point", "coupler.tip"]
+
+
+OWN = {"a rod that turns about itself": turning_rod, "a plane in space": parallel, "a path": of_points}
 
 
 def near(a: Any, b: Any, part: float) -> bool:
@@ -563,6 +570,28 @@ def test_the_kernel_corrects_as_numpy_does(name: str) -> None:
     assert near(fast.v, plain.v, 1e-7)
     assert near(fast.sizes[0], plain.sizes[0], 1e-3)
     assert near(fast.noise, plain.noise, 1e-3)
+
+
+@pytest.mark.parametrize(
+    "name", ["slider-crank function up to a factor, 5 pairs", "R-Sp-R function, 6 pairs", "a path"]
+)
+def test_the_kernel_closes_rows_of_fits_as_numpy_does(name: str) -> None:
+    m, task, unknown = (LADDER | OWN)[name]()[:3]
+    fit = Fit(RowProblem(m, task, unknown), task)
+    z = fit.z0[:, None] + np.random.default_rng(0).uniform(-0.05, 0.05, (len(fit.z0), 5))
+    theta = fit.theta[:, :, None] + 0.02 * np.arange(fit.rows)[:, None, None] * np.ones(5)
+    x = np.broadcast_to(fit.p.at_rest[:, None, None], (len(fit.p.at_rest), fit.rows, 5))
+    assert fit.compiled is not None
+    here, came = fit.closed(z, theta, x)
+    vars(fit)["compiled"] = None
+    there, plain = fit.closed(z, theta, x)
+    assert came.any()
+    assert np.array_equal(came, plain)
+    for what in ("x", "matrix", "by_drivers", "by_unknowns"):
+        a, b = getattr(here, what), getattr(there, what)
+        a, b = (v[:, came] if what == "x" else v[came] for v in (a, b))
+        assert near(a, b, 1e-11)
+    assert np.abs(here.residual[came]).max() < 1e-12
 
 
 def test_curves_of_rates_are_led_by_numpy() -> None:

@@ -346,6 +346,48 @@ static void opened_by(const Track *t, int side, int pair, const number *own, num
   }
 }
 
+/* The equations of row i, of which `row` tells the free columns, at a state: M[height][free + unknowns + sides], behind the derivatives what
+ * they leave open with the other sign and, with two `sides`, how fast they close along the way. The largest number in a pose of a link, squared. */
+static double put_row(Track *t, int i, const int *row, const number *x, number *M, int sides) {
+  const Model *m = &t->m;
+  const Arrow *a = &t->a;
+  const int c = m->columns, h = t->height, u = a->unknowns, free = row[2], *columns = row + 4, w = free + u + sides, last = free + u + 1;
+  number *open = t->small, *column = t->small;
+  double size = 0.0;
+  evaluate(m, &t->w, x + a->head + i * a->states);
+  FOR(l, m->links) {
+    product(t->w.pose + 12 * l, t->own + 12 * l, t->pose + 12 * l);
+    FOR(j, 12) size = raised(size, square_of(t->pose[12 * l + j]));
+  }
+  fill(m, t->w.S, t->w.middle, NULL, NULL, t->J);
+  put_rods(t, i, open);
+  FOR(r, h) {
+    FOR(j, free) M[r * w + j] = t->J[r * c + columns[j]];
+    FOR(j, u) M[r * w + free + j] = 0.0;
+    M[r * w + free + u] = r < m->rows ? -t->w.residual[r] : -open[r - m->rows];
+    if (sides > 1) M[r * w + last] = 0.0;
+  }
+  FOR(j, sides > 1 ? a->rods : 0) if (a->square[j] >= 0) M[(m->rows + j) * w + last] = 0.5 * t->change[i * a->asked + a->square[j]];
+  FOR(j, a->moved) {
+    const int *place = a->place + 5 * j;
+    opened_by(t, place[3], place[4], t->eta + 6 * j, column);
+    FOR(r, h) M[r * w + free + place[0]] += column[r];
+  }
+  FOR(j, a->asked) if (a->column[j] >= 0 && a->given[i * a->asked + j]) {
+    const int place = i * a->asked + j, factor = a->factor[j];
+    FOR(r, h) {
+      const number own = t->J[r * c + a->column[j]];
+      if (factor >= 0) M[r * w + free + factor] += own * t->drive[place];
+      if (sides > 1) M[r * w + last] -= own * t->change[place] * (factor < 0 ? 1.0 : x[factor]);
+    }
+  }
+  FOR(j, sides > 1 ? 2 * a->pairs : 0) if (t->leads[j]) {
+    opened_by(t, j / a->pairs, j % a->pairs, t->eta + 6 * (a->moved + j), column);
+    FOR(r, h) M[r * w + last] -= column[r];
+  }
+  return size;
+}
+
 /* At a state x, in which unknowns and what is asked are put, the step of Newton's method, and with two `sides` the rates along the way behind
  * it: t->step[sides][head + rows columns]. The largest number in a pose of a link. */
 static double linearized(Track *t, number *x, const number *mixing, int sides) {
@@ -357,40 +399,9 @@ static double linearized(Track *t, number *x, const number *mixing, int sides) {
   int at = 0;
   put_unknowns(t, x), put_twists(t);
   FOR(i, a->rows) {
-    const int rank = row[0], settled = row[1], free = row[2], mixed = row[3], *columns = row + 4, w = free + u + sides, last = free + u + 1;
-    number *out = t->reduced + (size_t)i * h * t->wide, *M = mixed ? t->raw : out, *open = t->small, *column = t->small;
-    evaluate(m, &t->w, x + a->head + i * a->states);
-    FOR(l, m->links) {
-      product(t->w.pose + 12 * l, t->own + 12 * l, t->pose + 12 * l);
-      FOR(j, 12) size = raised(size, square_of(t->pose[12 * l + j]));
-    }
-    fill(m, t->w.S, t->w.middle, NULL, NULL, t->J);
-    put_rods(t, i, open);
-    /* the rows of the closure: free columns, unknowns, right sides */
-    FOR(r, h) {
-      FOR(j, free) M[r * w + j] = t->J[r * c + columns[j]];
-      FOR(j, u) M[r * w + free + j] = 0.0;
-      M[r * w + free + u] = r < m->rows ? -t->w.residual[r] : -open[r - m->rows];
-      if (sides > 1) M[r * w + last] = 0.0;
-    }
-    FOR(j, sides > 1 ? a->rods : 0) if (a->square[j] >= 0) M[(m->rows + j) * w + last] = 0.5 * t->change[i * a->asked + a->square[j]];
-    FOR(j, a->moved) {
-      const int *place = a->place + 5 * j;
-      opened_by(t, place[3], place[4], t->eta + 6 * j, column);
-      FOR(r, h) M[r * w + free + place[0]] += column[r];
-    }
-    FOR(j, a->asked) if (a->column[j] >= 0 && a->given[i * a->asked + j]) {
-      const int place = i * a->asked + j, factor = a->factor[j];
-      FOR(r, h) {
-        const number own = t->J[r * c + a->column[j]];
-        if (factor >= 0) M[r * w + free + factor] += own * t->drive[place];
-        if (sides > 1) M[r * w + last] -= own * t->change[place] * (factor < 0 ? 1.0 : x[factor]);
-      }
-    }
-    FOR(j, sides > 1 ? 2 * a->pairs : 0) if (t->leads[j]) {
-      opened_by(t, j / a->pairs, j % a->pairs, t->eta + 6 * (a->moved + j), column);
-      FOR(r, h) M[r * w + last] -= column[r];
-    }
+    const int rank = row[0], settled = row[1], free = row[2], mixed = row[3], *columns = row + 4, w = free + u + sides;
+    number *out = t->reduced + (size_t)i * h * t->wide, *M = mixed ? t->raw : out;
+    size = raised(size, put_row(t, i, row, x, M, sides));
     if (mixed) {
       memset(out, 0, (size_t)rank * w * sizeof(number));
       FOR(r, rank) FOR(j, h) {
@@ -500,5 +511,63 @@ void mgk_tracks(const int *I, const double *P, int numbers, const int *A, const 
       FOR(j, length) step[j * T + k] = t.step[j], rates[j * T + k] = t.step[length + j];
     }
     FOR(j, t.size) x[j * T + k] = t.x[j];
+  }
+}
+
+/* Loops of equations M[.][w], as they are filled in, taken about the middles of their pairs. */
+static void about_middles(const Track *t, int w, number *M) {
+  const Model *m = &t->m;
+  FOR(l, m->loops) {
+    const int first = m->loop_first[l], steps = m->loop_first[l + 1] - first;
+    number way[3], s[6];
+    FOR(r, 3) way[r] = -t->w.middle[3 * l + r];
+    FOR(i, steps) {
+      const int k = m->loop_pair[first + i];
+      const number *X = m->marker_b + 12 * k, own[3] = {X[3], X[7], X[11]};
+      point_of(t->w.pose + 12 * m->ends[2 * k + 1], own, s);
+      FOR(r, 3) way[r] += s[r] / steps;
+    }
+    FOR(c, w) {
+      number V[6] = {0.0};
+      FOR(r, m->height) V[m->part + r] = M[(m->height * l + r) * w + c];
+      twist_about(V, way, s);
+      FOR(r, m->height) M[(m->height * l + r) * w + c] = s[m->part + r];
+    }
+  }
+}
+
+/* The one row at real states x[tracks][state], closed by Newton's method in as many coordinates, the first ones of it, as there are equations:
+ * until it is open by less than `to`, the first step below the `longest` and each at most half as long as the one before; whether it came there.
+ * Its equations rows[tracks][height][free + unknowns + 1] as of put_row. */
+void mgk_rows(const int *I, const double *P, int numbers, const int *A, const number *const *leg, int tracks, double longest, double to, double *x,
+              double *rows, int *came, number *memory) {
+  Track t;
+  open_track(I, P, A, numbers, memory, &t);
+  const int h = t.height, moved = t.a.moved, *columns = t.a.row + 4, w = t.a.row[2] + t.a.unknowns + 1, length = t.a.head + t.m.columns;
+  number *S = t.reduced;
+  put_on_way(&t, leg, 1, 0, 0.0);
+  FOR(k, tracks) {
+    double *own = x + (size_t)k * t.size, last = 2.0 * longest;
+    int known = k > 0;
+    FOR(j, t.a.unknowns) known &= own[j] == own[j - t.size];
+    FOR(j, t.size) t.x[j] = own[j];
+    if (!known) put_unknowns(&t, t.x), put_twists(&t);
+    came[k] = 0, t.a.moved = 0;
+    FOR(trial, 12) {
+      double open = 0.0, step = 0.0;
+      put_row(&t, 0, t.a.row, t.x, t.raw, 1);
+      FOR(r, h) open = raised(open, cabs(t.raw[r * w + w - 1]));
+      if ((came[k] = last < 1e-8 || open < to)) break;
+      FOR(r, h) FOR(c, h + 1) S[r * (h + 1) + c] = t.raw[r * w + (c < h ? c : w - 1)];
+      solved_rows(h, 1, S);
+      FOR(j, length) t.step[j] = 0.0;
+      FOR(r, h) t.step[t.a.head + columns[r]] = S[r * (h + 1) + h], step = raised(step, cabs(S[r * (h + 1) + h]));
+      if (!(step < 0.5 * last)) break;
+      advance_track(&t, t.x, t.step), last = step;
+    }
+    t.a.moved = moved;
+    put_row(&t, 0, t.a.row, t.x, t.raw, 1), about_middles(&t, w, t.raw);
+    FOR(j, t.size) own[j] = creal(t.x[j]);
+    FOR(j, h * w) rows[(size_t)k * h * w + j] = creal(t.raw[j]);
   }
 }

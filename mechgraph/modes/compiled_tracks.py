@@ -12,7 +12,7 @@ import numpy as np
 from mechgraph.kernel import build
 from mechgraph.kernel.tables import fundamental, layout, tables, why_not
 from mechgraph.kinematics.system import System
-from mechgraph.maths.se3 import Index
+from mechgraph.maths.se3 import Index, Mask
 from mechgraph.memo import dataclass
 from mechgraph.modes.family import Array
 
@@ -128,6 +128,23 @@ class CompiledTracks:
         )  # fmt: skip
         return x, step, grown, sizes
 
+    def rows(
+        self, numbers: LegNumbers, x: Array, longest: float = 1.0, to: float = np.inf
+    ) -> tuple[Array, Array, Mask]:
+        """Real states ``x (T, nx)`` of one row closed in its first free coordinates, by a Newton step below the ``longest`` and shorter
+        ones ``to`` a number by which it may stay open; its equations ``(T, n, free + u + 1)`` there: derivatives by free coordinates and
+        unknowns, and what is left open with the other sign; whether it came ``(T,)``.
+        """
+        x, memory = np.array(x, dtype=float, order="C"), np.empty(self._size, dtype=complex)
+        height = self.led.system.n_rows + len(self.led.rods)
+        out = np.empty((len(x), height, len(self.led.rows[0].free) + self.led.unknowns + 1))
+        came, legs = np.empty(len(x), dtype=np.int32), np.array([v.ctypes.data for v in numbers], dtype=np.uintp)
+        _library().mgk_rows(
+            self.I.ctypes.data, self.P.ctypes.data, len(self.P), self.A.ctypes.data, legs.ctypes.data, len(x), longest, to, x.ctypes.data,
+            out.ctypes.data, came.ctypes.data, memory.ctypes.data,
+        )  # fmt: skip
+        return x, out, came.astype(bool)
+
 
 @cache
 def _library() -> ctypes.CDLL:
@@ -136,5 +153,7 @@ def _library() -> ctypes.CDLL:
     pointer, whole = ctypes.c_void_p, ctypes.c_int
     library.mgk_tracks_size.argtypes, library.mgk_tracks_size.restype = [pointer, pointer, whole], ctypes.c_size_t
     library.mgk_tracks.argtypes = [pointer, pointer, whole, *[pointer] * 3, whole, whole, *[pointer] * 8]
-    library.mgk_tracks.restype = None
+    ends = [ctypes.c_double] * 2
+    library.mgk_rows.argtypes = [pointer, pointer, whole, pointer, pointer, whole, *ends, *[pointer] * 4]
+    library.mgk_tracks.restype = library.mgk_rows.restype = None
     return library

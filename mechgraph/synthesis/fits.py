@@ -26,7 +26,9 @@ from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
+from mechgraph.modes.compiled_tracks import CompiledTracks, Led, LedRow, LegNumbers
 from mechgraph.synthesis.fitness import keeps
+from mechgraph.synthesis.legs import marker_places
 from mechgraph.synthesis.system import ArrowRows, RowProblem
 from mechgraph.synthesis.tasks import FunctionTask
 
@@ -39,25 +41,49 @@ Bounds = Mapping[str, tuple[float | None, float | None]]
 @dataclass(frozen=True)
 class FitPoint:
     """Rows of ``T`` mechanisms: unknowns ``z (u, T)`` and drivers ``theta (n, d, T)`` in internal units, states ``x (nx, n, T)``, and their
-    equations, of ``rank`` in the coordinates ``free`` that no driver has.
+    equations, from the kernel the ``rows (n, T, m, f + d + u + 1)`` of ``CompiledTracks.rows``.
     """
 
+    fit: Fit
     z: Array
     theta: Array
     x: Array
-    at: ArrowRows
-    free: Index
-    rank: int
+    rows: Array | None = None
+
+    @cached_property
+    def at(self) -> ArrowRows:
+        """The equations one by one."""
+        p = self.fit.p
+        return p.equations(p.numbers.with_values(p.places, self.z), self.x.swapaxes(0, 1))
+
+    @cached_property
+    def residual(self) -> Array:
+        """What is left open ``(n, T, m)``."""
+        return self.at.residual.swapaxes(1, 2) if self.rows is None else -self.rows[..., -1]
+
+    @cached_property
+    def by_drivers(self) -> Array:
+        """``F_theta (n, T, m, d)``."""
+        if self.rows is None:
+            return np.moveaxis(self.at.by_coordinates[:, :, self.fit.drivers], 3, 1)
+        return self.rows[..., len(self.fit.free) : -1 - len(self.z)]
+
+    @cached_property
+    def by_unknowns(self) -> Array:
+        """``F_z (n, T, m, u)``."""
+        return np.moveaxis(self.at.by_unknowns, 3, 1) if self.rows is None else self.rows[..., -1 - len(self.z) : -1]
 
     @cached_property
     def matrix(self) -> Array:
         """``F_q (n, T, m, f)``."""
-        return np.moveaxis(self.at.by_coordinates[:, :, self.free], 3, 1)
+        if self.rows is None:
+            return np.moveaxis(self.at.by_coordinates[:, :, self.fit.free], 3, 1)
+        return self.rows[..., : len(self.fit.free)]
 
     @cached_property
     def square(self) -> bool:
         """Whether as many rows as coordinates are independent."""
-        return self.matrix.shape[2] == self.matrix.shape[3] == self.rank
+        return self.matrix.shape[2] == self.matrix.shape[3] == self.fit.rank
 
     @cached_property
     def inverse(self) -> Array:
@@ -176,17 +202,47 @@ class Fit:
 
     def point(self, z: Array, theta: Array, x: Array) -> FitPoint:
         """Rows at states, and their equations."""
-        numbers = self.p.numbers.with_values(self.p.places, z)
-        return FitPoint(z, theta, x, self.p.equations(numbers, x.swapaxes(0, 1)), self.free, self.rank)
+        return FitPoint(self, z, theta, x) if self.compiled is None else self._led(z, theta, x)[0]
+
+    def _led(self, z: Array, theta: Array, x: Array, *until: float) -> tuple[FitPoint, Mask]:
+        """Rows at states closed by the kernel, see ``CompiledTracks.rows``; which came there."""
+        assert self.compiled is not None
+        (tracks, numbers), (n, T) = self.compiled, x.shape[1:]
+        states = np.concatenate([np.broadcast_to(z[:, None], (len(z), n, T)), x]).T.reshape(n * T, -1)
+        x, rows, came = tracks.rows(numbers, states, *until)
+        x = x.reshape(T, n, -1)[..., len(z) :].T
+        return FitPoint(self, z, theta, x, rows.reshape(T, n, *rows.shape[1:]).swapaxes(0, 1)), came.reshape(T, n).T
+
+    @cached_property
+    def compiled(self) -> tuple[CompiledTracks, LegNumbers] | None:
+        """The equations of a row in the kernel, and the numbers that are known; None where it does not serve."""
+        p, s, places = self.p, self.p.system, marker_places(self.p)
+        if places is None or not s.n_rows == self.rank == len(self.free):
+            return None
+        none, u = np.zeros((0, len(p.order))), len(p.places)
+        row = LedRow(u, 0, np.append(self.free, self.drivers), None)
+        led = Led(
+            s, p.at_rest, s.n_state, p.columns[:0], none[:, :0].reshape(1, 0), [row], len(p.order), [], none, p.columns[:0], u, u, places
+        )  # fmt: skip
+        if not led.served:
+            return None
+        begin = np.stack(p.numbers.vectors).swapaxes(1, 2)
+        still = np.zeros(begin.shape), np.zeros((1, 0, 1)), np.zeros((1, 0, 1))
+        return CompiledTracks(led), LegNumbers(begin, np.zeros((6, *begin.shape[2:])), *still).joined
 
     def taken(self, here: FitPoint, which: Index) -> FitPoint:
         """Some of the mechanisms."""
-        return self.point(here.z[:, which], here.theta[..., which], here.x[..., which])
+        rows = None if here.rows is None else here.rows[:, which]
+        return FitPoint(self, here.z[:, which], here.theta[..., which], here.x[..., which], rows)
 
     def mixed(self, first: Mask, one: FitPoint, other: FitPoint) -> FitPoint:
         """Those of the one where it is the ``first (T,)``, else those of the other."""
+        if first.all():
+            return one
         parts = ((one.z, other.z), (one.theta, other.theta), (one.x, other.x))
-        return one if first.all() else self.point(*(np.where(first, a, b) for a, b in parts))
+        z, theta, x = (np.where(first, a, b) for a, b in parts)
+        known = one.rows is not None and other.rows is not None
+        return FitPoint(self, z, theta, x, np.where(first[:, None, None], one.rows, other.rows) if known else None)  # type: ignore[arg-type]
 
     def closed(
         self, z: Array, theta: Array, x: Array, longest: float = 1.0, to: float = 1e-12
@@ -196,11 +252,13 @@ class Fit:
         """
         s, x = self.p.system, x.copy()
         x[s.single_rows[self.drivers]] = theta.swapaxes(0, 1)
+        if self.compiled is not None:
+            return self._led(z, theta, x, longest, to)
         came, last = np.ones(x.shape[1:], dtype=bool), np.full(x.shape[1:], 2 * longest)
         # steps of Newton's method, each at most half as long as the one before
         for _ in range(12):
             here = self.point(z, theta, x)
-            left = here.at.residual.swapaxes(1, 2)
+            left = here.residual
             going = came & ~(np.abs(left).max(axis=2, initial=0.0) < to)
             if not going.any():
                 return here, came
@@ -218,14 +276,14 @@ class Fit:
     def by_drivers(self, here: FitPoint) -> Array:
         """``dq/dtheta (n, T, F, d)``."""
         out = np.zeros((*here.x.shape[1:], self.p.system.n_freedoms, len(self.drivers)))
-        out[:, :, self.free] = -here.inverse @ np.moveaxis(here.at.by_coordinates[:, :, self.drivers], 3, 1)
+        out[:, :, self.free] = -here.inverse @ here.by_drivers
         out[:, :, self.drivers] = np.eye(len(self.drivers))
         return out
 
     def rates(self, here: FitPoint) -> tuple[Array, Array]:
         """``dq/dz (n, T, F, u)`` and ``dq/dtheta (n, T, F, d)``."""
         by_z = np.zeros((*here.x.shape[1:], self.p.system.n_freedoms, len(here.z)))
-        by_z[:, :, self.free] = -here.inverse @ np.moveaxis(here.at.by_unknowns, 3, 1)
+        by_z[:, :, self.free] = -here.inverse @ here.by_unknowns
         return by_z, self.by_drivers(here)
 
     @staticmethod

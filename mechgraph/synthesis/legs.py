@@ -21,7 +21,7 @@ from mechgraph.modes.compiled_tracks import CompiledTracks, Led, LedRow, LegNumb
 from mechgraph.modes.family import Array
 from mechgraph.modes.homotopy import Corrected, Ways, rounding, solved
 from mechgraph.synthesis.rods import RodProblem
-from mechgraph.synthesis.system import ArrowRows, RowNumbers
+from mechgraph.synthesis.system import ArrowRows, RowNumbers, RowProblem
 from mechgraph.synthesis.unknowns import UnknownPlace
 from mechgraph.variants.numbers import MARKER
 
@@ -276,11 +276,9 @@ def noise_of(size: Array, z: Array) -> Array:
 
 def compiled_tracks(of: TaskClass) -> CompiledTracks | None:
     """Tracks of a class in the kernel, where that is there and serves it."""
-    p, s = of.problem, of.problem.system
-    known = all(q.array in (*MARKER, "factors") for own in p.places for q in own)
-    if p.rates or not known:
+    p, s, places = of.problem, of.problem.system, marker_places(of.problem)
+    if places is None:
         return None
-    places = [(k, q) for k, own in enumerate(p.places) for q in own if q.array in MARKER]
     rods, ways = (p.rods, cast("Any", s).ways) if isinstance(p, RodProblem) else ([], np.zeros(0))
     height = s.graph.loop_rows + len(p.whole.couplings) + len(rods)
     rows = list[LedRow]()
@@ -290,10 +288,18 @@ def compiled_tracks(of: TaskClass) -> CompiledTracks | None:
         rows.append(LedRow(height if mixing is None else len(mixing), block.settled, of.free[i], mixing))
     led = Led(
         s, p.at_rest, of.nx, of.columns, of.given, rows, len(p.order), [[*near, *far] for near, far in rods], ways,
-        np.full(len(rods), -1), of.u, of.head, [(k, MARKER.index(q.array), q.component, q.side, q.pair) for k, q in places],
+        np.full(len(rods), -1), of.u, of.head, places,
         np.where(p.factor_of < 0, -1, of.u - 1 - p.factor_of.max(initial=0) + p.factor_of),
     )  # fmt: skip
     return CompiledTracks(led) if led.served else None
+
+
+def marker_places(p: RowProblem) -> list[tuple[int, ...]] | None:
+    """Places of the unknowns at markers as the kernel takes them; None where other numbers are sought, or rates."""
+    every = [(k, q) for k, own in enumerate(p.places) for q in own if q.array != "factors"]
+    if p.rates or not all(q.array in MARKER for _, q in every):
+        return None
+    return [(k, MARKER.index(q.array), q.component, q.side, q.pair) for k, q in every]
 
 
 class CompiledArrow(Arrow):

@@ -145,8 +145,7 @@ def settled(fit: Fit, here: FitPoint, low: Array, high: Array) -> FitPoint:
     size, part = (fit.missed(here) ** 2).sum(axis=(0, 2)), np.full(here.z.shape[1], 10.0)
     # rounds after which an optimum is not sought any further
     for _ in range(8):
-        weight = part * np.maximum(np.sqrt(size / max(len(fit.asked[0]), 1)), 1e-9)
-        here, new = descended(fit, here, low, high, 40, weight)
+        here, new = descended(fit, here, low, high, 40, part * _typical(fit, size))
         gained = new < 0.6 * size
         if fit.open.any() and not gained.any():
             # open drivers are put anew where the path comes nearest
@@ -161,6 +160,11 @@ def settled(fit: Fit, here: FitPoint, low: Array, high: Array) -> FitPoint:
         if not (gained | narrow)[kept].any():
             break
     return here
+
+
+def _typical(fit: Fit, size: Array) -> Array:
+    """What is missed in the mean ``(T,)``, from the sums of the squares."""
+    return np.maximum(np.sqrt(size / max(len(fit.asked[0]), 1)), 1e-9)
 
 
 def _different(z: Array, size: Array, most: float) -> Index:
@@ -192,7 +196,8 @@ def fitted(
     progress: Callable[[str], None] | None = None,
     exact: Iterable[Array] = (),
 ) -> Fitted:
-    """The optima to which dimensions lead: the declared ones, those that do parts of the task exactly, and up to ``starts`` random ones.
+    """The optima to which dimensions lead: the declared ones, those that do parts of the task exactly, and four random ones for
+    each of ``starts`` that is left.
 
     ``exact`` are values of all names. ``way``, ``goal`` and ``limits`` are those of ``constrained``.
     """
@@ -200,8 +205,10 @@ def fitted(
     rng, u = np.random.default_rng(seed), len(fit.z0)
     box = np.where(np.isfinite(low[:u]), low[:u], fit.z0 - 0.5), np.where(np.isfinite(high[:u]), high[:u], fit.z0 + 0.5)
     told = [fit.p.inside(values[:, None])[:, 0] for values in exact]
-    tries = [fit.z0, *told, *(rng.uniform(*box) for _ in range(starts - 1 - len(told)))]
+    tries = [fit.z0, *told, *(rng.uniform(*box) for _ in range(4 * (starts - 1 - len(told))))]
     begun, count = _best(fit, np.clip(np.transpose(tries), low[:u, None], high[:u, None]), low, high, limits, progress)
+    # quadratic programs take long
+    begun = begun if way == "least_squares" and not limits else begun[:4]
     evolved = None if begun else _evolved(fit, *box, seed)
     begun += [] if evolved is None else [evolved]
     ends: list[FitPoint] = []
@@ -259,14 +266,16 @@ def _best(
     Under limits also those that fall short of them by the least, before what is missed is as small as can be.
     """
     # rows by which starts are compared, starts that go down together, and those whose end is sought
-    coarse, together, most, found, sizes = fit.of_some(20), 64, 4, [tries[:, :0]], [np.zeros(0)]
+    coarse, together, most, found, sizes = fit.of_some(20), 256, 8, [tries[:, :0]], [np.zeros(0)]
     count = 0
     for k in range(0, tries.shape[1], together):
         here, came = coarse.begun(tries[:, k : k + together])
         here, count = coarse.taken(here, np.flatnonzero(came)), count + int(came.sum())
-        # the better half goes on, with open drivers put anew where the path comes nearest
-        for n in (3, 6, 10, 16) if came.any() else ():
-            here, size = descended(coarse, here, low, high, n)
+        # the better ones go on, with open drivers put anew where the path comes nearest
+        for n, part in ((3, 4), (6, 2), (10, 2), (16, 2)) if came.any() else ():
+            # without margins most of them end where a row is about to leave its branch
+            weight = 3.0 * _typical(coarse, (coarse.missed(here) ** 2).sum(axis=(0, 2)))
+            here, size = descended(coarse, here, low, high, n, weight)
             if coarse.open.any() and n > 3:
                 there, came = coarse.begun(here.z)
                 again = (coarse.missed(there) ** 2).sum(axis=(0, 2))
@@ -274,7 +283,7 @@ def _best(
                     coarse.mixed(came & (again < size), there, here),
                     np.where(came, np.minimum(size, again), size),
                 )
-            order = np.argsort(size, kind="stable")[: max(len(size) // 2, most)]
+            order = np.argsort(size, kind="stable")[: max(len(size) // part, most)]
             here, size = coarse.taken(here, order), size[order]
             if limits and n == 6:
                 found.append(here.z)
@@ -284,7 +293,7 @@ def _best(
         if progress is not None:
             progress(f"{min(k + together, tries.shape[1])} of {tries.shape[1]} starts")
     z, size = np.concatenate(found, axis=1), np.concatenate(sizes)
-    kept = _different(z, size, np.inf)[: 6 * most if limits else most]
+    kept = _different(z, size, np.inf)[: 3 * most if limits else most]
     here, came = fit.begun(z[:, kept]) if kept.size else (here, np.zeros(0, dtype=bool))
     if not came.any():
         return [], count
