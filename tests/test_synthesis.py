@@ -12,6 +12,10 @@ from ladder import LADDER, PUBLISHED, by_markers, dyad, four_bar, geared_five_ba
 from scipy.optimize import brentq
 
 import mechgraph as mg
+from mechgraph.modes.start_sets import trace_test
+from mechgraph.synthesis.classes import TaskClass
+from mechgraph.synthesis.solve import TaskPencil, kept
+from mechgraph.synthesis.system import RowProblem
 
 QUICK = [name for name in LADDER if name.split(",")[0] in ("R-R dyad", "four-bar function", "spherical R-R")]
 LONG = [name for name in LADDER if name not in QUICK]
@@ -91,6 +95,24 @@ def test_a_four_bar_is_among_those_that_do_its_own_function() -> None:
     s = mg.synthesize(four_bar(), mg.function("A", "D", pairs), ["B.point", "C.point"])
     assert np.abs(s.values - (0.4, 0.9, 1.9, 1.6)).max(axis=1).min() < 1e-9
     assert pickle.loads(pickle.dumps(s)).to_dict() == s.to_dict()
+
+
+@pytest.mark.parametrize("name", ["four-bar of two dyads, 5 poses", "four-bar path, 5 points, both pivots given"])
+def test_the_trace_test_of_tasks_passes_with_all_solutions_and_with_none_left_out(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Points of which one isotropic component counts have few poles: 42 where general sums have more than 100; one left out has no end."""
+    m, tasks, unknown, total = LADDER[name]()
+    rng = np.random.default_rng(3)
+    of = TaskClass(RowProblem(m, tasks, unknown), rng)
+    start = kept(of)
+    assert start is not None
+    assert start.x.shape[1] == total
+    trace = trace_test(of, start.member, start.x, rng, None, TaskPencil)
+    assert 0 < trace.degree <= 42
+    assert trace.beyond < 1e-11
+    monkeypatch.setattr("mechgraph.modes.start_sets.MOST_TRACKS", 100 * (total - 1))
+    assert not trace_test(of, start.member, start.x[:, 1:], rng, None, TaskPencil).passed
 
 
 def test_centre_points_of_four_poses_lie_on_one_cubic() -> None:

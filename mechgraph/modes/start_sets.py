@@ -260,10 +260,10 @@ def trace_test(
                 return found
             poles = _poles(z, f, weights) if len(z) else z
             # members for every pole at which a pencil that does not tell is left for another one
-            if len(z) >= 5 * len(poles):
+            if len(z) >= 8 * len(poles):
                 break
             phi = _beside(poles, rng)
-            phi = np.concatenate([phi, pencil.anywhere(max(pencil.first, len(z)) - len(phi), rng)])
+            phi = np.concatenate([phi, pencil.anywhere(max(pencil.first, len(z) // 4 * 2, len(phi)) - len(phi), rng)])
     return NOT_PASSED
 
 

@@ -5,14 +5,16 @@ is led to others of the first task: finite ones only, and no others than mechani
 coincide. (Plecnik and Fearing, Finding only finite roots to large kinematic synthesis systems, J. Mech. Robotics 9, 2017.)
 
 In the trace test what is asked of one row goes along a line: lengths, or else ``exp(i q)`` of an angle, are linear in one number, on which
-the sum of a combination of the unknowns over all solutions depends rationally.
+the sum of a combination of the unknowns over all solutions depends rationally. A point goes along an isotropic direction ``v``, and of
+unknown points such components count: of ``(p + z v - c)^2`` the square of ``z`` is gone, and of a circle in the plane only one of the two
+points at infinity is met, so that the degree is a part of what it is along other lines, and fewer tasks tell it.
 """
 
 from __future__ import annotations
 
 import sys
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import partial
 from math import lcm, prod
@@ -132,12 +134,19 @@ class TaskPencil:
         # one angle, or lengths alone: rational functions of several angles are of much higher degrees
         given = open_[row]
         moves = given & length if (given & length).any() else np.arange(len(given)) == np.argmax(given)
-        coupled = equations.problem.system.coupled_freedoms
-        self.parts = _parts_of_turns(equations) if np.isin(equations.columns[moves], coupled).any() else 1
+        s, F = equations.problem.system, equations.problem.system.n_freedoms
+        self.parts = _parts_of_turns(equations) if np.isin(equations.columns[moves], s.coupled_freedoms).any() else 1
         grown = np.where(length, other, np.exp(1j / self.parts * np.where(length, 0.0, other)) - 1.0)
+        points = [(c // F, s.pair_of_freedom[c % F]) for c in equations.columns]
+        for own in _together([key if at else None for key, at in zip(points, moves & length, strict=True)]):
+            grown[own] = np.linalg.norm(other[own]) * _isotropic(len(own), rng)
         self.rate = np.zeros(base.drive.shape[:2], dtype=complex)
         self.rate[row] = part * grown * moves
-        self.weights = rng.normal(size=(equations.u, 2)) @ [1.0, 1.0j]
+        places = (own[0] for own in equations.problem.places)
+        groups = _together([(p.side, p.pair) if p.array == "point" else (k,) for k, p in enumerate(places)])
+        self.each = np.zeros((len(groups), equations.u), dtype=complex)
+        for weights, own in zip(self.each, groups, strict=True):
+            weights[own] = (rng.normal(size=2) @ [1.0, 1.0j]) * _isotropic(len(own), rng)
 
     def members(self, phi: Array) -> ClassMember:
         """Tasks at ``phi (n,)``."""
@@ -153,12 +162,28 @@ class TaskPencil:
         n, N = len(phi), x.shape[1]
         tracked = follow(self.of.leg(self.base, self.members(phi), np.repeat(np.arange(n), N)), np.tile(x, n), Care())
         told = self.of.told(tracked.x)
-        g = (self.weights @ told).reshape(n, N)
+        # as few of the unknowns as tell the solutions apart, each with poles of its own, but for a sum that is the same everywhere
+        for weights in np.cumsum(self.each, axis=0):
+            g = (weights @ told).reshape(n, N)
+            varies = np.abs(g.sum(axis=1) - g[0].sum()).max() > MODES.real_singular * np.abs(g).max()
+            if varies and len(distinct((weights @ self.of.told(x))[None])) == N:
+                break
         size = np.maximum(1.0, np.abs(told).max(axis=0, initial=1.0)).reshape(n, N).max(axis=1)
         good = tracked.arrived.reshape(n, N).all(axis=1) & np.isfinite(g).all(axis=1)
         good = np.repeat(good.reshape(-1, 2).all(axis=1), 2)
         z = np.exp(1j * phi)
         return z[good], g.sum(axis=1)[good], (np.maximum(1.0, np.abs(z)) / size)[good]
+
+
+def _together(keys: Sequence[tuple[Any, ...] | None]) -> list[list[int]]:
+    """Numbers of those that have a key in common, in the order of keys; None is no key."""
+    return [[k for k, own in enumerate(keys) if own == key] for key in dict.fromkeys(keys) if key is not None]
+
+
+def _isotropic(n: int, rng: np.random.Generator) -> Array:
+    """A random direction ``v (n,)`` with ``v . v = 0``; of one number itself."""
+    ends = np.linalg.qr(rng.normal(size=(n, 2)))[0]
+    return np.asarray(ends @ np.array([1.0, 1.0j])[: ends.shape[1]])
 
 
 def movable(of: TaskClass) -> Mask:
