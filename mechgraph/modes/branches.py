@@ -477,8 +477,7 @@ class _Mapper:
             at = [tracks.station(self.low / self.unit), *at, tracks.station(self.high / self.unit)]
         gaps: dict[tuple[float, float], Gap] = {}
         tried: set[float] = set()
-        # times that circuits are looked for between those found before, at most
-        for _ in range(8):
+        while True:
             ends = list(pairwise([*at, tracks.station(at[0].value + 2 * np.pi, at[0].x)] if self.around else at))
             new = [two for two in ends if (two[0].value, two[1].value) not in gaps]
             gaps |= zip([(a.value, b.value) for a, b in new], tracks.gaps(new), strict=True)
@@ -486,7 +485,8 @@ class _Mapper:
             begins = [one for of, _, _ in told for one in of if one.value not in tried]
             asked = [value for _, of, _ in told for value in of if value not in tried]
             lost = [value for _, _, of in told for value in of]
-            if not begins and not asked:
+            # values that are looked at between samples, at most
+            if not (begins or asked) or len(tried) > max(self.count, 24):
                 break
             tried |= {*asked, *(one.value for one in begins)}
             form = tracks.at(np.array([one.value for one in begins]))
