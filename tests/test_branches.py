@@ -78,7 +78,7 @@ def test_few_samples_tell_the_same_as_many_where_groups_fold_one_after_the_other
     m = spatial(("RSSR", "frame", "frame"), ("SSP", "03", "frame"), seed=seed)
     coarse, fine = (mg.branches(m, "O0", samples=n, points=40) for n in (4, 40))
     assert (coarse.completeness, coarse.open_ends) == (fine.completeness, 0) == ("proved", 0)
-    assert [len(c) for c in coarse.circuits] == [len(c) for c in fine.circuits]
+    assert sorted(map(len, coarse.circuits)) == sorted(map(len, fine.circuits))
     assert np.allclose(
         *(np.sort(np.mod([f.value for f in b.folds], 2 * np.pi)) for b in (coarse, fine)), rtol=0, atol=1e-6
     )
