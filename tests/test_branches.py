@@ -8,6 +8,7 @@ from mechanisms import FourBarFormula, linked_four_bar
 from test_assembly_groups import spatial
 
 import mechgraph as mg
+from mechgraph.modes.homotopy import RealLeg
 
 
 def angle_at(a: float, d: float, reach: float) -> float:
@@ -58,6 +59,41 @@ def test_the_circuit_of_the_start_is_found_between_samples_and_what_moves_most_a
     assert {f.fastest for f in b.folds} == {"O2.Rz"}  # in line the coupler turns against the follower
 
 
+@pytest.mark.parametrize(("reach", "samples"), [(2.0, 24), (2.0, 3), (4.98, 3)])
+def test_circuits_that_lie_wholly_between_samples_are_found(reach: float, samples: int) -> None:
+    """A short rocker leaves the crank some degrees on either side of the ground; with 3 samples both circuits lie between the same two."""
+    a, d, c = 2.0, 3.0, 0.01
+    m = linked_four_bar(a, reach, c, d, angle_at(a, d, reach))
+    b = mg.branches(m, "O0", samples=samples, points=2 * samples)
+    folds = [sign * angle_at(a, d, reach + extreme) for sign in (1, -1) for extreme in (-c, c)]
+    found = [np.angle(np.exp(1j * f.value)) for f in b.folds]
+    assert np.allclose(np.sort(found), np.sort(folds), rtol=0, atol=1e-8)
+    assert (len(b.circuits), b.full_turn, b.open_ends, b.completeness) == (2, (False,) * 4, 0, "proved")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(12))
+def test_few_samples_tell_the_same_as_many_where_groups_fold_one_after_the_other(seed: int) -> None:
+    """A fold of the first loop alone is a double point that is not real for the second: beyond it all goes on."""
+    m = spatial(("RSSR", "frame", "frame"), ("SSP", "03", "frame"), seed=seed)
+    coarse, fine = (mg.branches(m, "O0", samples=n, points=40) for n in (4, 40))
+    assert (coarse.completeness, coarse.open_ends) == (fine.completeness, 0) == ("proved", 0)
+    assert sorted(map(len, coarse.circuits)) == sorted(map(len, fine.circuits))
+    assert np.allclose(
+        *(np.sort(np.mod([f.value for f in b.folds], 2 * np.pi)) for b in (coarse, fine)), rtol=0, atol=1e-6
+    )
+
+
+def test_where_what_is_not_real_is_lost_nothing_is_proved(monkeypatch: pytest.MonkeyPatch) -> None:
+    m = linked_four_bar(2.0, 1.5, 2.5, 3.0, 0.9)
+    known = mg.branches(m, "O0", samples=3, points=6)
+    monkeypatch.setattr(RealLeg, "keeps", lambda leg, before, after: np.zeros(after.shape[1], dtype=bool))
+    b = mg.branches(m, "O0", samples=3, points=6)
+    assert (known.completeness, b.completeness, len(b)) == ("proved", "tested", len(known))
+    assert "may be missing" in str(b)
+    assert "may be missing" not in str(known)
+
+
 def test_a_parallelogram_has_its_branches_cross_and_all_are_one_circuit() -> None:
     b = mg.branches(linked_four_bar(1.0, 2.0, 1.0, 2.0, 0.5), "O0", samples=12, points=120)
     assert len(b.circuits) == 1
@@ -105,6 +141,7 @@ def test_an_end_that_is_not_told_is_none_and_leaves_the_map_open() -> None:
     assert (b.full_turn, b.open_ends) == ((None,), 2)
     assert b.intervals[0] == pytest.approx((-0.5, 0.6), abs=1e-8)
     assert "not told" in str(b)
+    assert (b.completeness, b.evidence) == ("searched", ("Circuits that lie wholly between samples were not looked for.",))
 
 
 def test_branch_circuit_and_order_defects_are_told() -> None:

@@ -401,9 +401,11 @@ class Legs:
                 part[self._closed(out, interpolation, part, inside.size == self.total)] for part in in_blocks(inside)
             ]
             wrong = np.concatenate(bad)
-            if not wrong.size or self.path.size[1] > 1:
+            # tracks that end where they begin have no step
+            halved = wrong[np.isin(self.track[wrong], interpolation.nodes.track[interpolation.left])]
+            if not halved.size or self.path.size[1] > 1:
                 break
-            more = self._halved(out.follower, interpolation, wrong)
+            more = self._halved(out.follower, interpolation, halved)
             if not len(more):
                 break
             out.tracks = replace(out.tracks, nodes=Nodes.join([out.tracks.nodes, more]))

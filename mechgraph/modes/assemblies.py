@@ -127,7 +127,8 @@ class BranchesData:
 
     mechanism: str
     driver: str
-    completeness: Annotated[str, "of the assemblies at the samples: proved, tested or searched"]
+    completeness: Annotated[str, "proved, tested or searched"]
+    evidence: Annotated[tuple[str, ...], "what that rests on between samples"]
     resolution: Annotated[float, "distance of the samples"]
     open_ends: Annotated[int, "ends of branches that could not be told"]
     branches: tuple[BranchData, ...]
@@ -543,14 +544,16 @@ Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class _Solutions:
+class Solutions:
     """Real states ``(nx, M)`` at a position and ``others`` that are not real, with what is said of them (see ``Assemblies``).
 
-    ``solved`` are the real ones as they stand in the equations that were solved, ``continua`` lie in those of the mechanism.
+    ``solved`` are the real ones as they stand in the equations that were solved, and ``unreal`` those that are not; ``bent`` are real
+    there, but with rods that are not. ``continua`` lie in the equations of the mechanism.
     """
 
     x: Array
     solved: Array
+    unreal: Array
     others: Array
     word: str
     evidence: tuple[str, ...]
@@ -558,6 +561,7 @@ class _Solutions:
     infinite: int = 0
     on_continua: int = 0
     continua: Sequence[Found] = ()
+    bent: int = 0
 
 
 class Finder:
@@ -600,7 +604,7 @@ class Finder:
             keep(family, made)
         return made
 
-    def solutions(self, guesses: int = GUESSES, turns: float = GUESSED_TURNS) -> list[_Solutions]:
+    def solutions(self, guesses: int = GUESSES, turns: float = GUESSED_TURNS) -> list[Solutions]:
         """What is found at all positions."""
         q = self.question
         if not self.starts:
@@ -612,7 +616,7 @@ class Finder:
         """The assemblies at all positions."""
         return [self._result(found, i) for i, found in enumerate(self.solutions(guesses, turns))]
 
-    def _searched(self, drive: Array, guesses: int, turns: float) -> _Solutions:
+    def _searched(self, drive: Array, guesses: int, turns: float) -> Solutions:
         q = self.question
         x = searched(q.system, q.x, q.columns, drive, guesses, turns, self.rng, self.progress)
         x = np.concatenate([x, *([q.start.x] if np.allclose(q.start.x[self.family.rows, 0], drive) else [])], axis=1)
@@ -627,11 +631,10 @@ class Finder:
         moving = np.array([Nearby(q.family, system, x[:, [i]]).moves for i in range(x.shape[1])], dtype=bool)
         more = continua(q.family, system, x[:, moving], drive, self.progress) if moving.any() else []
         others = np.zeros((system.n_state, 0), dtype=complex)
-        return _Solutions(
-            x[:, ~moving], x[:, ~moving], others, "searched", (why, *([BESIDE] if more else [])), None, continua=more
-        )
+        x, said = x[:, ~moving], (why, *([BESIDE] if more else []))
+        return Solutions(x, x, others, others, "searched", said, None, continua=more)
 
-    def _tracked(self, found: Ends, i: int) -> _Solutions:
+    def _tracked(self, found: Ends, i: int) -> Solutions:
         system, real = self.form.at(i), np.flatnonzero(is_real(found.poses, found.error))
         solved, error = close_all(system, found.x[:, real].real, self.family.columns)
         # two that meet at a place that is not real are next to one another there
@@ -643,7 +646,8 @@ class Finder:
         more = self._continua(found.moving, i)
         N = prod(start.x.shape[1] for start in self.starts)
         # rods that would need complex turns to be put back are not real
-        x, others = self.form.lifted(solved, i), self.form.lifted(np.delete(found.x, real, axis=1), i)
+        unreal = np.delete(found.x, real, axis=1)
+        x, others = self.form.lifted(solved, i), self.form.lifted(unreal, i)
         complex_ = np.abs(x.imag).max(axis=0, initial=0.0) > least_imaginary()
         system = self.question.system
         off = Configuration(system, x.real).closure
@@ -655,9 +659,10 @@ class Finder:
             word, evidence = "searched", (*evidence, f"Of {counted(lost, 'mode')} the rods could not be put back.")
         others = np.concatenate([others, x[:, complex_]], axis=1)
         evidence = (*evidence, *self.form.told, *([BESIDE] if more else []))
-        return _Solutions(
-            x[:, made].real, solved[:, made], others, word, evidence, N, found.infinite, found.on_continua, more
-        )
+        return Solutions(
+            x[:, made].real, solved[:, made], unreal, others, word, evidence, N, found.infinite, found.on_continua, more,
+            int(complex_.sum()),
+        )  # fmt: skip
 
     def _continua(self, moving: Array, i: int) -> list[Found]:
         """Continua of the mechanism, where tracks came to such."""
@@ -666,7 +671,7 @@ class Finder:
             return []
         return continua(q.family, q.system, self.form.lifted(moving, i), q.drive[:, i], self.progress)
 
-    def _result(self, found: _Solutions, i: int) -> Assemblies:
+    def _result(self, found: Solutions, i: int) -> Assemblies:
         q, m, x = self.question, self.question.asked, found.x
         here = Configuration(q.system, x)
         poses = np.moveaxis(user_poses(here), 1, 0)

@@ -1,14 +1,17 @@
 """Branches of a mechanism over the range of one driver.
 
 At evenly spread samples of the driver all assemblies are known. The circuits through them are followed, until every assembly lies on one
-(see ``modes.circuits``); between its folds a circuit is a branch, and circuits that meet are one.
+(see ``modes.circuits``); between its folds a circuit is a branch, and circuits that meet are one. Assemblies that are not real are followed
+from sample to sample: where they meet in a fold of none of these circuits another one begins. A fold to which none comes faces one of the
+same kind, and all assemblies are looked for between both. So it goes on until nothing is left that is not accounted for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import field
-from typing import Annotated, Any
+from itertools import pairwise
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 
@@ -18,7 +21,7 @@ from mechgraph.errors import DeclarationError, counted
 from mechgraph.files import plain
 from mechgraph.graph.linkgraph import components_of_edges, members
 from mechgraph.kinematics.reach import BEYOND_END
-from mechgraph.kinematics.state import CLOSED, Configuration, close
+from mechgraph.kinematics.state import CLOSED, Configuration, close, close_all
 from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
@@ -29,12 +32,13 @@ from mechgraph.modes.assemblies import (
     Finder,
     Fold,
     Question,
+    Solutions,
     in_degrees,
     unit_of,
     values_text,
     weakest,
 )
-from mechgraph.modes.circuits import CircuitNodes, Circuits
+from mechgraph.modes.circuits import CircuitNodes, Circuits, Double, Gap, Station, Unreal
 from mechgraph.modes.family import Array
 from mechgraph.quantities import Index as Seed
 from mechgraph.quantities import at_least, door, is_numeric, wrong
@@ -59,9 +63,23 @@ class BranchRun:
     told: int = 0
 
     @property
+    def last(self) -> int:
+        """Its last step."""
+        return int(np.flatnonzero(self.of.run == self.run)[-1])
+
+    @property
+    def fold(self) -> tuple[float, int]:
+        """Driver value at its end, internal units, and 1 where that is an upper limit, else -1."""
+        return float(self.of.b.x[self.of.row, self.last]), int(self.of.rises[self.last])
+
+    @property
     def ends(self) -> Array:
         """Driver values at both ends, in the sense in which the circuit is followed."""
         return self.of.values(self.run)[[0, -1]]
+
+
+Stretches: TypeAlias = tuple[list[BranchRun], list[tuple[BranchRun, BranchRun]], int]
+"""Branches, pairs of them that meet in folds, and how many ends are open."""
 
 
 @dataclass(frozen=True)
@@ -105,9 +123,12 @@ class Branches(Shown):
     circuits : tuple of tuple of int
         Numbers of the branches that the mechanism can run through without disassembly.
     completeness : str
-        Of the assembly modes at the samples, see ``Assemblies``.
+        Of the circuits: of the assembly modes at the samples, see ``Assemblies``; no stronger than "tested" where it is not told that no
+        circuit lies wholly between two of them.
+    evidence : tuple of str
+        The reasons for what is between samples.
     resolution : float
-        Distance of the samples; a branch that begins and ends between two of them is missed.
+        Distance of the samples.
     open_ends : int
         Ends of branches that are neither a fold shared with another branch nor at the end of the range; 0 if the map is whole.
 
@@ -126,6 +147,7 @@ class Branches(Shown):
     bifurcations: tuple[Bifurcation, ...]
     circuits: tuple[tuple[int, ...], ...]
     completeness: str
+    evidence: tuple[str, ...]
     resolution: float
     open_ends: int
 
@@ -262,8 +284,8 @@ class Branches(Shown):
         )
         step = f"{in_degrees(m, driver, self.resolution):.3g}{unit_of(m, driver)}"
         words = [
-            f"Completeness of the assemblies at the samples: {self.completeness}; samples every {step}. Branches "
-            "between two samples are missed.",
+            f"Completeness: {self.completeness}; samples every {step}.",
+            *self.evidence,
             *(["At each fold two branches meet in a double root."] if folds else []),
         ]
         if self.open_ends:
@@ -291,6 +313,7 @@ class Branches(Shown):
             self.mechanism.name,
             self.driver,
             self.completeness,
+            self.evidence,
             self.resolution,
             self.open_ends,
             tuple(
@@ -390,6 +413,8 @@ class _Mapper:
         self.unit = float(probe.unit[self.place])
         self.begin = float(probe.declared.x[probe.family.rows[self.place], 0] * self.unit)
         self.closed = over is None and m.turns(driver)
+        # with couplings a turn of the driver leads elsewhere
+        self.around = self.closed and not m.couplings
         around = (self.begin - MODES.slide_stroke * L, self.begin + MODES.slide_stroke * L)
         self.low, self.high = (self.begin, self.begin + 2 * np.pi) if self.closed else over or around
         self.rims = None if self.closed else (self.low / self.unit, self.high / self.unit)
@@ -402,11 +427,17 @@ class _Mapper:
         self.samples = self.low + (np.arange(self.count) + GOLDEN) * step
         self.q = q = Question(self.m, _at(self.m, self.driver, self.samples.tolist()))
         self.column = int(q.columns[self.place])
-        solutions = Finder(q, seed, cache, progress).solutions()
-        states = [found.x for found in solutions]
+        finder = Finder(q, seed, cache, progress)
+        solutions = finder.solutions()
+        # the position beside the start counts as that of a further sample, which may be the only one on its circuit
+        self.row, self.others = int(q.system.single_rows[self.column]), np.delete(q.columns, self.place)
+        self.known = [
+            *zip(q.drive[self.place].tolist(), (found.x for found in solutions), strict=True),
+            (float(q.start.x[self.row, 0]), q.start.x),
+        ]
         if progress is not None:
-            progress(f"following {sum(x.shape[1] for x in states)} assemblies")
-        every, pairs, open_ends = self._stretches(states)
+            progress(f"following {sum(x.shape[1] for _, x in self.known)} assemblies")
+        (every, pairs, open_ends), word, evidence = self._whole(finder, solutions, seed, cache)
         every.sort(key=lambda one: one.key)
         place = {one: i for i, one in enumerate(every)}
         meets = self._meetings(every)
@@ -421,7 +452,8 @@ class _Mapper:
             tuple(sorted(folds, key=lambda f: (f.value, f.branches))),
             tuple(Bifurcation(self._within(value), tuple(sorted(set(numbers)))) for value, numbers, _ in meets),
             tuple(tuple(c) for c in circuits),
-            weakest(found.word for found in solutions),
+            word,
+            evidence,
             step,
             open_ends + sum(2 - one.told for one in every),
         )
@@ -431,20 +463,102 @@ class _Mapper:
         value *= self.unit
         return float(self.low + np.mod(value - self.low, 2 * np.pi)) if self.closed else value
 
-    def _stretches(self, states: list[Array]) -> tuple[list[BranchRun], list[tuple[BranchRun, BranchRun]], int]:
-        """The branches on which assemblies ``states[i] (nx, M_i)`` at samples lie, pairs that meet in folds, open ends of those on none."""
-        q, s, family = self.q, self.q.system, self.q.family
-        # the position beside the start counts as that of a further sample, which may be the only one on its circuit
-        states = [*states, q.start.x]
-        values, S = np.append(q.drive[self.place], q.start.x[s.single_rows[self.column]]), len(states)
+    def _whole(
+        self, finder: Finder, solutions: list[Solutions], seed: int, cache: bool
+    ) -> tuple[Stretches, str, tuple[str, ...]]:
+        """All branches, the word for their completeness, and what it rests on."""
+        every = self._stretches()
+        words, bent = [found.word for found in solutions], sum(found.bent for found in solutions)
+        if not finder.starts:
+            return every, weakest(words), ("Circuits that lie wholly between samples were not looked for.",)
+        tracks = Unreal(finder.form, self.q.drive[self.place])
+        at = [tracks.station(value, found.unreal) for (value, _), found in zip(self.known, solutions, strict=False)]
+        if not self.around:
+            at = [tracks.station(self.low / self.unit), *at, tracks.station(self.high / self.unit)]
+        gaps: dict[tuple[float, float], Gap] = {}
+        tried: set[float] = set()
+        while True:
+            ends = list(pairwise([*at, tracks.station(at[0].value + 2 * np.pi, at[0].x)] if self.around else at))
+            new = [two for two in ends if (two[0].value, two[1].value) not in gaps]
+            gaps |= zip([(a.value, b.value) for a, b in new], tracks.gaps(new), strict=True)
+            told = [self._untold(a, b, gaps[a.value, b.value], every[1]) for a, b in ends]
+            begins = [one for of, _, _ in told for one in of if one.value not in tried]
+            asked = [value for _, of, _ in told for value in of if value not in tried]
+            lost = [value for _, _, of in told for value in of]
+            # values that are looked at between samples, at most
+            if not (begins or asked) or len(tried) > max(self.count, 24):
+                break
+            tried |= {*asked, *(one.value for one in begins)}
+            form = tracks.at(np.array([one.value for one in begins]))
+            for i, one in enumerate(begins):
+                # beside the fold, along what moves there
+                y, error = close_all(
+                    self.q.system, form.lifted((one.x.real + one.x.imag)[:, None], i).real, self.others
+                )
+                self.known += [(float(y[self.row, 0]), y)] * bool(error[0] < CLOSED)
+            if asked:
+                q = Question(self.m, _at(self.m, self.driver, (self.unit * np.array(asked)).tolist()))
+                solutions = Finder(q, seed, cache, None).solutions()
+                words, bent = words + [found.word for found in solutions], bent + sum(found.bent for found in solutions)
+                self.known += [(value, found.x) for value, found in zip(asked, solutions, strict=True)]
+                at += [tracks.station(value, found.unreal) for value, found in zip(asked, solutions, strict=True)]
+                at.sort(key=lambda one: one.value)
+            every = self._stretches()
+        if not lost and not bent:
+            return (
+                every,
+                weakest(words),
+                ("Between samples, assemblies that are not real become real at the folds told alone.",),
+            )
+        why = []
+        if lost:
+            at_one = values_text(self.m, {self.driver: self.unit * min(lost)})
+            why.append(
+                f"Between samples, {counted(len(lost), 'track')} of assemblies that are not real cannot be told, one next to {at_one}."
+            )
+        if bent:
+            why.append(
+                f"In {counted(bent, 'assembly')} at samples rods close with complex turns alone; between samples they may be real."
+            )
+        return every, weakest([*words, "tested"]), (*why, "Circuits that lie wholly between samples may be missing.")
+
+    def _untold(
+        self, a: Station, b: Station, gap: Gap, pairs: Sequence[tuple[BranchRun, BranchRun]]
+    ) -> tuple[list[Double], list[float], list[float]]:
+        """Between stations: double points that are no folds that are known, values between folds that face each other, to which none came,
+        and values next to which something is left that is not accounted for.
+        """
+        begins, left = list[Double](), list[tuple[float, int]]()
+        folds = [one.fold for one, _ in pairs]
+        if self.around:
+            folds = [(a.value + float(np.mod(value - a.value, 2 * np.pi)), sense) for value, sense in folds]
+        for sense, doubles in ((-1, gap.rising), (1, gap.falling)):
+            mine = [value for value, of in folds if of == sense and a.value <= value <= b.value]
+            for one in doubles:
+                fold = min(mine, key=lambda value: abs(value - one.value), default=np.inf)
+                if not one.real:
+                    left.append((one.value, -sense))
+                elif abs(fold - one.value) < gap.near:
+                    mine.remove(fold)
+                else:
+                    begins.append(one)
+            left += [(value, sense) for value in mine]
+        rims = [(one.value, sense) for one, sense in ((a, 1), (b, -1)) if one.x is None]
+        facing = pairwise(sorted([*left, *rims]))
+        asked = [0.5 * (one + other) for (one, up), (other, down) in facing if up > 0 > down]
+        return begins, asked, [*gap.lost, *(one.value for one in begins), *(value for value, _ in left)]
+
+    def _stretches(self) -> Stretches:
+        """The branches on which known assemblies lie, pairs that meet in folds, open ends of those on none."""
+        s, family = self.q.system, self.q.family
+        values, states, S = np.array([value for value, _ in self.known]), [x for _, x in self.known], len(self.known)
         prints = [family.prints(Configuration(s, x)) for x in states]
         left, rank = [np.ones(x.shape[1], dtype=bool) for x in states], s.n_freedoms - 1 - family.idle.shape[1]
         out, pairs, still, passed = list[BranchRun](), list[tuple[BranchRun, BranchRun]](), list[Array](), list[Array]()
         while any(some.any() for some in left):
             i = int(np.argmax([some.sum() for some in left]))
             start = np.flatnonzero(left[i])
-            others = np.delete(q.columns, self.place)
-            of = Circuits(family, s, self.column, rank, states[i][:, start], others, self.rims)
+            of = Circuits(family, s, self.column, rank, states[i][:, start], self.others, self.rims)
             step, k, value = of.steps_at(np.repeat(np.arange(of.V), S), np.tile(values, of.V))
             x, met = of.states(step, value)
             there = family.prints(Configuration(s, x))
@@ -486,12 +600,12 @@ class _Mapper:
 
     def _fold(self, a: BranchRun, branches: list[int]) -> Fold:
         """The fold at the end of a branch."""
-        of, last = a.of, np.flatnonzero(a.of.run == a.run)[-1]
-        value = float(of.b.x[of.row, last]) * self.unit
+        value, sense = a.fold
+        value *= self.unit
         if self.closed:
             value -= 2 * np.pi * np.round((value - self.begin) / (2 * np.pi))
-        fastest = self.m.freedom_names()[int(np.argmax(np.abs(of.b.t[:, last])))]
-        return Fold(value, int(of.rises[last]), (branches[0], branches[1]), fastest)
+        fastest = self.m.freedom_names()[int(np.argmax(np.abs(a.of.b.t[:, a.last])))]
+        return Fold(value, sense, (branches[0], branches[1]), fastest)
 
     def _meetings(self, every: list[BranchRun]) -> list[tuple[float, list[int], Array]]:
         """Where circuits meet: driver values, numbers of branches, and what tells assemblies apart."""

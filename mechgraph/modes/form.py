@@ -19,6 +19,7 @@ go that of their two ways that is nearest to the start: ways of rods are no asse
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cache, cached_property
 from itertools import count
@@ -290,6 +291,8 @@ class EquationForm(Protocol):
     family: Family
     drive: Array
     """Values ``(d, n)`` of the drivers of the class at all positions."""
+    given: Array
+    """The same of the drivers of the mechanism."""
     told: tuple[str, ...]
     """What is to be said of them, in words."""
     spare: int
@@ -297,6 +300,9 @@ class EquationForm(Protocol):
 
     def at(self, position: int) -> System:
         """The system at a position."""
+
+    def driven(self, given: Array) -> EquationForm:
+        """The same at other positions, values ``given (d, n)`` of the drivers of the mechanism."""
 
     def lifted(self, x: Array, position: int) -> Array:
         """States of the mechanism from those ``(nx, M)`` found; complex where rods cannot be put back with real numbers."""
@@ -306,13 +312,17 @@ class Whole:
     """All of the mechanism."""
 
     def __init__(self, family: Family, drive: Array) -> None:
-        self.family, self.drive = family, drive
+        self.family, self.drive, self.given = family, drive, drive
         self.told: tuple[str, ...] = ()
         self.spare = 0
 
     def at(self, position: int) -> System:
         """The mechanism, of which drivers are freedoms."""
         return self.family.system
+
+    def driven(self, given: Array) -> Whole:
+        """See there."""
+        return Whole(self.family, given)
 
     def lifted(self, x: Array, position: int) -> Array:
         """The same."""
@@ -396,7 +406,7 @@ class WithoutRods:
 
     def __init__(self, whole: Family, drive: Array, rods: list[RodChain], rows: list[RodChain]) -> None:
         self.start, self.full, self._rows = whole.here, whole.system, whole.rows
-        self._drive = drive
+        self.given = drive
         s = self.full
         inner = [s.graph.frame, *(link for rod in rods for link in rod.links)]
         self.links = np.array([s.graph.frame, *np.setdiff1d(np.arange(len(s.m.links)), inner)], dtype=np.intp)
@@ -411,8 +421,8 @@ class WithoutRods:
             np.array([i for k in self.pairs for i in range(to[k], to[k + 1])], dtype=np.intp)
             for to in (s.first_row, s.first_column)
         )
-        own = np.isin(whole.columns, self.kept)
-        self.drive = np.concatenate([drive[own], self._squares()])
+        self._own = np.isin(whole.columns, self.kept)
+        self.drive = np.concatenate([drive[self._own], self._squares()])
         both = sum(not is_ball(s.m.pairs[rod.steps[0].pair].type) for rod in rods)
         self.told: tuple[str, ...] = (f"{WAYS} ({counted(both, 'leg')} here).",) if both else ()
         if self.spare:
@@ -464,7 +474,7 @@ class WithoutRods:
 
     def _squares(self) -> Array:
         """Squares ``(rods, n)`` of the lengths of the rods at all positions."""
-        x = self._driven(self._drive)
+        x = self._driven(self.given)
         squares = [(d * d).sum(axis=0) for _, d in (self._inside(rod, x) for rod in self.rods)]
         return np.array(squares).reshape(len(self.rods), x.shape[1])
 
@@ -511,6 +521,13 @@ class WithoutRods:
             return s
         return s.with_points(replace(s.points, squares=self.drive[-len(self.rods) :, [position]]))
 
+    def driven(self, given: Array) -> WithoutRods:
+        """See ``EquationForm``."""
+        out = copy(self)
+        out.given = given
+        out.drive = np.concatenate([given[self._own], out._squares()])
+        return out
+
     # --- states ------------------------------------------------------------------------------------------------------
 
     def _state(self) -> Array:
@@ -533,7 +550,7 @@ class WithoutRods:
     def lifted(self, x: Array, position: int) -> Array:
         """States of the mechanism: balls and turns of the rods put back one after the other."""
         here = Configuration(self.at(position), x)
-        out = np.repeat(self._driven(self._drive[:, [position]]), x.shape[1], axis=1).astype(complex)
+        out = np.repeat(self._driven(self.given[:, [position]]), x.shape[1], axis=1).astype(complex)
         out[self.state_rows] = x[: len(self.state_rows)]
         begin = out.copy()
         with np.errstate(all="ignore"):

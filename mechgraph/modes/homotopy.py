@@ -141,6 +141,10 @@ class Ways:
     equations: Any
     at: Callable[..., Any]
 
+    def keeps(self, before: Array, after: Array) -> Mask | bool:
+        """Which steps may lead from states to others."""
+        return True
+
     def corrected(self, x: Array, t: Array, dt: Array, tracks: Index, idle: Array) -> Corrected:
         """Predictions ``x (nx, T)`` at ``t (T,)`` corrected, with rates ``dt`` times those with ``t``."""
         eq = self.equations
@@ -224,6 +228,15 @@ class Leg(Ways):
         )
         here = Configuration(self.family.system_with(markers, drive), x)
         return Linear(self, here, change, self._of(self._eta, tracks))
+
+
+class RealLeg(Leg):
+    """The ways between real members, for assemblies that are not real: none goes over to its conjugate, as it could past a double point."""
+
+    def keeps(self, before: Array, after: Array) -> Mask:
+        """Those along which imaginary parts turn by less than 60 degrees."""
+        a, b = before.imag, after.imag
+        return np.asarray((a * b).sum(axis=0) > 0.5 * np.sqrt((a * a).sum(axis=0) * (b * b).sum(axis=0)))
 
 
 class Linear:
@@ -444,7 +457,7 @@ class _March:
             t, dt = self.way(s)
             x, v, sizes, noise, idle = self.leg.corrected(self.x + self._ahead(h), t, dt, tracks, self.idle)
             good = (sizes[0] <= care.most) & (sizes[1] <= 0.1 * sizes[0] + np.clip(noise, 1e-10, care.aim))
-        good &= np.isfinite(v).all(axis=0)
+        good &= np.isfinite(v).all(axis=0) & self.leg.keeps(self.x, x)
         order = 1.0 / (1.0 + np.minimum(self.known + 1, RATES_KEPT))
         grown = h * np.clip((care.aim / np.maximum(sizes[0], 1e-12)) ** order, 0.4, 2.0)
         # no step is longer than 0.25
