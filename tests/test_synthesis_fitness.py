@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from ladder import LADDER
+from ladder import spatial
 from mechanisms import FourBarFormula
 
 import mechgraph as mg
@@ -242,3 +243,21 @@ def test_change_points_are_passed_straight_on() -> None:
     turned = np.array([0.0, 2.0, 4.0, 6.0])
     found = fitness(m, np.outer(turned, [1, -1, 1, -1]), "A", "D")
     assert (found.good, found.full_turn) == (True, True)
+
+
+def test_the_transmission_of_spheres_on_planes_and_in_grooves_is_that_of_a_solution() -> None:
+    """Where a contact acts moves on one of its links; of ten mechanisms each at once."""
+    rng = np.random.default_rng(0)
+    for output, pairs in (("Q", ("R", "Sp", "R")), ("Q.Rz", ("R", "Sg", "C"))):
+        made, q, wanted = list[mg.Mechanism](), list[np.ndarray](), list[float]()
+        while len(made) < 10:
+            places = rng.normal(size=(3, 2, 3)).tolist()
+            rows = [(symbol, tuple(at), tuple(axis)) for symbol, (at, axis) in zip(pairs, places, strict=True)]
+            m = spatial("contact", *rows)
+            s = mg.solve(m, {"O": [0.0, 0.05, 0.1]}, on_reach="flag")
+            if (angle := mg.transmission(s, output).transmission_angle).min() > 0.01:
+                made.append(m)
+                q.append(np.concatenate([s[pair.name].position.reshape(3, -1) for pair in m.pairs], axis=1))
+                wanted.append(float(angle.min()))
+        found = [one.transmission for one in fitnesses(made, np.array(q), "O", output)]
+        assert np.abs(np.array(found) - wanted).max() < 1e-12

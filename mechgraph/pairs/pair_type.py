@@ -413,6 +413,11 @@ class PairType:
         return next((j for j, freedom in enumerate(self.freedoms) if self.opens and freedom.name == "gap"), None)
 
     @property
+    def normal_frame(self) -> int:
+        """The frame of a contact in which the normal force acts."""
+        return next(c.frame for c in self.reactions or () if self.touching and c.name == self.touching.forces[0])
+
+    @property
     def can_open(self) -> bool:
         """Whether one force alone keeps it in touch, so that there is a row in which it opens."""
         form = self.touching

@@ -74,7 +74,7 @@ class ContactGeometry:
     @property
     def _frame(self) -> int:
         """The frame of the pair in which the normal force acts."""
-        return next(c.frame for c in self._pair.type.reactions or () if c.name == self._form.forces[0])
+        return self._pair.type.normal_frame
 
     @cached_property
     def _bodies(self) -> tuple[Array, Array, Array, Array]:

@@ -197,8 +197,8 @@ def _transmitted(
     holds nothing. States of a ``run`` lie on one branch.
     """
     m, out = mechanisms[0], np.full((len(outputs), here.T), np.nan)
-    if any(c.steps for c in m.couplings) or any(pair.type.touching for pair in m.pairs):
-        # forces act along lines of gears, and at points that move
+    if any(c.steps for c in m.couplings):
+        # forces act along lines of gears
         names, q = m.freedom_names(), here.system.coordinates_of(here.x)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MechgraphWarning)
@@ -213,7 +213,12 @@ def _transmitted(
     sizes_of = np.sqrt(((points - points.mean(axis=1, keepdims=True)) ** 2).sum(axis=0).mean(axis=0))
     sizes_of = np.where(sizes_of > CLOSED, sizes_of, 1.0)
     sizes_of = sizes_of / sizes_of[0]
-    s, r, free = here.system, of.rank, np.delete(np.arange(here.system.n_freedoms), of.column)
+    s, r, centers = here.system, of.rank, here.pair_points.copy()
+    for k, pair in enumerate(m.pairs):
+        if pair.type.touching is not None:
+            number, i = s.place_of(k)
+            centers[:, k] = here.frames[number][pair.type.normal_frame][:, 3, i]
+    free = np.delete(np.arange(here.system.n_freedoms), of.column)
     U, sigma, V = np.linalg.svd(here.J[:, free].transpose(2, 1, 0))
     sigma = np.where(sigma[:, r - 1 : r] > MODES.generic * sigma[:, :1], sigma[:, :r], np.nan)
     for i, output in enumerate(s.columns_of(outputs).tolist()):
@@ -225,8 +230,9 @@ def _transmitted(
         for f in (of.column, output):
             own = reactions[:, s.pair_of_freedom[f]]
             own -= here.E[:, f, None] * (here.S[:, f, None] * own).sum(axis=0)
-        for wrenches in (w, reactions):
-            wrenches[:3] -= cross(p[:, :, None], wrenches[3:])
+        # where forces act, as far as that moves on a link
+        for wrenches, places in ((w, centers), (reactions, p)):
+            wrenches[:3] -= cross(places[:, :, None], wrenches[3:])
         reactions[:3] /= sizes_of[case]
         least = np.nan_to_num(reactions.transpose(3, 0, 1, 2).reshape(here.T, -1, w.shape[2]))
         y = np.linalg.pinv(least[:, :, 1:]) @ least[:, :, :1]
@@ -235,7 +241,7 @@ def _transmitted(
         pairs = np.flatnonzero(((s.a == link) | (s.b == link)) & (np.arange(len(s.a)) != guide))
         w = (w[:, :, 0] - np.einsum("cpst,ts->cpt", w[:, :, 1:], y[..., 0]))[:, pairs]
         turn = np.broadcast_to(here.S[:3, [output]], w[:3].shape)
-        rates = np.concatenate([turn, here.S[3:, [output]] + cross(turn, p[:, pairs])])
+        rates = np.concatenate([turn, here.S[3:, [output]] + cross(turn, centers[:, pairs])])
         does = (np.where(s.b[pairs] == link, 1.0, -1.0)[:, None] * (w * rates).sum(axis=0)).sum(axis=0)
         w, rates = (np.linalg.norm(v.reshape(2, 3, *v.shape[1:]), axis=1) for v in (w, rates))
         could = (w * rates).sum(axis=(0, 1))
