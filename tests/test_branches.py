@@ -141,7 +141,10 @@ def test_an_end_that_is_not_told_is_none_and_leaves_the_map_open() -> None:
     assert (b.full_turn, b.open_ends) == ((None,), 2)
     assert b.intervals[0] == pytest.approx((-0.5, 0.6), abs=1e-8)
     assert "not told" in str(b)
-    assert (b.completeness, b.evidence) == ("searched", ("Circuits that lie wholly between samples were not looked for.",))
+    assert (b.completeness, b.evidence) == (
+        "searched",
+        ("Circuits that lie wholly between samples were not looked for.",),
+    )
 
 
 def test_branch_circuit_and_order_defects_are_told() -> None:

@@ -508,7 +508,10 @@ class _Mapper:
             return (
                 every,
                 weakest(words),
-                ("Between samples, assemblies that are not real become real at the folds told alone.",),
+                (
+                    "Between samples, assemblies that are not real become real at the folds told alone.",
+                    *finder.form.told,
+                ),
             )
         why = []
         if lost:
@@ -520,7 +523,11 @@ class _Mapper:
             why.append(
                 f"In {counted(bent, 'assembly')} at samples rods close with complex turns alone; between samples they may be real."
             )
-        return every, weakest([*words, "tested"]), (*why, "Circuits that lie wholly between samples may be missing.")
+        return (
+            every,
+            weakest([*words, "tested"]),
+            (*why, "Circuits that lie wholly between samples may be missing.", *finder.form.told),
+        )
 
     def _untold(
         self, a: Station, b: Station, gap: Gap, pairs: Sequence[tuple[BranchRun, BranchRun]]

@@ -11,8 +11,10 @@ from mechanisms import Z
 
 import mechgraph as mg
 from mechgraph.kinematics import reach
-from mechgraph.kinematics.motion_path import DriverPath
+from mechgraph.kinematics.motion_path import DriverPath, Request, Status
 from mechgraph.kinematics.prescribed import DriverMotion
+from mechgraph.kinematics.solver import closure_solver
+from mechgraph.kinematics.system import System
 from mechgraph.kinetostatics import Pipeline
 from mechgraph.maths import singular_point
 from mechgraph.maths.tolerances import PATH
@@ -434,3 +436,13 @@ def test_positions_beside_a_change_point_are_closed_or_are_not_solved(monkeypatc
     assert np.isnan(s["D"].position[1:3]).all()
     with pytest.raises(mg.ReachError, match="the closure residual stays above round-off"):
         mg.solve(m, {"A": q})
+
+
+def test_what_is_asked_at_an_open_start_is_not_closed() -> None:
+    """Tracks that end where they begin have no step: an IndexError, where no other track had one."""
+    s = System(mechanisms.linked_four_bar(2.0, 1.5, 2.5, 3.0, 0.9))
+    x, beyond = s.state_of(np.zeros((s.n_freedoms, 1)))[:, 0], 2.9
+    x[s.single_rows[0]] = beyond
+    path = DriverPath(s, closure_solver("dense", np.array([0])), s.cases)
+    found = reach.follow(path, [Request(x, 0, np.full((1, 1), beyond), np.array([i])) for i in range(3)], 3)
+    assert list(found.status) == [Status.NOT_CLOSED] * 3
