@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ladder import LADDER
-from ladder import spatial
+from ladder import LADDER, spatial
 from mechanisms import FourBarFormula
 
 import mechgraph as mg
