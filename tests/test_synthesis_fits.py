@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ladder
 import numpy as np
 import pytest
 import scipy.optimize
@@ -215,3 +216,33 @@ def test_a_path_of_sixty_points_is_met_no_worse_than_by_ten_thousand_evaluations
     assert ((found - points) ** 2).sum(axis=1).mean() < other.fun
     # one drive leads through all points
     assert s.fitness[0].branch is False
+
+
+def test_the_best_transmission_is_no_worse_than_that_of_any_answer_of_a_sweep() -> None:
+    """Far from the declared dimensions, where of several ways to do it that of a start is rarely the best."""
+    rng = np.random.default_rng(21)
+    angles, turned = (np.cumsum(np.r_[0, rng.uniform(*ends, 3)]) for ends in ((0.2, 0.6), (-0.5, 0.5)))
+    task = mg.function("A", "D", np.column_stack([angles, turned]))
+    m = ladder.four_bar()
+    swept = mg.synthesize(m, task, ["B.point.y", "C.point"], sweep={"B.point.x": [0.5, 0.8, 1.0, 1.2]})
+    every = [f.transmission for s in swept for f in s.fitness if f.branch is False and f.transmission is not None]
+    bounds = {"B.point.x": (-2.5, 2.5)}
+    s = mg.synthesize(m, task, ["B.point", "C.point"], maximize="transmission D", bounds=bounds)
+    assert max(every) > 0.9
+    assert max(f.transmission for f in s.fitness) > max(every)
+    assert not any("Stopped" in text for text in s.evidence)
+
+
+def test_what_a_function_raises_is_told_with_its_name() -> None:
+    def spent(s: mg.Solution) -> float:
+        raise ValueError("no price is known")
+
+    task = mg.function("A", "D", [[0, 0], [0.3, 0.2], [0.7, 0.3]])
+    with pytest.raises(mg.DeclarationError, match="minimize: spent raised ValueError: no price is known"):
+        mg.synthesize(four_bar(), task, ["B.point", "C.point"], minimize=spent, starts=1)
+
+
+def test_a_fit_of_rows_that_are_all_alike_is_refused() -> None:
+    task = mg.path("coupler.tip", np.tile([1.5, 2.5], (8, 1)))
+    with pytest.raises(mg.DeclarationError, match="all rows ask the same"):
+        mg.synthesize(four_bar(), task, ["B.point", "C.point"], fit="least_squares")

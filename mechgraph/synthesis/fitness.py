@@ -253,11 +253,13 @@ def _transmitted(
 class Measure:
     """A quantity of a mechanism that meets positions: ``size``, ``ratio``, ``transmission D``, an output of ``study``, or a function.
 
-    It is taken at the positions, or ``over`` driver values, freedom -> values.
+    It is taken at the positions, or ``over`` driver values, freedom -> values; ``asked`` tells by which argument.
     """
 
-    def __init__(self, m: Mechanism, what: Output, over: Mapping[str, Any] | None = None) -> None:
-        self.what, self.over = what, over
+    def __init__(
+        self, m: Mechanism, what: Output, over: Mapping[str, Any] | None = None, asked: str = "conditions"
+    ) -> None:
+        self.what, self.over, self.asked = what, over, asked
         self.of_dimensions = what in ("size", "ratio")
         self.output = what.removeprefix("transmission ") if isinstance(what, str) and "transmission " in what else None
         if self.output is not None and (fault := m.freedom_fault(self.output, single=True)):
@@ -291,9 +293,14 @@ class Measure:
             s = solve(m, motions, on_reach="flag")
             if self.output is not None:
                 return transmission(s, self.output).transmission_angle.ravel()
-            return np.asarray(
-                self.what(s) if callable(self.what) else quantity(s, self.what, self.what), dtype=float
-            ).ravel()
+            if not callable(self.what):
+                return np.asarray(quantity(s, self.what, self.what), dtype=float).ravel()
+            try:
+                return np.asarray(self.what(s), dtype=float).ravel()
+            except Exception as error:
+                name = getattr(self.what, "__name__", repr(self.what))
+                told = f"{self.asked}: {name} raised {type(error).__name__}: {error}"
+                raise DeclarationError(f"synthesis of {m.name!r}", [told]) from error
 
 
 def limits_of(

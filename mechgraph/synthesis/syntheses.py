@@ -8,7 +8,7 @@ from concurrent.futures import Executor
 from contextvars import copy_context
 from dataclasses import fields, replace
 from functools import cached_property, partial
-from itertools import combinations
+from itertools import combinations, islice
 from typing import Any, get_args
 
 import numpy as np
@@ -429,6 +429,38 @@ def subset_values(
     return problem.outside(np.concatenate(real, axis=1)[: of.u]).T
 
 
+def fixed_values(
+    problem: RowProblem, tasks: Any, spare: int, low: Array, high: Array, values: int, seed: int, progress: Progress
+) -> Array:
+    """Values ``(n, names)`` of all real solutions of a task with fewer conditions than unknowns, as many of these fixed at random values
+    between ``low`` and ``high (names,)``.
+
+    None where no start set of such tasks is kept or came with the package.
+    """
+    rng, names = np.random.default_rng(seed), problem.unknowns.names
+    # choices of what is fixed that are looked at; those that come last first, as frames and pivots are named first
+    for fixed in islice(combinations(range(len(names))[::-1], spare), 8 * bool(problem.closed_at_start and spare > 0)):
+        rest = [k for k in range(len(names)) if k not in fixed]
+        swept = {names[k]: rng.uniform(low[k], high[k], values) for k in fixed}
+        try:
+            of = Synthesis(
+                RowProblem(problem.m, tasks, [names[k] for k in rest]), tasks, swept, seed, True, progress, []
+            )
+        except (NoClass, DeclarationError):
+            continue
+        if (start := kept(of.of)) is not None and start.x.shape[1] < TRACKS_TOGETHER:
+            n = min(values, TRACKS_TOGETHER // start.x.shape[1])
+            goals = of.goals.taken(np.arange(n))
+            found = ends(of.of, start, goals, rng, progress)
+            out = []
+            for i, one in enumerate(found):
+                z = real_states(of.of, goals.taken(np.array([i])), one.x)[0][: of.of.u]
+                out.append(np.empty((z.shape[1], len(names))))
+                out[-1][:, rest], out[-1][:, fixed] = of.problem.outside(z).T, of.swept[:, i]
+            return np.concatenate(out)
+    return np.zeros((0, len(names)))
+
+
 @door
 def synthesize(
     m: Mechanism | Iterable[Chain],
@@ -483,8 +515,9 @@ def synthesize(
     over : mapping, optional
         Driver -> values at which conditions hold, in place of the positions.
     starts : int
-        From how many dimensions a fit begins: the declared ones; all real exact solutions of so many subsets of the positions, where a
-        start set of such tasks came with the package or is kept; then random ones about the declared ones or in ``bounds``.
+        From how many dimensions a fit begins: the declared ones; all real exact solutions of so many subsets of the positions, or with
+        numbers that are free at so many random values, where a start set of such tasks came with the package or is kept (that of a
+        ``sweep`` is); then the best of four times as many random ones about the declared ones or in ``bounds``.
     seed : int
         Seed of all random numbers; exact results of a mechanism do not depend on it.
     cache : bool
@@ -539,7 +572,7 @@ def synthesize(
     fitting = any(one is not None for one in (fit, minimize, maximize))
     for name, what, sign in (("minimize", minimize, 1.0), ("maximize", maximize, -1.0)):
         try:
-            goals += [] if what is None else [(Measure(m, what, over), sign)]
+            goals += [] if what is None else [(Measure(m, what, over, name), sign)]
         except DeclarationError as error:
             faults += [f"{name}: {fault}" for fault in error.faults]
     faults += _faults_of_options(m, fit, len(goals), require, over)
@@ -563,7 +596,15 @@ def synthesize(
         if fit is not None and (spare := fits.fit.spare) > 0:
             told = f"fit: {counted(spare, 'number')} of {', '.join(problem.unknowns.names)} would stay open: leave as many out of unknown"
             raise DeclarationError(where, [f"{told}, ask for more, or spend the freedom by minimize= or maximize="])
-        exact = subset_values(RowProblem(m, tasks, unknown), tasks, *numbers, cache, progress) if fit else ()
+        again = RowProblem(m, tasks, unknown)
+        if fit:
+            exact = subset_values(again, tasks, *numbers, cache, progress)
+        else:
+            reach = 2 * again.L * np.array([[-1.0], [1.0]])
+            ends_ = [two_ends(within.get(name, (None, None))) for name in again.unknowns.names]
+            low, high = np.where(np.isfinite(np.transpose(ends_)), np.transpose(ends_), again.unknowns.declared + reach)
+            spare = fits.fit.spare if cache else 0
+            exact = fixed_values(again, tasks, spare, low, high, *numbers, progress)
         answer = fits.answered(fit, within, limits, goals, *numbers, progress, exact)
         return answer._kept(require, within, limits, fits.driver)
     found = Synthesis(problem, tasks, dict(sweep or {}), int(seed), cache, progress, faults)
