@@ -25,8 +25,8 @@ from mechgraph.quantities import Count, door, items_of, real_array, wrong
 from mechgraph.quantities import Index as Seed
 from mechgraph.synthesis.answers import (
     ComplexSyntheses,
-    PerMechanism,
     Degenerate,
+    PerMechanism,
     Syntheses,
     SynthesesOver,
 )
