@@ -278,8 +278,8 @@ class Circuits:
         if at.size:
             last.x[:, at] = self.closed(last.x[:, at], last.case[at], last.t[:, at])[0].x
             d, ahead, behind, facing = self._apart(last)
-        # a chord of what bends one way is turned from both of its ends by no more than these are from each other
-        done = there & (ahead <= 0) & ((d < 1e-5) | (-ahead > (-facing - 1e-4) * d))
+        # behind a corner one of both ends alone leads straight to the other
+        done = there & (ahead <= 0) & ((d < 1e-5) | (np.maximum(-ahead, behind) > (1.0 - 1e-4) * d))
         lost = there & ~done & ((ahead <= 0) | (d > self.gap))
         self.closes |= done
         if np.isfinite(self.period):
