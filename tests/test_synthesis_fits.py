@@ -219,9 +219,10 @@ def test_a_path_of_sixty_points_is_met_no_worse_than_by_ten_thousand_evaluations
     assert s.fitness[0].branch is False
 
 
-def test_the_best_transmission_is_no_worse_than_that_of_any_answer_of_a_sweep() -> None:
-    """Far from the declared dimensions, where of several ways to do it that of a start is rarely the best."""
-    rng = np.random.default_rng(21)
+@pytest.mark.parametrize("seed", [9, 21, 28])
+def test_the_best_transmission_is_no_worse_than_that_of_any_answer_of_a_sweep(seed: int) -> None:
+    """Far from the declared dimensions (seed 9: some four times as far as the links are long), whatever start sets are kept."""
+    rng = np.random.default_rng(seed)
     angles, turned = (np.cumsum(np.r_[0, rng.uniform(*ends, 3)]) for ends in ((0.2, 0.6), (-0.5, 0.5)))
     task = mg.function("A", "D", np.column_stack([angles, turned]))
     m = ladder.four_bar()
@@ -229,7 +230,7 @@ def test_the_best_transmission_is_no_worse_than_that_of_any_answer_of_a_sweep() 
     every = [f.transmission for s in swept for f in s.fitness if f.branch is False and f.transmission is not None]
     bounds = {"B.point.x": (-2.5, 2.5)}
     s = mg.synthesize(m, task, ["B.point", "C.point"], maximize="transmission D", bounds=bounds)
-    assert max(every) > 0.9
+    assert max(every) > 0.7
     assert max(f.transmission for f in s.fitness) > max(every)
     assert not any("Stopped" in text for text in s.evidence)
 
@@ -241,6 +242,13 @@ def test_what_a_function_raises_is_told_with_its_name() -> None:
     task = mg.function("A", "D", [[0, 0], [0.3, 0.2], [0.7, 0.3]])
     with pytest.raises(mg.DeclarationError, match="minimize: spent raised ValueError: no price is known"):
         mg.synthesize(four_bar(), task, ["B.point", "C.point"], minimize=spent, starts=1)
+
+
+def test_numbers_that_a_fit_leaves_open_are_told() -> None:
+    task = mg.function("A", "D", [[0, 0], [0.3, 0.2]])
+    with pytest.warns(mg.MechgraphWarning, match=r"1 number of B\.point\.x, B\.point\.y stay open"):
+        s = mg.synthesize(four_bar(), task, ["B.point"], fit="least_squares", starts=2)
+    assert s.fitness[0].error < 1e-8
 
 
 def test_a_fit_of_rows_that_are_all_alike_is_refused() -> None:

@@ -513,7 +513,7 @@ def actuators(m: Mechanism, actuate: Actuators) -> tuple[str, ...]:
 def is_pose(X: Array) -> Mask:
     """Whether matrices ``(..., 4, 4)`` are poses: a proper rotation, and the last row 0 0 0 1."""
     R = X[..., :3, :3]
-    # largest entry of ``R R^T - 1`` of a pose
+    # largest entry of ``R R^T - 1``; numbers that are not known are no fault of it
     turns = ~(np.abs(R @ np.swapaxes(R, -1, -2) - np.eye(3)).max(axis=(-2, -1)) > 1e-6) & ~(np.linalg.det(R) < 0)
     return np.asarray(turns & (X[..., 3, :] == (0, 0, 0, 1)).all(axis=-1))
 

@@ -563,6 +563,16 @@ def two_ends(value: Any) -> Any:
     return tuple(end if given is None else plain(given) for given, end in ends)
 
 
+def keeps(values: Any, least: float | None, most: float | None) -> bool:
+    """Whether all values lie between limits, but for the accuracy of an optimizer; no value that is none does."""
+    slip = 1e-6 * max([1.0, *(abs(end) for end in (least, most) if end is not None and np.isfinite(end))])
+    return bool(
+        np.isfinite(values).all()
+        and (least is None or (values >= least - slip).all())
+        and (most is None or (values <= most + slip).all())
+    )
+
+
 def is_interval(value: Any) -> bool:
     """Whether a value is two ends, as ``two_ends`` reads them, the lower one first."""
     fits = isinstance(value, tuple) and len(value) == 2

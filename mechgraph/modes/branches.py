@@ -38,7 +38,8 @@ from mechgraph.modes.assemblies import (
     values_text,
     weakest,
 )
-from mechgraph.modes.circuits import CircuitNodes, Circuits, Double, Gap, Station, Unreal
+from mechgraph.modes.between_samples import Double, Gap, Station, Unreal
+from mechgraph.modes.circuits import CircuitNodes, Circuits, in_order
 from mechgraph.modes.family import Array
 from mechgraph.quantities import Index as Seed
 from mechgraph.quantities import at_least, door, is_numeric, wrong
@@ -336,19 +337,6 @@ def _turns(b: Branch) -> str:
     return "yes" if b.turns == 1 else f"yes, back after {b.turns} turns"
 
 
-def in_order(values: Array, period: float) -> Array | None:
-    """Driver values ``(n,)`` of a branch, with whole periods such that they rise or fall; None where the driver has to turn back."""
-    steps, ways = np.diff(values), []
-    if not np.isfinite(period):
-        return None if (steps > 0).any() and (steps < 0).any() else values
-    for sense in (1.0, -1.0):
-        ahead = np.mod(sense * steps, period)
-        # a step back by rounding (radians) is none
-        ways.append(sense * np.cumsum([0.0, *np.where(period - ahead < 1e-12, 0.0, ahead)]))
-    way = min(ways, key=lambda way: abs(way[-1]))
-    return values[0] + way if abs(way[-1]) < period else None
-
-
 @door
 def branches(
     m: Mechanism,
@@ -504,30 +492,24 @@ class _Mapper:
                 at += [tracks.station(value, found.unreal) for value, found in zip(asked, solutions, strict=True)]
                 at.sort(key=lambda one: one.value)
             every = self._stretches()
-        if not lost and not bent:
-            return (
-                every,
-                weakest(words),
-                (
-                    "Between samples, assemblies that are not real become real at the folds told alone.",
-                    *finder.form.told,
-                ),
-            )
-        why = []
+        said, word = self._told(lost, bent)
+        return every, weakest([*words, word]), (*said, *finder.form.told)
+
+    def _told(self, lost: list[float], bent: int) -> tuple[list[str], str]:
+        """What is said of circuits between samples, next to which something is ``lost`` or rods are ``bent``; the strongest word for it."""
+        out = list[str]()
         if lost:
             at_one = values_text(self.m, {self.driver: self.unit * min(lost)})
-            why.append(
+            out.append(
                 f"Between samples, {counted(len(lost), 'track')} of assemblies that are not real cannot be told, one next to {at_one}."
             )
         if bent:
-            why.append(
+            out.append(
                 f"In {counted(bent, 'assembly')} at samples rods close with complex turns alone; between samples they may be real."
             )
-        return (
-            every,
-            weakest([*words, "tested"]),
-            (*why, "Circuits that lie wholly between samples may be missing.", *finder.form.told),
-        )
+        if out:
+            return [*out, "Circuits that lie wholly between samples may be missing."], "tested"
+        return ["Between samples, assemblies that are not real become real at the folds told alone."], "proved"
 
     def _untold(
         self, a: Station, b: Station, gap: Gap, pairs: Sequence[tuple[BranchRun, BranchRun]]

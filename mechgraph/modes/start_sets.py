@@ -263,7 +263,9 @@ def trace_test(
             if len(z) >= 8 * len(poles):
                 break
             phi = _beside(poles, rng)
-            phi = np.concatenate([phi, pencil.anywhere(max(pencil.first, len(z) // 4 * 2, len(phi)) - len(phi), rng)])
+            # half as many again, an even number of them
+            more = max(pencil.first, len(z) // 4 * 2, len(phi))
+            phi = np.concatenate([phi, pencil.anywhere(more - len(phi), rng)])
     return NOT_PASSED
 
 

@@ -16,10 +16,11 @@ from mechgraph.files import optional, plain
 from mechgraph.maths.se3 import Array
 from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
+from mechgraph.model.setups import keeps
 from mechgraph.modes.assemblies import weakest
 from mechgraph.modes.certificate import Certificate
 from mechgraph.quantities import items_of, place_among, real_array, wrong
-from mechgraph.synthesis.fitness import Fitness, keeps
+from mechgraph.synthesis.fitness import Fitness
 from mechgraph.synthesis.labelling import Symmetry
 
 if TYPE_CHECKING:

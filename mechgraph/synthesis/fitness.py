@@ -28,8 +28,7 @@ from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.setups import is_interval, two_ends
-from mechgraph.modes.branches import in_order
-from mechgraph.modes.circuits import Circuits
+from mechgraph.modes.circuits import Circuits, in_order
 from mechgraph.modes.family import Family
 from mechgraph.quantities import wrong
 from mechgraph.variants.numbers import side_by_side
@@ -328,16 +327,6 @@ def limits_of(
                     )
                 )
     return out
-
-
-def keeps(values: Array, least: float | None, most: float | None) -> bool:
-    """Whether all values lie between limits, but for the accuracy of an optimizer; no value that is none does."""
-    slip = 1e-6 * max([1.0, *(abs(end) for end in (least, most) if end is not None and np.isfinite(end))])
-    return bool(
-        np.isfinite(values).all()
-        and (least is None or (values >= least - slip).all())
-        and (most is None or (values <= most + slip).all())
-    )
 
 
 def frame_outputs(m: Mechanism, driver: str) -> list[str]:

@@ -26,8 +26,8 @@ from mechgraph.maths.linear import complement
 from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
+from mechgraph.model.setups import keeps
 from mechgraph.modes.compiled_tracks import CompiledTracks, Led, LedRow, LegNumbers
-from mechgraph.synthesis.fitness import keeps
 from mechgraph.synthesis.legs import marker_places
 from mechgraph.synthesis.system import ArrowRows, RowProblem
 from mechgraph.synthesis.tasks import FunctionTask
@@ -484,10 +484,11 @@ class Fit:
             by_z[:, :, k, column] -= np.nan_to_num(self.wanted[:, k, None])
         return by_z, np.where(self.open[:, None, None], by_theta, 0.0)
 
-    @property
+    @cached_property
     def spare(self) -> int:
-        """How many unknowns and open drivers there are more than numbers asked; what is asked of a row closed by itself counts for none."""
-        return len(self.z0) + int(self.open.sum()) - int(np.isin(self.asked[0], self.p.rows).sum())
+        """How many unknowns and open drivers there are more than conditions on them; what a row meets whatever the dimensions is none."""
+        J = self.jacobian(self.begun(self.z0[:, None])[0])
+        return J.shape[1] - int((np.abs(J).max(axis=1) > MODES.span).sum())
 
     def residual(self, here: FitPoint) -> Array:
         """By how much each is missed by one mechanism ``(a,)``."""

@@ -99,17 +99,20 @@ def fitted(
     low, high = fit.limits(bounds)
     rng, u = np.random.default_rng(seed), len(fit.z0)
     told = [fit.p.inside(values[:, None])[:, 0] for values in exact]
-    many = 4 * (starts - 1 - len(told))
-    # how far random ones are from those declared, in L: of what is best in something else all around is of interest
-    reach = 0.5 * np.where(way is None, 8.0, 1.0) ** rng.uniform(size=(max(many, 0), 1))
-    box = [np.where(np.isfinite(end[:u]), end[:u], fit.z0 + sign * reach) for sign, end in ((-1, low), (1, high))]
-    tries = np.concatenate([np.reshape([fit.z0, *told], (-1, u)), rng.uniform(*box)]).T
+    many = max(4 * (starts - 1 - len(told)), 0)
+
+    def box(reach: Array | float) -> tuple[Array, Array]:
+        begin, end = low[:u], high[:u]
+        return np.where(np.isfinite(begin), begin, fit.z0 - reach), np.where(np.isfinite(end), end, fit.z0 + reach)
+
+    # how far from those declared, in L; what is best in something else may be farther
+    reach = 0.5 * (8.0 if way is None else 1.0) ** rng.uniform(size=(many, 1))
+    tries = np.concatenate([np.reshape([fit.z0, *told], (-1, u)), rng.uniform(*box(reach))]).T
     tries = np.clip(tries, low[:u, None], high[:u, None])
     begun, count = _best(fit, tries, low, high, goal if way is None else None, limits, progress)
     # quadratic programs take long
     begun = begun if way == "least_squares" and not limits else begun[:4]
-    near = [np.where(np.isfinite(end[:u]), end[:u], fit.z0 + far) for far, end in ((-0.5, low), (0.5, high))]
-    evolved = None if begun else _evolved(fit, near[0], near[1], seed)
+    evolved = None if begun else _evolved(fit, *box(0.5), seed)
     begun += [] if evolved is None else [evolved]
     ends: list[FitPoint] = []
     unsafe = lost = early = 0
@@ -150,6 +153,10 @@ def fitted(
     if told:
         part = "all that is asked" if way is None else "a part of the positions"
         words.append(f"{counted(len(told), 'start')} of these do {part} exactly.")
+    elif way is None and fit.spare > 0:
+        words.append(
+            "None was known to do all that is asked: sweep= over free numbers, with cache=True, keeps a start set for that."
+        )
     if unsafe + lost:
         words.append(
             f"Left out: {unsafe} of which the path does not lead through all rows, {lost} that came to no optimum within the limits."
@@ -202,20 +209,20 @@ def _best(
         if progress is not None:
             progress(f"{min(k + together, tries.shape[1])} of {tries.shape[1]} starts")
     z, size = np.concatenate(found, axis=1), np.concatenate(sizes)
-    if met := goal is not None and bool((size < 1e-10).any()):
-        assert goal is not None
+    ranked = goal is not None and bool((size < 1e-10).any())
+    if goal is not None and ranked:
         there, came = fit.begun(z[:, size < 1e-10])
         there = fit.taken(there, np.flatnonzero(came))
         reached = goal.of(there).max(axis=0) if came.any() else np.zeros(0)
         z, size = there.z, np.nan_to_num(reached, nan=np.inf)
-    kept = _different(z, size, np.inf, 0.2 if met else 1e-2)[: 3 * most if limits else most]
+    kept = _different(z, size, np.inf, 0.2 if ranked else 1e-2)[: 3 * most if limits else most]
     here, came = fit.begun(z[:, kept]) if kept.size else (here, np.zeros(0, dtype=bool))
     if not came.any():
         return [], count
     here = fit.taken(here, np.flatnonzero(came))
     each = [fit.taken(here, np.array([i])) for i in range(here.z.shape[1])]
     ends = list[FitPoint]()
-    if not met:
+    if not ranked:
         best = settled(fit, fit.taken(here, np.arange(min(most, len(each)))), low, high)
         ends = [fit.taken(best, np.array([i])) for i in range(best.z.shape[1])]
     if not limits:

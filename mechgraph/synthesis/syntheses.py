@@ -398,9 +398,7 @@ def driver_of(m: Mechanism, tasks: Any) -> tuple[str | None, str | None]:
     return (names[0], None) if len(names) == 1 else (None, None)
 
 
-def subset_values(
-    problem: RowProblem, tasks: Any, subsets: int, seed: int, cache: bool, progress: Progress = None
-) -> Array:
+def subset_values(problem: RowProblem, tasks: Any, subsets: int, seed: int, progress: Progress = None) -> Array:
     """Values ``(n, names)`` of all real solutions of so many subsets of rows with as many conditions as unknowns.
 
     None where no start set of such tasks is kept or came with the package: to make one takes longer than a fit.
@@ -414,10 +412,10 @@ def subset_values(
         R = problem.u // max(each, 1)
         if not 0 < R < len(alike) or R * each != problem.u:
             raise NoClass
-        of = Synthesis(problem.with_rows(np.append(0, alike[:R])), tasks, {}, seed, cache, None, []).of
+        of = Synthesis(problem.with_rows(np.append(0, alike[:R])), tasks, {}, seed, True, None, []).of
     except (NoClass, DeclarationError):
         return np.zeros((0, len(problem.unknowns.names)))
-    if not cache or (start := kept(of)) is None:
+    if (start := kept(of)) is None:
         return np.zeros((0, len(problem.unknowns.names)))
     if not (subsets := min(subsets, TRACKS_TOGETHER // start.x.shape[1])):
         return np.zeros((0, len(problem.unknowns.names)))
@@ -430,18 +428,23 @@ def subset_values(
 
 
 def fixed_values(
-    problem: RowProblem, tasks: Any, spare: int, low: Array, high: Array, values: int, seed: int, progress: Progress
+    problem: RowProblem, tasks: Any, spare: int, bounds: Mapping[str, Any], values: int, seed: int, progress: Progress
 ) -> Array:
-    """Values ``(n, names)`` of all real solutions of a task with fewer conditions than unknowns, as many of these fixed at random values
-    between ``low`` and ``high (names,)``.
+    """Values ``(n, names)`` of all real solutions of a task with fewer conditions than unknowns, as many of these fixed at random values in
+    ``bounds``, or at any distance from those declared.
 
     None where no start set of such tasks is kept or came with the package.
     """
-    rng, names = np.random.default_rng(seed), problem.unknowns.names
+    rng, names, none = np.random.default_rng(seed), problem.unknowns.names, np.zeros((0, len(problem.unknowns.names)))
+    if problem.unknowns.others or not problem.closed_at_start or spare < 1:
+        return none
     # choices of what is fixed that are looked at; those that come last first, as frames and pivots are named first
-    for fixed in islice(combinations(range(len(names))[::-1], spare), 8 * bool(problem.closed_at_start and spare > 0)):
-        rest = [k for k in range(len(names)) if k not in fixed]
-        swept = {names[k]: rng.uniform(low[k], high[k], values) for k in fixed}
+    for fixed in islice(combinations(range(len(names))[::-1], spare), 8):
+        rest, swept = [k for k in range(len(names)) if k not in fixed], dict[str, Array]()
+        for k in fixed:
+            low, high = two_ends(bounds.get(names[k], (None, None)))
+            far = problem.unknowns.declared[k] + 2 * problem.L * rng.standard_cauchy(values)
+            swept[names[k]] = rng.uniform(low, high, values) if np.isfinite(high - low) else np.clip(far, low, high)
         try:
             of = Synthesis(
                 RowProblem(problem.m, tasks, [names[k] for k in rest]), tasks, swept, seed, True, progress, []
@@ -449,16 +452,13 @@ def fixed_values(
         except (NoClass, DeclarationError):
             continue
         if (start := kept(of.of)) is not None and start.x.shape[1] < TRACKS_TOGETHER:
-            n = min(values, TRACKS_TOGETHER // start.x.shape[1])
-            goals = of.goals.taken(np.arange(n))
-            found = ends(of.of, start, goals, rng, progress)
-            out = []
-            for i, one in enumerate(found):
+            goals, out = of.goals.taken(np.arange(min(values, TRACKS_TOGETHER // start.x.shape[1]))), [none]
+            for i, one in enumerate(ends(of.of, start, goals, rng, progress)):
                 z = real_states(of.of, goals.taken(np.array([i])), one.x)[0][: of.of.u]
                 out.append(np.empty((z.shape[1], len(names))))
                 out[-1][:, rest], out[-1][:, fixed] = of.problem.outside(z).T, of.swept[:, i]
             return np.concatenate(out)
-    return np.zeros((0, len(names)))
+    return none
 
 
 @door
@@ -589,22 +589,17 @@ def synthesize(
             measure.of_dimensions for measure in (*(limit[1] for limit in limits), *(goal[0] for goal in goals))
         )
         ends_of = (None, None) if faults else driver_of(m, tasks)
-        fits, numbers = (
-            FittedSynthesis(problem, tasks, over if moving else None, *ends_of, faults),
-            (int(starts), int(seed)),
-        )
-        if fit is not None and (spare := fits.fit.spare) > 0:
-            told = f"fit: {counted(spare, 'number')} of {', '.join(problem.unknowns.names)} would stay open: leave as many out of unknown"
-            raise DeclarationError(where, [f"{told}, ask for more, or spend the freedom by minimize= or maximize="])
-        again = RowProblem(m, tasks, unknown)
-        if fit:
-            exact = subset_values(again, tasks, *numbers, cache, progress)
-        else:
-            reach = 2 * again.L * np.array([[-1.0], [1.0]])
-            ends_ = [two_ends(within.get(name, (None, None))) for name in again.unknowns.names]
-            low, high = np.where(np.isfinite(np.transpose(ends_)), np.transpose(ends_), again.unknowns.declared + reach)
-            spare = fits.fit.spare if cache else 0
-            exact = fixed_values(again, tasks, spare, low, high, *numbers, progress)
+        fits = FittedSynthesis(problem, tasks, over if moving else None, *ends_of, faults)
+        spare, numbers = fits.fit.spare, (int(starts), int(seed))
+        if fit is not None and spare > 0:
+            told = f"{counted(spare, 'number')} of {', '.join(problem.unknowns.names)} stay open: some of solutions without end are found"
+            more = "leave as many out of unknown, ask for more, or spend the freedom by minimize= or maximize="
+            warnings.warn(f"{where}: fit: {told}; {more}", MechgraphWarning, stacklevel=3)
+        again, exact = RowProblem(m, tasks, unknown), np.zeros((0, len(problem.unknowns.names)))
+        if cache and fit is not None:
+            exact = subset_values(again, tasks, *numbers, progress)
+        elif cache:
+            exact = fixed_values(again, tasks, spare, within, *numbers, progress)
         answer = fits.answered(fit, within, limits, goals, *numbers, progress, exact)
         return answer._kept(require, within, limits, fits.driver)
     found = Synthesis(problem, tasks, dict(sweep or {}), int(seed), cache, progress, faults)
