@@ -414,8 +414,9 @@ class PairType:
 
     @property
     def normal_frame(self) -> int:
-        """The frame of a contact in which the normal force acts."""
-        return next(c.frame for c in self.reactions or () if self.touching and c.name == self.touching.forces[0])
+        """The frame of a contact in which the normal force acts; of other pairs 0, in which all reactions do."""
+        name = self.touching.forces[0] if self.touching else ""
+        return next((c.frame for c in self.reactions or () if c.name == name), 0)
 
     @property
     def can_open(self) -> bool:
