@@ -20,6 +20,19 @@ void mgk_drives(const int *I, const double *P, void *state, double *q) {
   FOR(i, m.drives) q[i] = w.drive[i] * (m.is_length[m.drive[i]] ? *m.unit : 1.0);
 }
 
+/* Closure rows at states x[count][states], of mechanisms `which` of those with tables P[mechanisms][numbers], none of them driven: what they leave
+ * open left[count][rows], and their derivatives J[count][rows][columns]. */
+void mgk_closure(const int *I, const double *P, int numbers, int count, const int *which, const double *x, void *memory, double *left, double *J) {
+  Model m;
+  Work w;
+  FOR(i, count) {
+    if (!i || which[i] != which[i - 1]) opened(I, P + (size_t)which[i] * numbers, memory, &m, &w);
+    evaluate(&m, &w, x + (size_t)i * m.states);
+    memcpy(left + (size_t)i * m.rows, w.residual, m.rows * sizeof(double));
+    fill(&m, w.S, w.middle, NULL, NULL, J + (size_t)i * m.rows * m.columns);
+  }
+}
+
 /* n states one after the other, each led on from the last good one: motion[3][n][drives] = q, v, a, and of every state what mgk_solve gives,
  * poses too unless NULL. status[n]; NaN where that is not 0. Not 0, and nothing done, where a number of `motion` is not finite. */
 int mgk_table(const int *I, const double *P, void *state, int n, const double *motion, double *effort, double *reaction, double *position,

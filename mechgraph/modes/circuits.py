@@ -27,6 +27,7 @@ from mechgraph.maths.newton import cubic
 from mechgraph.maths.se3 import Array, Index, Mask
 from mechgraph.maths.tolerances import MODES, MOTIONS
 from mechgraph.memo import dataclass
+from mechgraph.modes.compiled_tracks import CompiledClosure
 from mechgraph.modes.family import NO_NUMBERS, Family
 
 
@@ -110,6 +111,7 @@ class Circuits:
     ) -> None:
         self.family, self.s, self.column, self.rank, self.x, self.held = family, system, column, rank, x, held
         self.V, self.row = x.shape[1], int(system.single_rows[column])
+        self.compiled = CompiledClosure.of(system)
         self.period = np.inf if rims else float(system.periods[column])
         # turns of the driver after which a branch may come back, at most
         far = 8 * self.period if np.isfinite(self.period) else np.inf
@@ -142,8 +144,12 @@ class Circuits:
 
         With nodes ``beside`` them motions are those with ``[[J, U], [N^T, 0]]``, bordered by what no motion meets and by motions there.
         """
-        here, r, (F, T) = self.here(x, case), self.rank, (self.s.n_freedoms, x.shape[1])
-        J, left = here.J, here.residual
+        r, (F, T) = self.rank, (self.s.n_freedoms, x.shape[1])
+        if self.compiled is None:
+            here = self.here(x, case)
+            left, J = here.residual, here.J
+        else:
+            left, J = self.compiled.at(x, case)
         if self.held.size:
             rest = np.broadcast_to(np.eye(F)[self.held, :, None], (len(self.held), F, T))
             J, left = np.concatenate([J, rest]), np.concatenate([left, np.zeros((len(rest), T))])

@@ -1,4 +1,6 @@
-"""Tracks led by the kernel: what ``kernel/tracks.c`` needs of a class of mechanisms, of their ways and states."""
+"""Tracks and circuits in the kernel: what ``kernel/tracks.c`` needs of a class of mechanisms, of their ways and states; closure rows of many
+mechanisms at once.
+"""
 
 from __future__ import annotations
 
@@ -146,14 +148,47 @@ class CompiledTracks:
         return x, out, came.astype(bool)
 
 
+class CompiledClosure:
+    """Closure rows of a system's cases in the kernel; their loops are those that chords close, about the chords."""
+
+    def __init__(self, system: System) -> None:
+        none = np.zeros(0, dtype=np.intp)
+        made = tables(layout(system, none, []), system, np.zeros((system.n_state, system.par.batch)), None)
+        assert made is not None
+        self.I, self.P = made
+        self.shape = system.n_rows, system.n_freedoms
+
+    @staticmethod
+    def of(system: System) -> CompiledClosure | None:
+        """Where the kernel is there and serves them."""
+        return CompiledClosure(system) if build.installed() is not None and why_not(system) is None else None
+
+    @cached_property
+    def _memory(self) -> Array:
+        return np.empty(-(-int(_library().mgk_state_size(self.I.ctypes.data)) // 8))
+
+    def at(self, x: Array, case: Index) -> tuple[Array, Array]:
+        """What rows leave open ``(rows, T)`` at states ``(nx, T)``, and their derivatives ``(rows, F, T)``."""
+        T = x.shape[1]
+        case, x = (np.zeros_like(case) if len(self.P) == 1 else case).astype(np.int32), np.ascontiguousarray(x.T)
+        left, J = np.empty((T, self.shape[0])), np.empty((T, *self.shape))
+        _library().mgk_closure(
+            self.I.ctypes.data, self.P.ctypes.data, self.P.shape[1], T, case.ctypes.data, x.ctypes.data, self._memory.ctypes.data,
+            left.ctypes.data, J.ctypes.data,
+        )  # fmt: skip
+        return left.T, J.transpose(1, 2, 0)
+
+
 @cache
 def _library() -> ctypes.CDLL:
-    """The kernel, its functions for tracks declared."""
+    """The kernel, its functions for tracks and circuits declared."""
     library = build.built()
     pointer, whole = ctypes.c_void_p, ctypes.c_int
     library.mgk_tracks_size.argtypes, library.mgk_tracks_size.restype = [pointer, pointer, whole], ctypes.c_size_t
     library.mgk_tracks.argtypes = [pointer, pointer, whole, *[pointer] * 3, whole, whole, *[pointer] * 8]
     ends = [ctypes.c_double] * 2
     library.mgk_rows.argtypes = [pointer, pointer, whole, pointer, pointer, whole, *ends, *[pointer] * 4]
-    library.mgk_tracks.restype = library.mgk_rows.restype = None
+    library.mgk_state_size.argtypes, library.mgk_state_size.restype = [pointer], ctypes.c_size_t
+    library.mgk_closure.argtypes = [pointer, pointer, whole, whole, *[pointer] * 5]
+    library.mgk_tracks.restype = library.mgk_rows.restype = library.mgk_closure.restype = None
     return library
