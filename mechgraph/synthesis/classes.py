@@ -211,7 +211,7 @@ class TaskClass:
     def _read(self, rng: np.random.Generator) -> None:
         """Ranks of all rows at a random mechanism of the class, and a start there."""
         # random mechanisms of which the best one is the start
-        found, x = self.random_closed(rng, 12)
+        found, x = self.random_closed(rng, 6)
         self.start, self.x = found[0], x[:, 0]
         rows = self.at(self.start, self.x[:, None])
         J, B = rows.by_coordinates[..., 0], rows.by_unknowns[..., 0]
@@ -253,28 +253,36 @@ class TaskClass:
 
     def missed(self, rng: np.random.Generator) -> Array:
         """By how much every row ``(R,)`` that asks for numbers which follow from others is missed, each with dimensions of its own."""
-        of, out, T = self.full, np.zeros(self.R), 24
+        of, out, which = self.full, np.zeros(self.R), np.flatnonzero(self.followed)
         p, goal = of.problem, of.goal(of.problem.numbers)
         goal = ClassMember(goal.numbers, goal.drive.real)
-        for i in np.flatnonzero(self.followed).tolist():
+        # tries of each row, more where none of the first ones comes to rest
+        for tries in (6, 24) if which.size else ():
+            row = np.repeat(which, tries)
+            T = len(row)
             z = p.inside(p.unknowns.declared[:, None]) + rng.normal(size=(of.u, T))
-            moved = (not self._rests(i)) * rng.normal(size=(p.system.n_freedoms, T))
+            moved = ~np.array([self._rests(i) for i in row], dtype=bool) * rng.normal(size=(p.system.n_freedoms, T))
             rest = p.system.advance(p.at_rest[:, None], moved)
             states = np.concatenate([rest, np.zeros((of.nx - of.states, T))])
             norms = p.numbers.with_values(p.places, z).norms.reshape(-1, T)[: of.W]
-            x, free = np.concatenate([z, norms, *[states] * of.R]), of.free[i]
-            at = np.array([*range(of.u), *(of.head + i * of.F + free)])
-            # Newton steps, until one of all comes to rest there
+            x, left = np.concatenate([z, norms, *[states] * of.R]), np.full(T, np.inf)
+            # Newton steps, until one of each comes to rest there
             for _ in range(40):
-                rows = of.at(goal, x)
-                k = of.counted(rows.residual.shape[1], i)
-                out[i] = np.abs(rows.residual[i][:k]).max(axis=0).min()
-                if out[i] <= MODES.real_closed:
+                rows, step = of.at(goal, x), np.zeros((of.head + of.R * of.F, T))
+                for i in which.tolist():
+                    at, free = np.flatnonzero(row == i), of.free[i]
+                    k = of.counted(rows.residual.shape[1], i)
+                    open_ = rows.residual[i][:k, at]
+                    left[at] = np.abs(open_).max(axis=0)
+                    J = np.concatenate([rows.by_unknowns[i][:k, :, at], rows.by_coordinates[i][:k, free][..., at]], axis=1)
+                    own = np.array([*range(of.u), *(of.head + i * of.F + free)])
+                    step[np.ix_(own, at)] = least_norm_steps(J, open_, MODES.generic).real
+                out[which] = [left[row == i].min() for i in which]
+                if (out[which] <= MODES.real_closed).all():
                     break
-                J = np.concatenate([rows.by_unknowns[i][:k], rows.by_coordinates[i][:k, free]], axis=1)
-                step = np.zeros((of.head + of.R * of.F, T))
-                step[at] = least_norm_steps(J, rows.residual[i][:k], MODES.generic).real
                 x = of.advance(of.state(rows).real, step / np.maximum(1.0, np.abs(step).max(axis=0)))
+            if not (which := np.flatnonzero(out > MODES.real_closed)).size:
+                break
         return out
 
     def _by_condition(self, members: Sequence[ClassMember], x: Array) -> Index:

@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import sys
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
-from functools import partial
+from functools import lru_cache, partial
 from math import lcm, prod
 from pathlib import Path
 from typing import Any
@@ -338,18 +338,24 @@ def kept(of: TaskClass) -> TaskStart | None:
     return _read(labelling, cache_folder() / f"task-{key}.npz", "") or _read(labelling, PACKED, f"{key}/")
 
 
+@lru_cache(8)
+def _stored(file: Path, prefix: str, written: int) -> Mapping[str, Array]:
+    """The arrays of a set in a file as it was ``written`` last [ns]."""
+    with file.open("rb") as handle, np.load(handle, allow_pickle=False) as f:
+        return {name.removeprefix(prefix): f[name] for name in f.files if name.startswith(prefix)}
+
+
 def _read(labelling: TaskLabelling, file: Path, prefix: str) -> TaskStart | None:
     try:
-        with file.open("rb") as handle, np.load(handle, allow_pickle=False) as f:
-            loops, lost, followed, degree, samples = f[prefix + "counts"].tolist()
-            chance, last, beyond = f[prefix + "sizes"].tolist()
-            source, estimate = str(f[prefix + "source"]), str(f.get(prefix + "estimate", ""))
-            vectors = {name: f[prefix + name] for name in MARKER}
-            (each, K), stored = np.append(f[prefix + "each"], 1)[:2].tolist(), f[prefix + "x"]
-            if not np.iscomplexobj(stored):
-                stored = stored.astype(float) @ [1.0, 1.0j]
-                stored[:, f[prefix + "exactly"]] = f[prefix + "exact"]
-            member, x = labelling.taken(vectors, f[prefix + "drive"], stored)
+        f = _stored(file, prefix, file.stat().st_mtime_ns)
+        loops, lost, followed, degree, samples = f["counts"].tolist()
+        chance, last, beyond = f["sizes"].tolist()
+        source, estimate = str(f["source"]), str(f.get("estimate", ""))
+        (each, K), stored = np.append(f["each"], 1)[:2].tolist(), f["x"]
+        if not np.iscomplexobj(stored):
+            stored = stored.astype(float) @ [1.0, 1.0j]
+            stored[:, f["exactly"]] = f["exact"]
+        member, x = labelling.taken({name: f[name] for name in MARKER}, f["drive"], stored)
         alike = x.reshape(len(x), -1, K)
         # digits that were left out come back
         of, tracks = labelling.of, np.zeros(alike.shape[1], dtype=np.intp)

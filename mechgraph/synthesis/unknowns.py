@@ -267,7 +267,7 @@ def mattering(m: Mechanism, k: int, candidates: Sequence[str]) -> list[str]:
     numbers, side = declared(m), [place.side for place in places]
     vectors = [np.moveaxis(getattr(numbers, name)[side, :, k], 0, 1) for name in MARKER]
     twists = marker_twists(vectors, norms_of(*vectors[1:]), unit_rates(places))
-    told = _told(m, k, side[0]) @ twists[:, :, 0]
+    told = m.once(_told, k, side[0]) @ twists[:, :, 0]
     # all places of directions are counted alike, whatever the length of the declared vector
     size = np.abs(told).max(axis=0)
     told = told / np.where(size > MODES.span, size, 1.0) * (size > MODES.span)
@@ -276,7 +276,7 @@ def mattering(m: Mechanism, k: int, candidates: Sequence[str]) -> list[str]:
     return [known[i] for i in sorted(picked.tolist())]
 
 
-def _told(m: Mechanism, k: int, side: int) -> Array:
+def _told(k: int, side: int, m: Mechanism) -> Array:
     """Rows ``(n, 6)`` that vanish for twists of a pair's place, on both links or on that of a side, by which its motions stay the same."""
     pair = m.pairs[k]
     alone = Mechanism(pair.name, [m.link(pair.a), m.link(pair.b)], [pair], planar=m.planar)
