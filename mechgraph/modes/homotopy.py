@@ -478,19 +478,13 @@ class _March:
         (Adams and Bashforth with steps of their own; an interpolation of states would carry on what no correction touches.) Beyond it terms
         go on as the last ones do, in the ratio that fits these best: so they do where a branch point is near.
         """
-        widths = [self.s[0] - s for s in self.s[1:]]
-        table, out = list(self.v), h * self.v[0]
-        before = term = out
-        basis = np.array([np.zeros_like(h), np.ones_like(h)])  # coefficients of tau, lowest first
-        for k in range(1, RATES_KEPT):
-            gap = [np.where(self.known >= k, self.s[i] - self.s[i + k], 1.0) for i in range(RATES_KEPT - k)]
-            table = [(table[i] - table[i + 1]) / gap[i] for i in range(RATES_KEPT - k)]
-            powers = h[None] ** np.arange(2, len(basis) + 1)[:, None] / np.arange(2, len(basis) + 1)[:, None]
-            before, term = term, np.where(self.known >= k, table[0] * (basis[1:] * powers).sum(axis=0), 0.0)
-            out = out + term
-            lifted = np.concatenate([basis * widths[k - 1], np.zeros_like(h)[None]])
-            lifted[1:] += basis
-            basis = lifted
+        (s0, s1, s2), (v0, v1, v2), two, three = self.s, self.v, self.known >= 1, self.known >= 2
+        first, second, both = (np.where(known, gap, 1.0) for known, gap in ((two, s0 - s1), (three, s1 - s2), (three, s0 - s2)))
+        slope, half = (v0 - v1) / first, 0.5 * h * h
+        bend = (slope - (v1 - v2) / second) / both
+        before = np.where(two, slope * half, 0.0)
+        term = np.where(three, bend * (h**3 / 3.0 + first * half), 0.0)
+        out = h * v0 + before + term
         ratio = (before.conj() * term).sum(axis=0) / np.maximum((before * before.conj()).real.sum(axis=0), 1e-300)
         ratio *= np.minimum(1.0, 0.8 / np.maximum(np.abs(ratio), 0.8))
         return out + term * ratio / (1.0 - ratio)

@@ -37,7 +37,7 @@ class TaskClass:
     """Equations of a class of tasks, as ``modes.homotopy`` follows them: states are the unknowns ``z (u,)`` and those of all rows.
 
     ``free[i]`` are the freedoms of row ``i`` of which nothing is asked; rows of equal shape are eliminated together, in ``blocks``;
-    ``conditions (R,)`` are left for the unknowns; solutions of two runs are one where ``fingerprints``
+    ``conditions (R,)`` are left for the unknowns, of which ``matrix (u, u)`` is that of a random member at its solution ``x``; solutions of two runs are one where ``fingerprints``
     are less than ``apart``, against their size, from each other.
 
     Raises
@@ -230,8 +230,9 @@ class TaskClass:
             self._block(shape, [i for i, own in enumerate(shapes) if own == shape], n, rng)
             for shape in dict.fromkeys(shapes)
         ]
-        best = int(self._by_condition(found, x)[0])
-        self.start, self.x = found[best], x[:, best]
+        matrices = self._matrices(found, x)
+        best = int(_by_condition(matrices)[0])
+        self.start, self.x, self.matrix = found[best], x[:, best], matrices[best]
 
     def _leave_followers(self, J: Array, B: Array) -> None:
         """Ask nothing of numbers that follow from others of their row, whatever the mechanism: what they are is looked at in the end.
@@ -285,13 +286,13 @@ class TaskClass:
                 break
         return out
 
-    def _by_condition(self, members: Sequence[ClassMember], x: Array) -> Index:
-        """Numbers of members in the order of the condition of their unknowns at their solutions ``x (nx, n)``."""
+    def _matrices(self, members: Sequence[ClassMember], x: Array) -> Array:
+        """Matrices ``(n, u, u)`` of the unknowns of members at their solutions ``x (nx, n)``; of none but zeros ``(n, u, 0)``."""
         every = np.arange(len(members))
         if not (self.u and self.conditions.any()):
-            return every
+            return np.zeros((len(every), self.u, 0))
         joined = ClassMember.joined(members)
-        return np.argsort(np.linalg.cond(self.leg(joined, joined, every).at(x, np.zeros(len(every)), every).matrix))
+        return self.leg(joined, joined, every).at(x, np.zeros(len(every)), every).matrix
 
     def random_closed(self, rng: np.random.Generator, n: int) -> tuple[list[ClassMember], Array]:
         """Random mechanisms of the class at random positions: what they do there are tasks that they solve; their states ``(nx, n)``.
@@ -369,7 +370,7 @@ class TaskClass:
         NoClass
         """
         found, x = self.random_closed(rng, 3 * n)
-        return [found[i] for i in self._by_condition(found, x)[:n]]
+        return [found[i] for i in _by_condition(self._matrices(found, x))[:n]]
 
     def counted(self, n: int, i: int) -> int:
         """How many of ``n`` equations, order by order, count at a row: of no higher order than is asked there."""
@@ -535,6 +536,11 @@ def _closed(system: System, x: Array) -> tuple[Array, Array]:
             if not going.size:
                 break
         return out, Configuration(system, out).closure
+
+
+def _by_condition(matrices: Array) -> Index:
+    """Numbers of matrices ``(n, ., .)`` in the order of their condition."""
+    return np.argsort(np.linalg.cond(matrices)) if matrices.size else np.arange(len(matrices))
 
 
 def _rank(A: Array) -> int:

@@ -711,6 +711,8 @@ def _closed_real(of: TaskClass, goal: ClassMember, x: Array) -> tuple[Array, Arr
         for _ in range(8):
             step = here.newton(here.idle()).real
             here = here.again(of.advance(here.x, step).real.astype(complex))
+            if of.size(here.x, step).max() < MODES.real_closed:
+                break
     error, size = of.error(here.rows), np.maximum(1.0, np.abs(x[: of.u]).max(axis=0, initial=0.0))
     moved = np.abs(here.x[: of.u] - x[: of.u]).max(axis=0, initial=0.0)
     good = (moved < MODES.real_singular * size) & (of.size(here.x, step) < np.sqrt(MODES.real_closed))

@@ -137,10 +137,7 @@ class Synthesis:
             )
         names = [p.unknowns.names[k] for k in p.sought]
         if wanted == p.u:
-            at = np.zeros(1, dtype=np.intp)
-            _, sigma, V = np.linalg.svd(
-                self.of.leg(self.of.start, self.of.start).at(self.of.x[:, None], np.zeros(1), at).matrix[0]
-            )
+            _, sigma, V = np.linalg.svd(self.of.matrix)
             idle = V[int((sigma > MODES.generic * sigma[0]).sum()) :] if p.u else V
             if not len(idle):
                 return
