@@ -31,8 +31,10 @@ from mechgraph.kinematics import assembly
 from mechgraph.kinematics.prescribed import DriverMotion
 from mechgraph.kinetostatics import Pipeline
 from mechgraph.modes import compiled_tracks
+from mechgraph.modes.circuits import Circuits
 from mechgraph.modes.homotopy import Leg, Ways
 from mechgraph.outcome import Options
+from mechgraph.synthesis import fitness
 from mechgraph.synthesis.classes import TaskClass
 from mechgraph.synthesis.fits import Fit
 from mechgraph.synthesis.legs import Arrow, CompiledArrow, TaskLeg
@@ -592,6 +594,23 @@ def test_the_kernel_closes_rows_of_fits_as_numpy_does(name: str) -> None:
         a, b = (v[:, came] if what == "x" else v[came] for v in (a, b))
         assert near(a, b, 1e-11)
     assert np.abs(here.residual[came]).max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    "name", ["four-bar function, 5 pairs", "R-Sp-R function, 6 pairs", "geared five-bar path, 3 points, timed"]
+)
+def test_circuits_have_the_steps_and_motions_of_numpy(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = list[Circuits]()
+    monkeypatch.setattr(fitness, "Circuits", lambda *of: made.append(Circuits(*of)) or made[-1])
+    m, task, unknown, _ = LADDER[name]()
+    found = mg.synthesize(m, task, unknown)
+    assert all(one.branch is not None for one in found.fitness)
+    of = made[0]
+    aside = of.s.advance(of.a.x, 1e-6 * np.random.default_rng(0).normal(size=(of.s.n_freedoms, of.a.x.shape[1])))
+    (fast, here), of.compiled = of.at(aside, of.a.case), None
+    plain, there = of.at(aside, of.a.case)
+    assert near(fast, plain, 1e-4)
+    assert np.abs(np.abs((here.t * there.t).sum(axis=0)) - 1.0).max() < 1e-9
 
 
 def test_curves_of_rates_are_led_by_numpy() -> None:

@@ -1,6 +1,4 @@
-"""Tracks and circuits in the kernel: what ``kernel/tracks.c`` needs of a class of mechanisms, of their ways and states; closure rows of many
-mechanisms at once.
-"""
+"""Tracks in the kernel: what ``kernel/tracks.c`` needs of a class of mechanisms, of their ways and states; closure rows for circuits."""
 
 from __future__ import annotations
 

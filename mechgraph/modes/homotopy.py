@@ -479,7 +479,9 @@ class _March:
         go on as the last ones do, in the ratio that fits these best: so they do where a branch point is near.
         """
         (s0, s1, s2), (v0, v1, v2), two, three = self.s, self.v, self.known >= 1, self.known >= 2
-        first, second, both = (np.where(known, gap, 1.0) for known, gap in ((two, s0 - s1), (three, s1 - s2), (three, s0 - s2)))
+        first, second, both = (
+            np.where(known, gap, 1.0) for known, gap in ((two, s0 - s1), (three, s1 - s2), (three, s0 - s2))
+        )
         slope, half = (v0 - v1) / first, 0.5 * h * h
         bend = (slope - (v1 - v2) / second) / both
         before = np.where(two, slope * half, 0.0)

@@ -37,8 +37,8 @@ class TaskClass:
     """Equations of a class of tasks, as ``modes.homotopy`` follows them: states are the unknowns ``z (u,)`` and those of all rows.
 
     ``free[i]`` are the freedoms of row ``i`` of which nothing is asked; rows of equal shape are eliminated together, in ``blocks``;
-    ``conditions (R,)`` are left for the unknowns, of which ``matrix (u, u)`` is that of a random member at its solution ``x``; solutions of two runs are one where ``fingerprints``
-    are less than ``apart``, against their size, from each other.
+    ``conditions (R,)`` are left for the unknowns, of which ``matrix (u, u)`` is that of a random member at its solution ``x``; solutions of
+    two runs are one where ``fingerprints`` are less than ``apart``, against their size, from each other.
 
     Raises
     ------
@@ -262,7 +262,7 @@ class TaskClass:
             row = np.repeat(which, tries)
             T = len(row)
             z = p.inside(p.unknowns.declared[:, None]) + rng.normal(size=(of.u, T))
-            moved = ~np.array([self._rests(i) for i in row], dtype=bool) * rng.normal(size=(p.system.n_freedoms, T))
+            moved = np.array([not self._rests(i) for i in row.tolist()]) * rng.normal(size=(p.system.n_freedoms, T))
             rest = p.system.advance(p.at_rest[:, None], moved)
             states = np.concatenate([rest, np.zeros((of.nx - of.states, T))])
             norms = p.numbers.with_values(p.places, z).norms.reshape(-1, T)[: of.W]
@@ -275,7 +275,9 @@ class TaskClass:
                     k = of.counted(rows.residual.shape[1], i)
                     open_ = rows.residual[i][:k, at]
                     left[at] = np.abs(open_).max(axis=0)
-                    J = np.concatenate([rows.by_unknowns[i][:k, :, at], rows.by_coordinates[i][:k, free][..., at]], axis=1)
+                    J = np.concatenate(
+                        [rows.by_unknowns[i][:k, :, at], rows.by_coordinates[i][:k, free][..., at]], axis=1
+                    )
                     own = np.array([*range(of.u), *(of.head + i * of.F + free)])
                     step[np.ix_(own, at)] = least_norm_steps(J, open_, MODES.generic).real
                 out[which] = [left[row == i].min() for i in which]
