@@ -150,8 +150,8 @@ class CompiledClosure:
     """Closure rows of a system's cases in the kernel; their loops are those that chords close, about the chords."""
 
     def __init__(self, system: System) -> None:
-        none = np.zeros(0, dtype=np.intp)
-        made = tables(layout(system, none, []), system, np.zeros((system.n_state, system.par.batch)), None)
+        start = np.repeat(system.start_coordinates(system.m.start)[:, None], system.par.batch, axis=1)
+        made = tables(layout(system, np.zeros(0, dtype=np.intp), []), system, system.state_of(start), None)
         assert made is not None
         self.I, self.P = made
         self.shape = system.n_rows, system.n_freedoms
