@@ -368,7 +368,10 @@ class Synthesis:
         return p.first.back(m).replace(start=begin), q[:, :F], p.first.poses_of(here)
 
     def _fitness(self, made: list[Mechanism], q: Array) -> list[Fitness]:
-        return fitnesses(made, q, *driver_of(self.problem.m, self.tasks))
+        asked = self.problem.tasks
+        # rates are met in one way alone
+        values = asked.values if asked and not asked.rates else None
+        return fitnesses(made, q, *driver_of(self.problem.m, self.tasks), asked=values)
 
 
 CLOSED_TO = 1e-10
