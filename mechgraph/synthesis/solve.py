@@ -128,12 +128,14 @@ class TaskPencil:
     def __init__(self, equations: TaskClass, base: ClassMember, rng: np.random.Generator) -> None:
         self.of, self.base = equations, base
         open_, length = movable(equations), equations.is_length
-        row = int(np.argmax(np.where(open_.any(axis=1), equations.conditions, -1)))
+        # any row of those with as many conditions, any angle: of some, poles are too far away to be told
+        most = np.where(open_.any(axis=1), equations.conditions, -1)
+        row = int(rng.choice(np.flatnonzero(most == most.max())))
         other = equations.random_members(rng, 1)[0].drive[row, :, 0] - base.drive[row, :, 0]
         part = rng.normal(size=2) @ [0.7, 0.7j]
         # one angle, or lengths alone: rational functions of several angles are of much higher degrees
         given = open_[row]
-        moves = given & length if (given & length).any() else np.arange(len(given)) == np.argmax(given)
+        moves = given & length if (given & length).any() else np.arange(len(given)) == rng.choice(np.flatnonzero(given))
         s, F = equations.problem.system, equations.problem.system.n_freedoms
         self.parts = _parts_of_turns(equations) if np.isin(equations.columns[moves], s.coupled_freedoms).any() else 1
         grown = np.where(length, other, np.exp(1j / self.parts * np.where(length, 0.0, other)) - 1.0)
