@@ -388,8 +388,14 @@ RANGE = sys.maxsize
 
 def _unfit(value: Any, what: str, wanted: Wanted) -> str:
     """The fault of an argument; of several where one is wanted, as results are, that it is several."""
-    if isinstance(value, Sequence) and not isinstance(value, str) and len(value) and wanted.fits(value[0]):
-        return f"{what}: {type(value).__name__}, {len(value)} in all; expected one of these, such as [0]"
+    if (
+        isinstance(value, Sequence)
+        and not isinstance(value, str | list | tuple)
+        and len(value)
+        and wanted.fits(value[0])
+    ):
+        one = wanted.words.partition(";")[0]
+        return f"{what}: {type(value).__name__} of {len(value)}; expected {one}, such as the first of these, [0]"
     return wrong(value, what, wanted.words)
 
 

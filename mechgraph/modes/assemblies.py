@@ -29,18 +29,19 @@ from mechgraph.memo import dataclass
 from mechgraph.model.gears import moving_lines
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.certificate import TINY, Certificate, certificate, told_apart
-from mechgraph.modes.family import (
-    NO_NUMBERS,
-    Array,
-    Family,
-    Nearby,
-    at_rest,
-    irregular,
-    least_value,
-    searched,
-)
+from mechgraph.modes.family import NO_NUMBERS, Array, Family, Nearby, at_rest, irregular, least_value, searched
 from mechgraph.modes.form import EquationForm, RodChain, Whole, WithoutRods, rods_of
-from mechgraph.modes.start_sets import Irregular, StartSet, bound, distinct, keep, kept, start_set
+from mechgraph.modes.start_sets import (
+    NOT_TESTED,
+    Irregular,
+    StartSet,
+    bound,
+    distinct,
+    keep,
+    kept,
+    start_set,
+    tested,
+)
 from mechgraph.modes.targets import (
     MOST_FOLLOWED,
     Ends,
@@ -540,7 +541,7 @@ class Finder:
         self.question, self.progress, self._most = question, progress, most
         self.form: EquationForm = question.form
         self.family = self.form.family
-        self.rng, self.cache = np.random.default_rng(seed), cache
+        self.rng, self.cache, self._again = np.random.default_rng(seed), cache, seed != 0
         self.fault = self.family.fault
 
     @cached_property
@@ -567,7 +568,7 @@ class Finder:
     def _start(self, family: Family) -> StartSet:
         known = kept(family) if self.cache else None
         if known is not None:
-            return known
+            return tested(family, known, self.rng, self.progress) if self._again else known
         made = start_set(family, self.rng, self.progress)
         if self.cache and made.whole:
             keep(family, made)
@@ -774,7 +775,7 @@ def _of_class(family: Family, start: StartSet) -> tuple[str, tuple[str, ...]]:
     if known is not None and known.count == N:
         return "proved", (f"The class has at most {N}: {known.source}.",)
     if not trace.passed:
-        return "searched", (loops, "No trace test passed; solutions may be missing.")
+        return "searched", (loops, NOT_TESTED)
     words = (
         f"Trace test passed: over {trace.samples} random mechanisms of the class a sum over all assemblies is a rational function of "
         f"degree {trace.degree} (the singular values of its Loewner matrix end there: {trace.last:.1g}, {trace.beyond:.1g})."

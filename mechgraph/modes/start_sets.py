@@ -52,6 +52,7 @@ from __future__ import annotations
 import zipfile
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -233,6 +234,8 @@ class Trace:
 
 NOT_PASSED = Trace(-1, 0, 1.0, 1.0)
 """No trace test was passed."""
+NOT_TESTED = "No trace test passed; solutions may be missing. A call with another seed tries it again."
+"""What is said of that."""
 
 
 def trace_test(
@@ -686,3 +689,16 @@ def keep(family: Family, start: StartSet) -> None:
             np.savez_compressed(handle, **arrays(labelling, start))
     except (OSError, RuntimeError, MechgraphError):
         return
+
+
+def tested(
+    family: Family, known: StartSet, rng: np.random.Generator, progress: Callable[[str], None] | None
+) -> StartSet:
+    """A kept start set, the trace test of which is tried again where it passed none."""
+    met = bound(family)
+    if not known.whole or known.trace.passed or (met is not None and met.count == known.x.shape[1]):
+        return known
+    known = replace(known, trace=trace_test(Equations(family, known.mixing), known.member, known.x, rng, progress))
+    if known.trace.passed:
+        keep(family, known)
+    return known
