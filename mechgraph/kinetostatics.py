@@ -876,7 +876,7 @@ def _wrenches(s: Solution, link: str, guide: str) -> list[tuple[Array, Array, Ar
         if link in (pair.a, pair.b) and pair.name != guide:
             # totals act on link b, forces of gears on the second one
             total = s[pair.name].total if link == pair.b else -s[pair.name].total
-            p = s.contact(pair.name).center if pair.type.touching else _pair_point(s, m.pair_index[pair.name])
+            p = s.contact(pair.name).center if pair.type.touching else s._values.frame_origin(m.pair_index[pair.name])
             found.append((total[..., 3:], total[..., :3] - np.cross(p, total[..., 3:]), p))
     for coupling in m.couplings:
         if coupling.steps and link in (gears := coupling.gears(m)):
@@ -885,13 +885,6 @@ def _wrenches(s: Solution, link: str, guide: str) -> list[tuple[Array, Array, Ar
             force = result.force if link == gears[1] else -result.force
             found.append((force, np.zeros_like(force), result.point))
     return found
-
-
-def _pair_point(s: Solution, pair: int) -> Array:
-    """Origin of the marker of a pair on link b, of every variant its own, global ``(..., 3)``."""
-    values = s._values
-    found = values._evaluated(lambda block: block.here.pair_points[:, pair])
-    return values._out(values._system.par.L * found + values._system.par.origin.reshape(3, 1))
 
 
 def _size(v: Array) -> Array:

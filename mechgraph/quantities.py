@@ -386,6 +386,19 @@ RANGE = sys.maxsize
 """Whole numbers up to this one count and index something."""
 
 
+def _unfit(value: Any, what: str, wanted: Wanted) -> str:
+    """The fault of an argument; of several where one is wanted, as results are, that it is several."""
+    if (
+        isinstance(value, Sequence)
+        and not isinstance(value, str | list | tuple)
+        and len(value)
+        and wanted.fits(value[0])
+    ):
+        one = wanted.words.partition(";")[0]
+        return f"{what}: {type(value).__name__} of {len(value)}; expected {one}, such as the first of these, [0]"
+    return wrong(value, what, wanted.words)
+
+
 class Wanted(NamedTuple):
     """What an argument must be: a check, and the words for it."""
 
@@ -431,7 +444,7 @@ def door(function: Callable[P, R]) -> Callable[P, R]:
                     bound[name] = tuple(bound[name])
                     args, named = given.args, given.kwargs  # type: ignore[assignment]
         faults = [
-            wrong(value, SPOKEN.get(name, name), one.words)
+            _unfit(value, SPOKEN.get(name, name), one)
             for name, value in bound.items()
             if (one := wanted[name]) is not None and not one.fits(value)
         ]

@@ -41,6 +41,7 @@ WRONG = {
     "formulate in a list": (lambda: mg.formulate(M, ["lee"]), "bookkeeping = "),
     "formulate for something else": (lambda: mg.formulate(M, unknowns="all"), "unknowns = 'all'"),
     "formulate with one effort": (lambda: mg.formulate(M, efforts="A"), "efforts = 'A'"),
+    "save several": (lambda: mg.save(mg.assemblies(mg.load("four-bar"), {"A": 0.5}), "x.toml"), "such as the first of these"),
     "save a name": (lambda: mg.save("four-bar", "x.toml"), "expected a Mechanism"),
     "save to a number": (lambda: mg.save(M, 3), "path = 3"),
     "load a number": (lambda: mg.load(3), "name = 3"),

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ladder import four_bar
 from mechanisms import Z, bennett, linked_four_bar, ring
 
 import mechgraph as mg
@@ -645,8 +646,29 @@ def test_rational_functions_are_told_from_others() -> None:
     poles = rng.normal(size=(7, 2)) @ [1.0, 1.0j]
     exact = rational(z, (1.0 / (z[:, None] - poles)).sum(axis=1), np.ones(60))
     assert exact.degree == 7
-    for other in (np.sqrt(z - poles[0]), np.exp(z), np.log(z), z.conj()):
+    # of the last one nothing varies but the last digit of a value, which a function of low degree would do too
+    still = 5.0 + 0j * z
+    still[7] = np.nextafter(5.0, 6.0)
+    for other in (np.sqrt(z - poles[0]), np.exp(z), np.log(z), z.conj(), still):
         assert not rational(z, other, np.ones(60)).passed
+
+
+def test_what_passed_no_trace_test_is_tried_again_with_another_seed(
+    empty: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of assemblies and of syntheses: kept as what was searched for; passed once it stays so."""
+    loop, four = general("RRRSR"), four_bar()
+    task = mg.function("A", "D", [[0.0, 0.0], [0.3, 0.2], [0.7, 0.5]])
+
+    def words(seed: int) -> list[str]:
+        one = mg.synthesize(four, task, ["C.point"], seed=seed)
+        return [mg.assemblies(loop, {"O1": 0.1}, seed=seed).completeness, one.completeness]
+
+    with monkeypatch.context() as failing:
+        for module in ("synthesis.solve", "modes.start_sets"):
+            failing.setattr(f"mechgraph.{module}.trace_test", lambda *_: start_sets.NOT_PASSED)
+        assert [words(seed) for seed in (0, 1)] == [["searched"] * 2] * 2
+    assert [words(seed) for seed in (0, 1, 0)] == [["searched"] * 2, ["tested"] * 2, ["tested"] * 2]
 
 
 def test_samples_beside_poles_tell_a_rational_function_and_no_other() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import deepcopy
+from itertools import pairwise
 
 import machines
 import numpy as np
@@ -16,7 +17,7 @@ from mechgraph.kinematics.system import indexed
 from mechgraph.maths.se3 import quaternion_matrix, rotation_exp
 from mechgraph.modes.assemblies import Finder, Question
 from mechgraph.modes.family import Member, searched
-from mechgraph.modes.form import _two_turns, least_turn, rods_of
+from mechgraph.modes.form import least_turn, rods_of, two_turns
 from mechgraph.modes.homotopy import Equations, Leg
 from mechgraph.modes.start_sets import bound, distinct
 from mechgraph.modes.targets import Ends, TrackRun, _account, ends
@@ -31,24 +32,33 @@ def states(q: Question, modes: mg.Assemblies) -> np.ndarray:
 
 @pytest.mark.slow
 def test_a_hexapod_has_forty_assemblies_whatever_carries_its_legs() -> None:
-    """Balls at both ends, or universal joints at the feet: eight real postures, the same ones."""
+    """Balls at both ends, or universal joints at the feet, each leg in two ways then: eight real postures, the same ones."""
     found = []
-    for legs in ("SPS", "UPS"):
+    for legs, ways in (("SPS", 1), ("UPS", 64)):
         m = hexapod(legs)
         at = {f"P{k}": 0.02 * k for k in range(1, 7)}
         modes, q = mg.assemblies(m, at), Question(m, at)
-        assert (modes.total, len(modes) + len(modes.complex), modes.completeness) == (40, 40, "proved")
+        count = len(modes) + len(modes.complex)
+        assert (modes.total, count, modes.completeness) == (40 * ways, 40 * ways, "proved")
+        assert (len(modes), str(modes).count("regular")) == (8 * ways, 8)
         assert all(sure is not None and sure.proved and sure.apart > 0 for sure in modes.certificates)
         assert Configuration(q.system, states(q, modes)).closure.max() < 1e-12
-        assert any("two ways" in line for line in modes.evidence) == (legs == "UPS")
+        assert any("64 ways" in line for line in modes.evidence) == (legs == "UPS")
+        prints = q.family.prints(Configuration(q.system, states(q, modes)))
+        assert len(distinct(prints)) == len(modes)
         found.append(modes)
     platform = [link.name for link in m.links].index("platform")
-    both = [np.sort_complex(modes.poses[:, platform, 0, 3] + 1j * modes.poses[:, platform, 1, 3]) for modes in found]
-    assert len(both[0]) == len(both[1]) > 2
+    both = [
+        np.sort_complex(
+            modes.poses[: modes.postures, platform, 0, 3] + 1j * modes.poses[: modes.postures, platform, 1, 3]
+        )
+        for modes in found
+    ]
+    assert len(both[0]) == len(both[1]) == 8
     assert np.abs(both[0] - both[1]).max() < 1e-9
-    # the assembly in which it is declared, legs as they stand there
+    # the assembly in which it is declared, legs as they stand there, is among the first
     home = mg.assemblies(m, {f"P{k}": 0.0 for k in range(1, 7)})
-    assert np.abs(home.coordinates).max(axis=1).min() < 1e-9
+    assert np.abs(home.coordinates[: home.postures]).max(axis=1).min() < 1e-9
 
 
 def test_assemblies_that_are_not_real_close_the_loops_too() -> None:
@@ -67,6 +77,50 @@ def test_assemblies_that_are_not_real_close_the_loops_too() -> None:
             at = np.append(head, 1.0)
             top = modes.complex.poses[:, index["platform"]]
             assert (np.abs((tube - top) @ at).max(axis=1) < 1e-8 * np.abs(top).max(axis=(1, 2)) ** 2).all()
+
+
+def turned_leg(second: np.ndarray, *, split: bool = False, back: bool = False) -> mg.Mechanism:
+    """A crank and a rocker joined by a leg on two turns, the first about ``(0.3, 0.2, 1)``; ``split``: with a link between these."""
+    ends, axes = (
+        (("leg", "crank") if back else ("crank", "leg")),
+        [np.array((0.3, 0.2, 1.0)), second][:: -1 if back else 1],
+    )
+    joint = [mg.Pair("U", "U", *ends, point=NEAR, axis=axes[0], second=axes[1])]
+    if split:
+        joint = [
+            mg.Pair(f"U{i}", "R", *of, point=NEAR, axis=axes[i])
+            for i, of in enumerate(pairwise([ends[0], "cross", ends[1]]))
+        ]
+    pairs = [
+        mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=(0.1, 0.2, 1)), *joint,
+        mg.Pair("B", "S", "leg", "rocker", point=FAR),
+        mg.Pair("G", "R", "rocker", "frame", point=(1, 3, 0), axis=(0.3, 0.1, 1)),
+    ]  # fmt: skip
+    return mg.Mechanism("leg", pairs=pairs, drives=["A"], frame="frame")
+
+
+@pytest.mark.daily(1)
+@pytest.mark.parametrize("back", [False, True])
+@pytest.mark.parametrize("slope", [0.0, 0.3, 1.0])
+def test_both_ways_of_two_turns_are_those_of_two_pairs_with_a_link_between(slope: float, back: bool) -> None:
+    """Where the leg lies across the second turn it comes everywhere, where it does not, to a part of all directions: not real beyond."""
+    first = np.array((0.3, 0.2, 1.0))
+    second = np.cross(first, FAR - NEAR)
+    second = second + slope * np.cross(first, second)
+    whole, split = (turned_leg(second, split=cut, back=back) for cut in (False, True))
+    for angle in (0.1, 1.2, 2.2):
+        modes, others = (mg.assemblies(m, {"A": angle}) for m in (whole, split))
+        assert (modes.total, modes.completeness) == (others.total, "proved") == (4, "proved")
+        assert (len(modes), len(modes.complex), 2 * modes.postures) == (len(others), len(others.complex), len(modes))
+        at = [[link.name for link in m.links].index("leg") for m in (whole, split)]
+        one, other = (of.poses[:, i].reshape(-1, 16) for of, i in zip((modes, others), at, strict=True))
+        gaps = np.abs(one[:, None] - other[None]).max(axis=2)
+        assert max(gaps.min(axis=0).max(initial=0.0), gaps.min(axis=1).max(initial=0.0)) < 1e-9
+    maps = [mg.branches(m, "A", samples=8, points=80) for m in (whole, split)]
+    for one, other in zip(*(sorted(f.value for f in b.folds) for b in maps), strict=True):
+        assert abs(one - other) < 1e-6
+    assert [len(b.circuits) for b in maps] == [2, 2] if slope < 1 else len(maps[0]) == len(maps[1])
+    assert maps[0].completeness == ("tested" if slope == 1 else "proved")
 
 
 @pytest.mark.daily(1)
@@ -226,9 +280,11 @@ def test_balls_and_two_turns_point_where_they_shall() -> None:
         return np.einsum("ijt,jkt,k->it", first, second, of[:, 0])
 
     to = turned(angles)
-    found = _two_turns(row, of, to, angles.astype(complex))
+    near = np.zeros(50, dtype=bool)
+    found = two_turns(row, of, to, angles.astype(complex), near)
     assert np.abs(found - angles).max() < 1e-9
-    other = _two_turns(row, of, to, angles + np.pi + 0j)
+    other = two_turns(row, of, to, angles.astype(complex), ~near)
+    assert np.abs(other - angles).max(axis=0).min() > 1e-3
     assert np.abs(turned(other.real) - to).max() < 1e-9
     assert np.abs(other.imag).max() < 1e-9
     begin = rng.normal(size=(4, 50))

@@ -227,6 +227,10 @@ def test_what_is_not_served_is_refused_by_name() -> None:
     )
     with pytest.raises(mg.DeclarationError, match="pair A: ties an angle to a length"):
         mg.synthesize(screw, mg.positions([{"B": 0}, {"B": 0.1}]), ["A.pitch"])
+    # declared or not
+    for name in ("coupler.mass", "coupler.center.x"):
+        with pytest.raises(mg.DeclarationError, match=f"'{name}': stands in no equation of closure"):
+            mg.synthesize(four_bar(), mg.function("A", "D", pairs), [name])
 
 
 def test_numbers_that_change_nothing_together_are_told() -> None:

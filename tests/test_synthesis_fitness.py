@@ -260,3 +260,36 @@ def test_the_transmission_of_spheres_on_planes_and_in_grooves_is_that_of_a_solut
                 wanted.append(float(angle.min()))
         found = [one.transmission for one in fitnesses(made, np.array(q), "O", output)]
         assert np.abs(np.array(found) - wanted).max() < 1e-12
+
+
+def test_a_leg_that_stands_the_other_way_at_a_row_is_no_defect() -> None:
+    """A function does not ask in which way a universal joint stands: the branch through the first row meets the others."""
+    far, axis = np.array((1.5, 2, 0.8)), (0.3, 0.2, 1)
+    pairs = [
+        mg.Pair("A", "R", "frame", "crank", point=(0, 0, 0), axis=(0.1, 0.2, 1)),
+        mg.Pair("U", "U", "crank", "leg", point=(1, 0, 0.1), axis=axis, second=np.cross(far - (1, 0, 0.1), axis)),
+        mg.Pair("B", "S", "leg", "rocker", point=far),
+        mg.Pair("G", "R", "rocker", "frame", point=(1, 3, 0), axis=(0.3, 0.1, 1)),
+    ]
+    m = mg.Mechanism("leg", pairs=pairs, drives=["A"], frame="frame")
+    b, output = mg.branches(m, "A", samples=6, points=60), m.freedom_names().index("G.Rz")
+    rows = b.branches[0].coordinates[[8, 13, 18]]
+    # of others at the same place of the crank the one that has the same place of the rocker, and one that has not
+    modes = mg.assemblies(m, {"A": rows[1, 0]})
+    gaps = [abs(np.sin(0.5 * (mode.start["G.Rz"] - rows[1, output]))) for mode in modes]
+    near = [mode for mode, gap in zip(modes, gaps, strict=True) if gap < 1e-9]
+    turned = max(near, key=lambda mode: abs(np.sin(0.5 * (mode.start["U.Rz"] - rows[1, 1]))))
+    other, wrong = rows.copy(), rows.copy()
+    other[1], wrong[1] = (list(mode.start.values()) for mode in (turned, modes[int(np.argmax(gaps))]))
+    asked = {"A.Rz": rows[:, 0], "G.Rz": rows[:, output]}
+    assert len(near) == 2
+    plain = fitness(m, rows, "A", "G")
+    assert fitness(m, other, "A", "G").circuit
+    (found,) = fitnesses([m], other[None], "A", "G", asked=asked)
+    assert (found.branch, found.circuit, found.order) == (plain.branch, plain.circuit, plain.order) == (False,) * 3
+    assert abs(found.transmission - plain.transmission) < 1e-9
+    # where the output is asked to be elsewhere, this is a defect; nothing is asked at the second row
+    (found,) = fitnesses([m], wrong[None], "A", "G", asked=asked | {"G.Rz": wrong[:, output]})
+    assert found.branch
+    (found,) = fitnesses([m], wrong[None], "A", "G", asked=asked | {"G.Rz": rows[:, output] * [1, np.nan, 1]})
+    assert not found.branch

@@ -16,7 +16,8 @@ from mechgraph.files import VERSION, Json, json_text, object_schema, patch, plai
 from mechgraph.kinetostatics import TransmissionData
 from mechgraph.memo import dataclass
 from mechgraph.model.toml import to_data
-from mechgraph.modes.assemblies import AssembliesData, BranchesData
+from mechgraph.modes.assemblies import AssembliesData
+from mechgraph.modes.branches import BranchesData
 from mechgraph.response.respond import ResponseData
 from mechgraph.result.over_time import OverTimeData
 from mechgraph.result.summary import SolutionData

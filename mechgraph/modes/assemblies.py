@@ -29,18 +29,19 @@ from mechgraph.memo import dataclass
 from mechgraph.model.gears import moving_lines
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.certificate import TINY, Certificate, certificate, told_apart
-from mechgraph.modes.family import (
-    NO_NUMBERS,
-    Array,
-    Family,
-    Nearby,
-    at_rest,
-    irregular,
-    least_value,
-    searched,
-)
+from mechgraph.modes.family import NO_NUMBERS, Array, Family, Nearby, at_rest, irregular, least_value, searched
 from mechgraph.modes.form import EquationForm, RodChain, Whole, WithoutRods, rods_of
-from mechgraph.modes.start_sets import Irregular, StartSet, bound, distinct, keep, kept, start_set
+from mechgraph.modes.start_sets import (
+    NOT_TESTED,
+    Irregular,
+    StartSet,
+    bound,
+    distinct,
+    keep,
+    kept,
+    start_set,
+    tested,
+)
 from mechgraph.modes.targets import (
     MOST_FOLLOWED,
     Ends,
@@ -88,53 +89,11 @@ class AssembliesData:
     infinite: Annotated[int, "how many of these lie at infinity here"]
     on_continua: Annotated[int, "how many of these lie on continua here"]
     complex: Annotated[int, "how many are not real"]
+    postures: Annotated[
+        int, "how many of the modes, the first ones, differ by more than the ways of legs on universal joints"
+    ]
     continua: tuple[ContinuumData, ...]
     modes: tuple[ModeData, ...]
-
-
-@dataclass(frozen=True)
-class BranchData:
-    """A branch: its interval of the driver, and the range of every freedom."""
-
-    interval: tuple[float, float]
-    full_turn: Annotated[bool | None, "null where an end could not be told"]
-    turns: Annotated[int, "turns of the driver that bring it back"]
-    circuit: int
-    ranges: Mapping[str, tuple[float, float]]
-
-
-@dataclass(frozen=True)
-class Fold:
-    """Where two branches meet and the driver has to turn back."""
-
-    value: float
-    sense: Annotated[int, "1 at an upper limit, -1 at a lower one"]
-    branches: tuple[int, int]
-    fastest: Annotated[str, "the freedom that moves most there, while the driver stands still"]
-
-
-@dataclass(frozen=True)
-class Bifurcation:
-    """Where branches cross: all that meet there."""
-
-    value: float
-    branches: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class BranchesData:
-    """All branches over a driver."""
-
-    mechanism: str
-    driver: str
-    completeness: Annotated[str, "proved, tested or searched"]
-    evidence: Annotated[tuple[str, ...], "what that rests on between samples"]
-    resolution: Annotated[float, "distance of the samples"]
-    open_ends: Annotated[int, "ends of branches that could not be told"]
-    branches: tuple[BranchData, ...]
-    folds: tuple[Fold, ...]
-    bifurcations: tuple[Bifurcation, ...]
-    circuits: Annotated[tuple[tuple[int, ...], ...], "branches of each"]
 
 
 @dataclass(frozen=True)
@@ -192,6 +151,9 @@ class Assemblies(Shown, Sequence[Mechanism]):
         Solutions of a generic member of the class; ``infinite`` of them diverged here, ``on_continua`` ended on self-motions.
     continua : tuple
         Self-motions with the drivers fixed; ``completeness`` does not cover them.
+    postures : int
+        Number of modes but for the two ways in which legs on universal joints stand: ``modes[:modes.postures]`` are those in which all
+        such legs are as near to the start as they can be. The others differ in these legs alone, and are not drawn or shown in tables.
 
     Examples
     --------
@@ -216,6 +178,7 @@ class Assemblies(Shown, Sequence[Mechanism]):
     infinite: int
     on_continua: int
     continua: tuple[Continuum, ...]
+    postures: int
 
     def __len__(self) -> int:
         return len(self.modes)
@@ -239,7 +202,7 @@ class Assemblies(Shown, Sequence[Mechanism]):
         names = [f"{name} [deg]" if m.turns(name) else name for name in shown]
         header = ("mode", *names, "kind", "condition", "unique within")
         rows = []
-        for i, kind in enumerate(self.kinds):
+        for i, kind in enumerate(self.kinds[: self.postures]):
             sure = self.certificates[i]
             word = "none" if sure is None else f"{sure.radius:.2g}" if sure.proved else "not proved"
             rows.append(
@@ -259,6 +222,8 @@ class Assemblies(Shown, Sequence[Mechanism]):
             f"Continuum of dimension {one.dimension}: {', '.join(one.moves)} move with the drivers at rest."
             for one in self.continua
         ]
+        if len(rows) < len(self):
+            moving.append(f"{len(self) - len(rows)} more are the same with legs the other way.")
         words = " ".join([*moving, f"Completeness: {self.completeness}.", *self.evidence])
         return Document(title, (Table(header, tuple(rows)), Paragraph(words)))
 
@@ -275,7 +240,10 @@ class Assemblies(Shown, Sequence[Mechanism]):
         MissingExtraError
             Without matplotlib.
         """
-        drawn = [*zip(self.modes, self.kinds, strict=True), *((one.point, "continuum") for one in self.continua)]
+        drawn = [
+            *zip(self[: self.postures], self.kinds, strict=False),
+            *((one.point, "continuum") for one in self.continua),
+        ]
         return methods.call("draw_side_by_side", self.mechanism, drawn, "there is no real assembly to draw")
 
     @property
@@ -291,6 +259,7 @@ class Assemblies(Shown, Sequence[Mechanism]):
             self.infinite,
             self.on_continua,
             len(self.complex),
+            self.postures,
             tuple(ContinuumData(one.point.start, one.dimension, one.moves) for one in self.continua),
             tuple(ModeData(mode.start, kind, condition, sure) for mode, kind, condition, sure in modes),
         )
@@ -411,10 +380,7 @@ class Question:
         self.x = self.start.x[:, 0]
         self.freedoms = free_motion(self.system, self.x, self.columns)
         idle = np.stack([*(p.rates for p in self.freedoms.passive), np.zeros(self.system.n_freedoms)], axis=1)[:, :-1]
-        held = self._held(idle)
-        self.rods = [] if self.m.couplings else rods_of(self.system, np.concatenate([self.columns, held]))
-        links = np.array([link for rod in self.rods for link in rod.links], dtype=np.intp)
-        self.family = Family(self.start, self.columns, idle, held, links)
+        self.family = Family(self.start, self.columns, idle, self._held(idle))
 
     def _held(self, idle: Array) -> Index:
         """Freedoms that may rest, as one of the passive motions ``idle (F, p)`` goes on for ever with them, evenly in all freedoms.
@@ -450,7 +416,7 @@ class Question:
         With ``G_d`` and ``G`` the coefficients of what is given and of the others, ``q = q_0 - G^-1 G_d (d - d_0)``.
         """
         if not self.m.couplings:
-            return self.family, self.drive, self.rods
+            return self.family, self.drive, rods_of(self.system, np.concatenate([self.columns, self.family.held]))
         s, terms = self.system, self.system.coupling_matrix[:, :, 0]
         others = np.setdiff1d(s.coupled_freedoms, self.columns)
         if rank_of(singular_values(terms[:, others])) < max(len(terms), len(others)):
@@ -462,10 +428,9 @@ class Question:
         columns = np.concatenate([self.columns, others])
         bare = System(self.m.replace(couplings=[]), None, s.par)
         idle, held = self.family.idle, self.family.held
-        rods = rods_of(bare, np.concatenate([columns, held]))
-        links = np.array([link for rod in rods for link in rod.links], dtype=np.intp)
-        family = Family(Configuration(bare, begin), columns, idle, np.setdiff1d(held, others), links)
-        return family, np.concatenate([self.drive, begin[s.single_rows[others]] - turned]), rods
+        family = Family(Configuration(bare, begin), columns, idle, np.setdiff1d(held, others))
+        drive = np.concatenate([self.drive, begin[s.single_rows[others]] - turned])
+        return family, drive, rods_of(bare, np.concatenate([columns, held]))
 
     @property
     def _loose(self) -> bool:
@@ -547,12 +512,14 @@ Progress = Callable[[str], None]
 class Solutions:
     """Real states ``(nx, M)`` at a position and ``others`` that are not real, with what is said of them (see ``Assemblies``).
 
-    ``solved`` are the real ones as they stand in the equations that were solved, and ``unreal`` those that are not; ``bent`` are real
-    there, but with rods that are not. ``continua`` lie in the equations of the mechanism.
+    ``solved`` are the real ones as they stand in the equations that were solved, ``of (2, M)`` says from which one each is and in which of
+    so many ``ways`` rods are put back; ``unreal`` are those that are not, ``bent`` real there, but with rods that are not. ``continua`` lie
+    in the equations of the mechanism.
     """
 
     x: Array
     solved: Array
+    of: Index
     unreal: Array
     others: Array
     word: str
@@ -562,16 +529,19 @@ class Solutions:
     on_continua: int = 0
     continua: Sequence[Found] = ()
     bent: int = 0
+    ways: int = 1
 
 
 class Finder:
-    """Finds the assemblies of a question."""
+    """Finds the assemblies of a question; with more than ``most`` ways of all legs, these are put back in that next to the start alone."""
 
-    def __init__(self, question: Question, seed: int, cache: bool, progress: Progress | None) -> None:
-        self.question, self.progress = question, progress
+    def __init__(
+        self, question: Question, seed: int, cache: bool, progress: Progress | None, most: int = MOST_FOLLOWED
+    ) -> None:
+        self.question, self.progress, self._most = question, progress, most
         self.form: EquationForm = question.form
         self.family = self.form.family
-        self.rng, self.cache = np.random.default_rng(seed), cache
+        self.rng, self.cache, self._again = np.random.default_rng(seed), cache, seed != 0
         self.fault = self.family.fault
 
     @cached_property
@@ -598,11 +568,23 @@ class Finder:
     def _start(self, family: Family) -> StartSet:
         known = kept(family) if self.cache else None
         if known is not None:
-            return known
+            return tested(family, known, self.rng, self.progress) if self._again else known
         made = start_set(family, self.rng, self.progress)
         if self.cache and made.whole:
             keep(family, made)
         return made
+
+    @property
+    def ways(self) -> int:
+        """In how many ways rods are put back."""
+        every = self.form.ways
+        return every if every * prod(start.x.shape[1] for start in self.starts) <= self._most else 1
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """What is said of rods."""
+        few = "These are too many: all but that next to the start are not listed."
+        return (*self.form.told, *[few] * (self.ways < self.form.ways))
 
     def solutions(self, guesses: int = GUESSES, turns: float = GUESSED_TURNS) -> list[Solutions]:
         """What is found at all positions."""
@@ -632,7 +614,8 @@ class Finder:
         more = continua(q.family, system, x[:, moving], drive, self.progress) if moving.any() else []
         others = np.zeros((system.n_state, 0), dtype=complex)
         x, said = x[:, ~moving], (why, *([BESIDE] if more else []))
-        return Solutions(x, x, others, others, "searched", said, None, continua=more)
+        of = np.stack([np.arange(x.shape[1]), np.zeros(x.shape[1], dtype=np.intp)])
+        return Solutions(x, x, of, others, others, "searched", said, None, continua=more)
 
     def _tracked(self, found: Ends, i: int) -> Solutions:
         system, real = self.form.at(i), np.flatnonzero(is_real(found.poses, found.error))
@@ -644,10 +627,11 @@ class Finder:
         if solved.shape[1] < once:
             word, evidence = "searched", (*evidence, "Different ends came to one real assembly.")
         more = self._continua(found.moving, i)
-        N = prod(start.x.shape[1] for start in self.starts)
+        every, ways = self.form.ways, self.ways
+        N = every * prod(start.x.shape[1] for start in self.starts)
         # rods that would need complex turns to be put back are not real
         unreal = np.delete(found.x, real, axis=1)
-        x, others = self.form.lifted(solved, i), self.form.lifted(unreal, i)
+        x, others = self.form.lifted(solved, i, ways), self.form.lifted(unreal, i, ways)
         complex_ = np.abs(x.imag).max(axis=0, initial=0.0) > least_imaginary()
         system = self.question.system
         off = Configuration(system, x.real).closure
@@ -658,10 +642,14 @@ class Finder:
         if (lost := int((~made & ~complex_ & ~unfit).sum())) > 0:
             word, evidence = "searched", (*evidence, f"Of {counted(lost, 'mode')} the rods could not be put back.")
         others = np.concatenate([others, x[:, complex_]], axis=1)
-        evidence = (*evidence, *self.form.told, *([BESIDE] if more else []))
+        evidence = (*evidence, *self.told, *([BESIDE] if more else []))
+        # both ways of a leg are one at the limit of its reach
+        kept = np.flatnonzero(made)
+        kept = kept[distinct(self.question.family.prints(Configuration(system, x[:, kept].real)))]
+        way, root = np.divmod(kept, max(1, solved.shape[1]))
         return Solutions(
-            x[:, made].real, solved[:, made], unreal, others, word, evidence, N, found.infinite, found.on_continua, more,
-            int(complex_.sum()),
+            x[:, kept].real, solved, np.stack([root, way]), unreal, others, word, evidence, N, found.infinite * every,
+            found.on_continua * every, more, int(complex_.sum()), ways,
         )  # fmt: skip
 
     def _continua(self, moving: Array, i: int) -> list[Found]:
@@ -669,19 +657,23 @@ class Finder:
         q = self.question
         if not moving.shape[1]:
             return []
-        return continua(q.family, q.system, self.form.lifted(moving, i), q.drive[:, i], self.progress)
+        return continua(q.family, q.system, self.form.lifted(moving, i, 1), q.drive[:, i], self.progress)
 
     def _result(self, found: Solutions, i: int) -> Assemblies:
         q, m, x = self.question, self.question.asked, found.x
         here = Configuration(q.system, x)
         poses = np.moveaxis(user_poses(here), 1, 0)
-        order = _ordered(q.family.prints(here).T)
-        x, poses, solved = x[:, order], poses[order], found.solved[:, order]
+        order = sorted(_ordered(q.family.prints(here).T), key=found.of[1].tolist().__getitem__)
+        x, poses = x[:, order], poses[order]
+        roots, root, count = np.unique(found.of[0, order], return_inverse=True, return_counts=True)
         coordinates = self._coordinates(x, i)
         own = [q.m.freedom_names().index(name) for name in m.freedom_names()]
         names = m.freedom_names()
-        told = [self._point(self.form.at(i), solved[:, [j]]) for j in range(x.shape[1])]
-        sure = told_apart(self.family, solved, [proof for _, _, proof in told])
+        told = [
+            self._point(self.form.at(i), found.solved[:, [k]]) if ways == found.ways else DOUBLE
+            for k, ways in zip(roots, count, strict=True)
+        ]
+        sure = told_apart(self.family, found.solved[:, roots], [proof for _, _, proof in told])
         away = Configuration(q.system, found.others)
         return Assemblies(
             m,
@@ -689,9 +681,9 @@ class Finder:
             tuple(self._assembly(row[own]) for row in coordinates),
             poses,
             coordinates[:, own],
-            tuple(kind for kind, _, _ in told),
-            np.array([condition for _, condition, _ in told]),
-            tuple(sure),
+            tuple(told[k][0] for k in root),
+            np.array([told[k][1] for k in root]),
+            tuple(sure[k] for k in root),
             ComplexModes(q.complex_coordinates(found.others)[:, own], np.moveaxis(user_poses(away), 1, 0)),
             found.word,
             (*found.evidence, *_said_apart(sure)),
@@ -706,6 +698,7 @@ class Finder:
                 )
                 for one in found.continua
             ),
+            int((found.of[1] == 0).sum()),
         )
 
     def _coordinates(self, x: Array, i: int) -> Array:
@@ -726,7 +719,11 @@ class Finder:
         # what is proved is regular, be it ever so close to a double point; so is what is far from any other
         if (sure is not None and sure.proved) or Nearby(family, system, x).gap > MODES.one_assembly:
             return "regular", condition, sure
-        return "double", np.inf, None
+        return DOUBLE
+
+
+DOUBLE: tuple[str, float, Certificate | None] = ("double", np.inf, None)
+"""Kind, condition and certificate of assemblies that meet."""
 
 
 def _completeness(
@@ -778,7 +775,7 @@ def _of_class(family: Family, start: StartSet) -> tuple[str, tuple[str, ...]]:
     if known is not None and known.count == N:
         return "proved", (f"The class has at most {N}: {known.source}.",)
     if not trace.passed:
-        return "searched", (loops, "No trace test passed; solutions may be missing.")
+        return "searched", (loops, NOT_TESTED)
     words = (
         f"Trace test passed: over {trace.samples} random mechanisms of the class a sum over all assemblies is a rational function of "
         f"degree {trace.degree} (the singular values of its Loewner matrix end there: {trace.last:.1g}, {trace.beyond:.1g})."

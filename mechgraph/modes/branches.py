@@ -26,11 +26,7 @@ from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.assemblies import (
-    Bifurcation,
-    BranchData,
-    BranchesData,
     Finder,
-    Fold,
     Question,
     Solutions,
     in_degrees,
@@ -41,11 +37,57 @@ from mechgraph.modes.assemblies import (
 from mechgraph.modes.between_samples import Double, Gap, Station, Unreal
 from mechgraph.modes.circuits import CircuitNodes, Circuits, in_order
 from mechgraph.modes.family import Array
+from mechgraph.modes.targets import MOST_FOLLOWED
 from mechgraph.quantities import Index as Seed
 from mechgraph.quantities import at_least, door, is_numeric, wrong
 
 GOLDEN = 0.5 * (3.0 - 5.0**0.5)
 """Place of the first sample, as part of the distance of two: double points are likely at whole parts of a turn."""
+
+
+@dataclass(frozen=True)
+class BranchData:
+    """A branch: its interval of the driver, and the range of every freedom."""
+
+    interval: tuple[float, float]
+    full_turn: Annotated[bool | None, "null where an end could not be told"]
+    turns: Annotated[int, "turns of the driver that bring it back"]
+    circuit: int
+    ranges: Mapping[str, tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Where two branches meet and the driver has to turn back."""
+
+    value: float
+    sense: Annotated[int, "1 at an upper limit, -1 at a lower one"]
+    branches: tuple[int, int]
+    fastest: Annotated[str, "the freedom that moves most there, while the driver stands still"]
+
+
+@dataclass(frozen=True)
+class Bifurcation:
+    """Where branches cross: all that meet there."""
+
+    value: float
+    branches: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class BranchesData:
+    """All branches over a driver."""
+
+    mechanism: str
+    driver: str
+    completeness: Annotated[str, "proved, tested or searched"]
+    evidence: Annotated[tuple[str, ...], "what that rests on between samples"]
+    resolution: Annotated[float, "distance of the samples"]
+    open_ends: Annotated[int, "ends of branches that could not be told"]
+    branches: tuple[BranchData, ...]
+    folds: tuple[Fold, ...]
+    bifurcations: tuple[Bifurcation, ...]
+    circuits: Annotated[tuple[tuple[int, ...], ...], "branches of each"]
 
 
 @dataclass(eq=False)
@@ -228,7 +270,7 @@ class Branches(Shown):
             x, error = close(of.s, given[:, 0], np.append(of.held, of.column))
             if error > CLOSED or np.abs(of.s.difference(x[:, None], given)).max() > MODES.touches:
                 return None
-            step, _, value = of.placed(np.arange(of.V), np.repeat(x[:, None], of.V, axis=1))
+            step, _, value, _ = of.placed(np.arange(of.V), np.repeat(x[:, None], of.V, axis=1))
             at = dict(zip(of.run[step].tolist(), value.tolist(), strict=True))
             found |= {i: at[one.run] for i, one in enumerate(every) if one.of is of and one.run in at}
         return next(iter(found.items())) if len(found) == 1 else None
@@ -415,7 +457,7 @@ class _Mapper:
         self.samples = self.low + (np.arange(self.count) + GOLDEN) * step
         self.q = q = Question(self.m, _at(self.m, self.driver, self.samples.tolist()))
         self.column = int(q.columns[self.place])
-        finder = Finder(q, seed, cache, progress)
+        finder = Finder(q, seed, cache, progress, MOST_FOLLOWED // self.count)
         solutions = finder.solutions()
         # the position beside the start counts as that of a further sample, which may be the only one on its circuit
         self.row, self.others = int(q.system.single_rows[self.column]), np.delete(q.columns, self.place)
@@ -469,7 +511,7 @@ class _Mapper:
             ends = list(pairwise([*at, tracks.station(at[0].value + 2 * np.pi, at[0].x)] if self.around else at))
             new = [two for two in ends if (two[0].value, two[1].value) not in gaps]
             gaps |= zip([(a.value, b.value) for a, b in new], tracks.gaps(new), strict=True)
-            told = [self._untold(a, b, gaps[a.value, b.value], every[1]) for a, b in ends]
+            told = [self._untold(a, b, gaps[a.value, b.value], every[1], finder.ways) for a, b in ends]
             begins = [one for of, _, _ in told for one in of if one.value not in tried]
             asked = [value for _, of, _ in told for value in of if value not in tried]
             lost = [value for _, _, of in told for value in of]
@@ -480,20 +522,19 @@ class _Mapper:
             form = tracks.at(np.array([one.value for one in begins]))
             for i, one in enumerate(begins):
                 # beside the fold, along what moves there
-                y, error = close_all(
-                    self.q.system, form.lifted((one.x.real + one.x.imag)[:, None], i).real, self.others
-                )
-                self.known += [(float(y[self.row, 0]), y)] * bool(error[0] < CLOSED)
+                beside = form.lifted((one.x.real + one.x.imag)[:, None], i, finder.ways).real
+                y, error = close_all(self.q.system, beside, self.others)
+                self.known += [(float(y[self.row, k]), y[:, [k]]) for k in np.flatnonzero(error < CLOSED)]
             if asked:
                 q = Question(self.m, _at(self.m, self.driver, (self.unit * np.array(asked)).tolist()))
-                solutions = Finder(q, seed, cache, None).solutions()
+                solutions = Finder(q, seed, cache, None, MOST_FOLLOWED // self.count).solutions()
                 words, bent = words + [found.word for found in solutions], bent + sum(found.bent for found in solutions)
                 self.known += [(value, found.x) for value, found in zip(asked, solutions, strict=True)]
                 at += [tracks.station(value, found.unreal) for value, found in zip(asked, solutions, strict=True)]
                 at.sort(key=lambda one: one.value)
             every = self._stretches()
         said, word = self._told(lost, bent)
-        return every, weakest([*words, word]), (*said, *finder.form.told)
+        return every, weakest([*words, word]), (*said, *finder.told)
 
     def _told(self, lost: list[float], bent: int) -> tuple[list[str], str]:
         """What is said of circuits between samples, next to which something is ``lost`` or rods are ``bent``; the strongest word for it."""
@@ -505,17 +546,17 @@ class _Mapper:
             )
         if bent:
             out.append(
-                f"In {counted(bent, 'assembly')} at samples rods close with complex turns alone; between samples they may be real."
+                f"In {counted(bent, 'mode')} at samples rods close with complex turns alone; between samples they may be real."
             )
         if out:
             return [*out, "Circuits that lie wholly between samples may be missing."], "tested"
         return ["Between samples, assemblies that are not real become real at the folds told alone."], "proved"
 
     def _untold(
-        self, a: Station, b: Station, gap: Gap, pairs: Sequence[tuple[BranchRun, BranchRun]]
+        self, a: Station, b: Station, gap: Gap, pairs: Sequence[tuple[BranchRun, BranchRun]], ways: int
     ) -> tuple[list[Double], list[float], list[float]]:
         """Between stations: double points that are no folds that are known, values between folds that face each other, to which none came,
-        and values next to which something is left that is not accounted for.
+        and values next to which something is left that is not accounted for. A double point is a fold in all ``ways`` of rods.
         """
         begins, left = list[Double](), list[tuple[float, int]]()
         folds = [one.fold for one, _ in pairs]
@@ -524,11 +565,11 @@ class _Mapper:
         for sense, doubles in ((-1, gap.rising), (1, gap.falling)):
             mine = [value for value, of in folds if of == sense and a.value <= value <= b.value]
             for one in doubles:
-                fold = min(mine, key=lambda value: abs(value - one.value), default=np.inf)
+                mine.sort(key=lambda value: abs(value - one.value))
                 if not one.real:
                     left.append((one.value, -sense))
-                elif abs(fold - one.value) < gap.near:
-                    mine.remove(fold)
+                elif mine and abs(mine[0] - one.value) < gap.near:
+                    mine = [value for k, value in enumerate(mine) if k >= ways or abs(value - one.value) >= gap.near]
                 else:
                     begins.append(one)
             left += [(value, sense) for value in mine]

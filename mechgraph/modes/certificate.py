@@ -297,7 +297,8 @@ class Certificate:
     residual : largest closure error in all rows.
     apart : bound from below of how far any other root that is proved at this position is (radians, lengths / L), in the coordinate or
         pose in which they differ most, of links in the frames in which they are solved (not those of ``modes.poses``); at most zero
-        where they may be one, None where there is no other.
+        where they may be one, None where there is no other. The two ways of a leg on a universal joint have the certificate of both, and
+        are not compared.
     """
 
     proved: bool

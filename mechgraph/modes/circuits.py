@@ -451,14 +451,20 @@ class Circuits:
         mine = np.flatnonzero(self.run == run)
         return np.append(self.a.x[self.row, mine], self.b.x[self.row, mine[-1]])
 
-    def placed(self, case: Index, x: Array) -> tuple[Index, Index, Array]:
-        """The steps on which states ``(nx, T)`` of mechanisms lie, the number of each state, and driver values there."""
+    def placed(
+        self, case: Index, x: Array, told: Callable[[Configuration, Index], Array] | None = None
+    ) -> tuple[Index, Index, Array, Array]:
+        """The steps on which states ``(nx, T)`` of mechanisms lie, the number of each state, driver values and states there.
+
+        ``told`` returns what counts of states, of which numbers are given, where that is not all of them.
+        """
         step, k, value = self.steps_at(case, x[self.row])
         y, good = self.states(step, value)
-        here, there = (self.family.prints(self.here(z, case[k])) for z in (x[:, k], y))
+        told = told or (lambda here, _: self.family.prints(here))
+        here, there = (told(self.here(z, case[k]), k) for z in (x[:, k], y))
         near = np.abs(there - here).max(axis=0, initial=0.0)
         good &= near < MODES.arrives * np.maximum(1.0, np.abs(here).max(axis=0, initial=0.0))
-        return step[good], k[good], value[good]
+        return step[good], k[good], value[good], y[:, good]
 
 
 def in_order(values: Array, period: float) -> Array | None:

@@ -88,20 +88,11 @@ class Family:
     """The class of a mechanism with drivers ``columns``, told at a closed position ``here``.
 
     ``idle (F, p)`` are passive motions, by which assemblies are not told apart, of which rest of ``held`` freedoms stops some: ``passive``
-    are those left. ``rods`` are numbers of links by which assemblies are not told apart either (see ``modes.form``).
+    are those left.
     """
 
-    def __init__(
-        self, here: Configuration, columns: Index, idle: Array, held: Index = NO_NUMBERS, rods: Index = NO_NUMBERS
-    ) -> None:
-        self.here, self.system, self.columns, self.idle, self.held, self._rods = (
-            here,
-            here.system,
-            columns,
-            idle,
-            held,
-            rods,
-        )
+    def __init__(self, here: Configuration, columns: Index, idle: Array, held: Index = NO_NUMBERS) -> None:
+        self.here, self.system, self.columns, self.idle, self.held = here, here.system, columns, idle, held
         self.passive = at_rest(idle, held)
         self.free = complement(np.concatenate([columns, held]), self.system.n_freedoms)
         self.rows = self.system.single_rows[columns]
@@ -186,11 +177,11 @@ class Family:
 
     @cached_property
     def settled_links(self) -> Index:
-        """Links that no passive motion moves, and that are not parts of rods."""
+        """Links that no passive motion moves."""
         V = [self.here.link_twists(rates[:, None]) for rates in self.idle.T]
         links = np.arange(len(self.system.m.links))
         still = np.abs(V).max(axis=(0, 1, 3)) < MODES.span if V else np.ones(len(links), dtype=bool)
-        return links[still & ~np.isin(links, self._rods)]
+        return links[still]
 
     @cached_property
     def periods(self) -> Array:
@@ -201,11 +192,9 @@ class Family:
 
     @cached_property
     def settled_rows(self) -> tuple[Index, Index]:
-        """State rows of freedoms that come back and of those that do not, which no passive motion changes, and that are not in rods."""
+        """State rows of freedoms that come back and of those that do not, which no passive motion changes."""
         s = self.system
-        inside = np.isin(s.a, self._rods) | np.isin(s.b, self._rods)
         still = (s.single_rows >= 0) & (np.abs(self.idle).max(axis=1, initial=0.0) < MODES.span)
-        still &= ~inside[s.pair_of_freedom]
         back = np.isfinite(self.periods)
         return s.single_rows[still & back], s.single_rows[still & ~back]
 

@@ -12,8 +12,8 @@ A rod is a chain of links with a ball at its one end and a ball or two turns at 
 S-P-S, U-P-S). Over the complex numbers all that it does is to keep two points at a distance, as both ends turn so that they point at
 each other wherever the bodies are that it joins. So it falls away, and with it its loops of six rows, for one row;
 a body that nothing else joins to the frame floats on a pair of six freedoms. A rod that holds nothing that others do not hold has no
-row: an assembly in which it does not fit is none of the mechanism. Put back, a ball turns as little as it can, and two turns
-go that of their two ways that is nearest to the start: ways of rods are no assemblies of their own.
+row: an assembly in which it does not fit is none of the mechanism. Put back, a ball turns as little as it can; two turns take a
+rod to its direction in two ways, which are two assemblies.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ from mechgraph.maths.linear import rank_of, singular_values
 from mechgraph.maths.se3 import Array as Reals
 from mechgraph.maths.se3 import (
     Index,
+    Mask,
     compose,
     cross,
     identity,
@@ -275,10 +276,6 @@ def _rows(here: Configuration) -> RodRows:
     return here.system.rod_rows
 
 
-WAYS = "A leg that two turns carry can stand in two ways in the same assembly: nearest to the start, the other does not count"
-"""What is said of rods with two turns at an end."""
-
-
 @cache
 def floating_type() -> PairType:
     """A pair that holds nothing, with a rotation that has no chart."""
@@ -297,6 +294,8 @@ class EquationForm(Protocol):
     """What is to be said of them, in words."""
     spare: int
     """Rods without a row, which may not fit where they are put back."""
+    ways: int
+    """In how many ways rods can be put back."""
 
     def at(self, position: int) -> System:
         """The system at a position."""
@@ -304,8 +303,11 @@ class EquationForm(Protocol):
     def driven(self, given: Array) -> EquationForm:
         """The same at other positions, values ``given (d, n)`` of the drivers of the mechanism."""
 
-    def lifted(self, x: Array, position: int) -> Array:
-        """States of the mechanism from those ``(nx, M)`` found; complex where rods cannot be put back with real numbers."""
+    def lifted(self, x: Array, position: int, ways: int | None = None) -> Array:
+        """States ``(nx, ways M)`` of the mechanism from those ``(nx, M)`` found; complex where rods cannot be put back with real numbers.
+
+        First stand those of the way that is nearest to the start for every rod; of all ways where not so many are asked for.
+        """
 
 
 class Whole:
@@ -314,7 +316,7 @@ class Whole:
     def __init__(self, family: Family, drive: Array) -> None:
         self.family, self.drive, self.given = family, drive, drive
         self.told: tuple[str, ...] = ()
-        self.spare = 0
+        self.spare, self.ways = 0, 1
 
     def at(self, position: int) -> System:
         """The mechanism, of which drivers are freedoms."""
@@ -324,7 +326,7 @@ class Whole:
         """See there."""
         return Whole(self.family, given)
 
-    def lifted(self, x: Array, position: int) -> Array:
+    def lifted(self, x: Array, position: int, ways: int | None = None) -> Array:
         """The same."""
         return x
 
@@ -423,8 +425,14 @@ class WithoutRods:
         )
         self._own = np.isin(whole.columns, self.kept)
         self.drive = np.concatenate([drive[self._own], self._squares()])
-        both = sum(not is_ball(s.m.pairs[rod.steps[0].pair].type) for rod in rods)
-        self.told: tuple[str, ...] = (f"{WAYS} ({counted(both, 'leg')} here).",) if both else ()
+        self._turning = [rod for rod in rods if not is_ball(s.m.pairs[rod.steps[0].pair].type)]
+        self.ways = 2 ** len(self._turning)
+        self.told: tuple[str, ...] = ()
+        if self._turning:
+            legs = counted(len(self._turning), "leg")
+            self.told += (
+                f"Two turns carry {legs}: each assembly that is found without rods stands in {self.ways} ways.",
+            )
         if self.spare:
             self.told += (
                 f"Left out: {counted(self.spare, 'rod')} of what others hold too; assemblies are those in which it closes again.",
@@ -547,19 +555,22 @@ class WithoutRods:
                 out[at, i] = np.linalg.solve(here.S[:, at, 0], V[:, link])
         return out[:, np.abs(out).max(axis=0, initial=0.0) > MODES.span]
 
-    def lifted(self, x: Array, position: int) -> Array:
+    def lifted(self, x: Array, position: int, ways: int | None = None) -> Array:
         """States of the mechanism: balls and turns of the rods put back one after the other."""
+        way = np.repeat(np.arange(ways or self.ways), x.shape[1])
+        x = np.tile(x, ways or self.ways)
         here = Configuration(self.at(position), x)
         out = np.repeat(self._driven(self.given[:, [position]]), x.shape[1], axis=1).astype(complex)
         out[self.state_rows] = x[: len(self.state_rows)]
         begin = out.copy()
         with np.errstate(all="ignore"):
             for rod in self._all:
-                self._put_back(rod, here, out, begin)
+                other = way >> self._turning.index(rod) & 1 == 1 if rod in self._turning else way < 0
+                self._put_back(rod, here, out, begin, other)
         return out
 
-    def _put_back(self, rod: RodChain, here: Configuration, out: Array, begin: Array) -> None:
-        """The numbers of a rod in states ``out``, near those where it ``begin``s."""
+    def _put_back(self, rod: RodChain, here: Configuration, out: Array, begin: Array, other: Mask) -> None:
+        """The numbers of a rod in states ``out``, near those where it ``begin``s, or the ``other`` way."""
         s, par = self.full, self.full.par
         near, far = rod.steps[0], rod.steps[-1]
         bodies = [here.poses[:, :, self.place[body]] for body in rod.bodies]
@@ -579,7 +590,7 @@ class WithoutRods:
             to, of = of, to
         rows = slice(s.first_row[near.pair], s.first_row[near.pair + 1])
         row = s.m.pairs[near.pair].type
-        out[rows] = least_turn(of, to, begin[rows]) if is_ball(row) else _two_turns(row, of, to, begin[rows])
+        out[rows] = least_turn(of, to, begin[rows]) if is_ball(row) else two_turns(row, of, to, begin[rows], other)
         # the ball at the other end, from both its markers
         last = compose(compose(bodies[0], behind(self.full, near, out)), C)
         A, B = (last, bodies[1]) if far.sign > 0 else (bodies[1], last)
@@ -602,8 +613,8 @@ def least_turn(of: Array, to: Array, begin: Array) -> Array:
     return quaternion_product(np.where(np.abs(1.0 + cosine) < MODES.span, half, least), begin)
 
 
-def _two_turns(row: PairType, of: Array, to: Array, begin: Array) -> Array:
-    """Angles ``(2, T)`` that take directions ``of`` to those ``to (3, T)``: of both ways the one nearest to where they ``begin``.
+def two_turns(row: PairType, of: Array, to: Array, begin: Array, other: Mask) -> Array:
+    """Angles ``(2, T)`` that take directions ``of`` to those ``to (3, T)``: the way nearer to where they ``begin``, or the other one.
 
     With ``e`` and ``g`` the directions and ``v`` the one between the turns: ``v . w_2 = e . w_2``, ``v . w_1 = g . w_1``, ``v^2 = e^2``.
     Source: Paden, Kinematics and Control of Robot Manipulators, 1986, subproblem 2.
@@ -619,7 +630,8 @@ def _two_turns(row: PairType, of: Array, to: Array, begin: Array) -> Array:
         v = alpha * first + beta * second + sign * across * normal
         ways.append(np.stack([angle_about(v, g, first), angle_about(e, v, second)]))
     apart = [np.abs(np.exp(1j * way) - np.exp(1j * begin)).max(axis=0) for way in ways]
-    return np.where(apart[0] <= apart[1], *ways)
+    # of two that are as near but for rounding the first
+    return np.where((apart[0] <= apart[1] + 1e-9) ^ other, *ways)
 
 
 def angle_about(a: Array, b: Array, axis: Array) -> Array:

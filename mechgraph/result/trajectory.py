@@ -315,11 +315,12 @@ class Trajectory:
             return self._out(np.where(self._solved, self._coordinates[columns], np.nan))
         return self._out(self._lengths[columns] * self._of(("dq", "ddq")[rank - 1])[columns])
 
-    def frame_origin(self, pair: int, k: int) -> Array:
-        """Origin of frame k of a pair, global, ``(..., 3)``."""
-        number, i = self._system.place_of(pair)
-        par = self._system.par
-        found = self._evaluated(lambda block: block.here.frames[number][k][:, 3, i])
+    def frame_origin(self, pair: int, k: int | None = None) -> Array:
+        """Origin of frame k of a pair, or that of its marker on link b, of every variant its own, global ``(..., 3)``."""
+        (number, i), par = self._system.place_of(pair), self._system.par
+        found = self._evaluated(
+            lambda at: at.here.pair_points[:, pair] if k is None else at.here.frames[number][k][:, 3, i]
+        )
         return self._out(par.L * found + par.origin.reshape(3, 1))
 
     def screws(self, pair: int) -> Array:

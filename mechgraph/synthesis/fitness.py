@@ -21,7 +21,8 @@ import numpy as np
 from mechgraph.determinacy.mobility import free_motion
 from mechgraph.errors import DeclarationError, MechgraphWarning, did_you_mean, near_names
 from mechgraph.kinematics.assembly import closed_start
-from mechgraph.kinematics.state import CLOSED, Configuration
+from mechgraph.kinematics.prescribed import Target, target_of
+from mechgraph.kinematics.state import CLOSED, Configuration, user_poses
 from mechgraph.kinetostatics import kinematics, solve, transmission
 from mechgraph.maths.se3 import Array, Index, cross
 from mechgraph.maths.tolerances import MODES
@@ -93,11 +94,13 @@ def fitnesses(
     driver: str | None = None,
     output: str | None = None,
     errors: Sequence[float] = (),
+    asked: Mapping[str, Array] | None = None,
 ) -> list[Fitness]:
     """Fitness of mechanisms of one topology that meet positions with coordinates ``q (V, n, F)``; the start of each is its first.
 
     ``driver`` and ``output`` are freedoms; without a driver nothing is said of defects and transmission, without an output that freedom at
-    the frame counts that is moved worst.
+    the frame counts that is moved worst. A branch leads to a position where all is as there, or what is ``asked``: values ``(n,)`` by name,
+    NaN where nothing is.
     """
     each = zip(mechanisms, errors or [0.0] * len(mechanisms), strict=True)
     out = [Fitness(None, None, None, None, np.nan, np.nan, *sizes(m), error) for m, error in each]
@@ -122,10 +125,12 @@ def fitnesses(
     idle = np.array(passive).reshape(-1, s.n_freedoms).T
     of = Circuits(Family(base, columns, idle), s, int(columns[0]), rank, x[:, :: q.shape[1]])
     # of several branches on which a position lies the one of the lowest number, which comes last
-    step, k, value = of.placed(case, x)
+    step, k, value, there = of.placed(case, x, None if asked is None else partial(_asked, of, mechanisms, asked))
     order = np.argsort(-np.abs(of.of_branch[step]), kind="stable")
     branches, values = np.full((2, len(case)), np.nan)
     branches[k[order]], values[k[order]] = of.of_branch[step[order]], value[order]
+    x[:, k[order]] = there[:, order]
+    rows = Configuration(s.cases(case), x)
     branches, values = branches.reshape(V, -1), values.reshape(V, -1)
     # the first one, also where it is a dead point
     branches[:, 0], values[:, 0] = 0.0, of.x[of.row]
@@ -147,6 +152,30 @@ def fitnesses(
         )
         out[v] = replace(one, branch=True) if dead else replace(known, error=one.error)
     return out
+
+
+def _asked(
+    of: Circuits, mechanisms: Sequence[Mechanism], asked: Mapping[str, Array], here: Configuration, k: Index
+) -> Array:
+    """What is asked at states of which ``k (T,)`` are the numbers, row by row of one mechanism after the other; zero where nothing is."""
+    m, s, out = mechanisms[0], here.system, []
+    case, row = np.divmod(k, len(next(iter(asked.values()))))
+    for name, values in asked.items():
+        if isinstance(target := target_of(m, name), Target):
+            link = [one.name for one in m.links].index(target.link)
+            X = user_poses(here, slice(link, link + 1))[0, :, :3] / [1.0, 1.0, 1.0, s.par.L]
+            at = [
+                (0, 0, 0, 1) if not target.point else (*one.links[link].points[target.point], 1) for one in mechanisms
+            ]
+            place = np.einsum("tij,tj->it", X, np.array(at)[case])
+            found = np.concatenate([place, *([] if target.point else [X[:, :, :3].reshape(len(k), 9).T])])
+        else:
+            [column] = s.columns_of([name])
+            found, period = here.x[s.single_rows[[column]]], of.family.periods[column]
+            if np.isfinite(period):
+                found = np.concatenate([np.cos(2 * np.pi * found / period), np.sin(2 * np.pi * found / period)])
+        out.append(np.where(np.isnan(values[row]), 0.0, found))
+    return np.concatenate(out)
 
 
 def _least_between(

@@ -15,6 +15,7 @@ from __future__ import annotations
 import sys
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache, partial
 from math import lcm, prod
@@ -35,6 +36,7 @@ from mechgraph.modes.start_sets import (
     MISSED_AGAIN,
     MOST_TRACKED,
     NOT_PASSED,
+    NOT_TESTED,
     Pencil,
     Trace,
     TrackGroup,
@@ -107,7 +109,7 @@ class TaskStart:
         if self.source:
             return (f"As many as such tasks have in general: {self.total}{self._each}, {self.source}.",)
         if not self.trace.passed:
-            return (loops, "No trace test passed; solutions may be missing.")
+            return (loops, NOT_TESTED)
         return (
             f"Trace test passed: over {self.trace.samples} tasks on a line a sum over all solutions is a rational function of degree "
             f"{self.trace.degree} (the singular values of its Loewner matrix end there: {self.trace.last:.1g}, {self.trace.beyond:.1g}).",
@@ -128,12 +130,14 @@ class TaskPencil:
     def __init__(self, equations: TaskClass, base: ClassMember, rng: np.random.Generator) -> None:
         self.of, self.base = equations, base
         open_, length = movable(equations), equations.is_length
-        row = int(np.argmax(np.where(open_.any(axis=1), equations.conditions, -1)))
+        # any row of those with as many conditions, any angle: of some, poles are too far away to be told
+        most = np.where(open_.any(axis=1), equations.conditions, -1)
+        row = int(rng.choice(np.flatnonzero(most == most.max())))
         other = equations.random_members(rng, 1)[0].drive[row, :, 0] - base.drive[row, :, 0]
         part = rng.normal(size=2) @ [0.7, 0.7j]
         # one angle, or lengths alone: rational functions of several angles are of much higher degrees
         given = open_[row]
-        moves = given & length if (given & length).any() else np.arange(len(given)) == np.argmax(given)
+        moves = given & length if (given & length).any() else np.arange(len(given)) == rng.choice(np.flatnonzero(given))
         s, F = equations.problem.system, equations.problem.system.n_freedoms
         self.parts = _parts_of_turns(equations) if np.isin(equations.columns[moves], s.coupled_freedoms).any() else 1
         grown = np.where(length, other, np.exp(1j / self.parts * np.where(length, 0.0, other)) - 1.0)
@@ -593,13 +597,20 @@ def endless(of: TaskClass, goal: ClassMember, x: Array) -> Mask:
     return closed & (sigma[:, -1] < MODES.generic * sigma[:, 0]) & (_apart(of, there, x) > 1e-3)
 
 
-def start_of(of: TaskClass, rng: np.random.Generator, cache: bool, progress: Progress) -> TaskStart:
-    """The start set of a class: a kept one, or else one that is made, and kept where it is whole.
+def start_of(
+    of: TaskClass, rng: np.random.Generator, cache: bool, progress: Progress, again: bool = False
+) -> TaskStart:
+    """The start set of a class: a kept one, of which a test that no one passed may be tried ``again``, or else one that is made, and kept
+    where it is whole.
 
     That takes so long that somebody who looks at a terminal or a notebook is told of it unasked.
     """
     known = kept(of) if cache else None
     if known is not None:
+        if again and known.word == "searched" and known.chance <= MISSED and movable(of).any():
+            known = replace(known, trace=trace_test(of, known.member, known.x, rng, progress, TaskPencil))
+            if known.trace.passed:
+                _keep(of, known)
         return known
     if progress is None and sys.stderr is not None and (sys.stderr.isatty() or "ipykernel" in sys.modules):
         progress = partial(print, "mg.synthesize:", file=sys.stderr, flush=True)

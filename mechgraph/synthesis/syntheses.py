@@ -85,6 +85,7 @@ class Synthesis:
         faults: list[str],
     ) -> None:
         self.problem, self.rng, self.cache, self.progress = problem, np.random.default_rng(seed), cache, progress
+        self.again = seed != 0
         self.tasks = tasks
         p, m = problem, problem.m
         faults += [f"unknown {name!r}: {NO_ARRAY}" for name in p.unknowns.others]
@@ -191,7 +192,7 @@ class Synthesis:
 
     def answers(self) -> list[Syntheses]:
         """For every value swept."""
-        start = start_of(self.of, self.rng, self.cache, self.progress)
+        start = start_of(self.of, self.rng, self.cache, self.progress, self.again)
         start = replace(start, against=int((~doing_all(self.of, start.member, start.x)).sum()))
         n, goals = self.swept.shape[1], self.goals
         found = ends(self.of, start, goals, self.rng, self.progress)
@@ -365,7 +366,10 @@ class Synthesis:
         return p.first.back(m).replace(start=begin), q[:, :F], p.first.poses_of(here)
 
     def _fitness(self, made: list[Mechanism], q: Array) -> list[Fitness]:
-        return fitnesses(made, q, *driver_of(self.problem.m, self.tasks))
+        asked = self.problem.tasks
+        # rates are met in one way alone
+        values = asked.values if asked and not asked.rates else None
+        return fitnesses(made, q, *driver_of(self.problem.m, self.tasks), asked=values)
 
 
 CLOSED_TO = 1e-10

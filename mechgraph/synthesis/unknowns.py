@@ -74,6 +74,16 @@ class UnknownPlace:
         return (self.component if self.pair < 0 else self.pair,)
 
 
+NOT_MET = "stands in no equation of closure; no position depends on it"
+"""Why a number is none to be sought."""
+
+
+def _of_body(m: Mechanism, name: str) -> bool:
+    """Whether a name is that of mass, center or the like of a link, declared or not; not of one of its points."""
+    whose = [(link, name.removeprefix(f"{link.name}.")) for link in m.links if name.startswith(f"{link.name}.")]
+    return any(hasattr(link, what := rest.partition(".")[0]) and what not in link.points for link, rest in whose)
+
+
 class Unknowns:
     """The numbers sought, in the order given: ``names (u,)``, and ``places`` where each stands; ``m`` is the mechanism as declared.
 
@@ -90,7 +100,9 @@ class Unknowns:
         for name in (name for name in given if isinstance(name, str)):
             for one in self._expanded(name):
                 found = find_field(m, one)
-                if isinstance(found, str):
+                if _of_body(m, one):
+                    faults.append(f"unknown {one!r}: {NOT_MET}")
+                elif isinstance(found, str):
                     faults.append(f"unknown {found}")
                 elif one in self.fields:
                     faults.append(f"unknown {one!r} is named twice")
@@ -115,7 +127,7 @@ class Unknowns:
             a, b = (declared(one) for one in (self.m, other))
             same = all(np.array_equal(getattr(a, part), getattr(b, part)) for part in (*PLACED, "couplings"))
             same &= [p.type for p in self.m.pairs] == [p.type for p in other.pairs]
-            return "stands in no equation of closure; no position depends on it" if same else ""
+            return NOT_MET if same else ""
         return why
 
     def _expanded(self, name: str) -> list[str]:
