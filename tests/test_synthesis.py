@@ -342,6 +342,23 @@ def test_real_mechanisms_are_found_where_a_row_asks_nothing() -> None:
     assert np.sort(s.field("g.constant") % (4 * np.pi)) == pytest.approx(constants, abs=1e-9)
 
 
+def test_real_mechanisms_are_found_where_a_row_is_nearly_out_of_reach() -> None:
+    """Of a row the place of the tip to the left alone is asked: it goes no farther than second crank and rod in one line."""
+    cranks, pins, turns = [[0, 0], [3, 0]], [[0.3, 1.0], [2.7, 1.2]], np.array([[0, 0], [-0.3, 0.2], [-0.1, 0.4]])
+    m = geared_five_bar(*map(tuple, pins)).replace(couplings=[], drives=["A", "E"])
+    tips = mg.kinematics(m, dict(zip("AE", turns.T, strict=True))).link("rod").at("tip").position[:, :2]
+    rows = [{"A": a, "E": e, "rod.tip": tuple(tip)} for (a, e), tip in zip(turns, tips, strict=True)]
+    parts = np.linalg.norm(np.subtract(pins, cranks), axis=1), np.linalg.norm(np.subtract(pins, (1.5, 1.5)), axis=1)
+    (left, right), near = np.add(*parts), abs(np.subtract(*parts))
+    end = 3 - right
+    # there the first crank and its rod come to as well
+    assert near[0] < end < left
+    for room in (1e-3, -1e-3):
+        s = mg.synthesize(m, mg.positions([*rows, {"rod.tip": (end + room, np.nan)}]), ["B.point", "D.point"])
+        assert (s.total, len(s), "no real position" in s.evidence[-1]) == (1, int(room > 0), room < 0)
+
+
+
 @pytest.mark.parametrize(
     "name", ["R-Sp-R function, 6 pairs", "slider-crank function, 5 pairs", "four-bar path, 5 points, timed"]
 )
