@@ -188,6 +188,8 @@ def test_numbers_that_are_none_of_their_kind_are_told_with_their_place() -> None
     X, mirrored = turned(3, 1.0), turned(3, 1.0)
     X[1, 0, 3] = np.inf
     mirrored[2, :3, 0] *= -1
+    partly = turned(3, 1.0)
+    partly[1, 0, 0] = np.nan
     balls = spatial("S-S", ("S", (0, 0, 0), None), ("S", (1, 0.3, 0.1), None))
     rows = [{}, {"coupler": (1, np.inf, 0)}, {"coupler.tip": "no"}, {"A": np.inf}]
     pairs = mg.function("A", "D", [[0, 0], [0.3, 0.2]])
@@ -202,6 +204,8 @@ def test_numbers_that_are_none_of_their_kind_are_told_with_their_place() -> None
         (four_bar(), pairs, {"over": {"A": []}}, ["over['A'] = []: expected finite values, one at least"]),
         (four_bar(), pairs, {"conditions": {"transmission D": (40, None)}}, ["transmission angles in radians, 1.5708"]),
         (balls, mg.poses("body", mirrored), {}, ["row 2: expected a proper rotation"]),
+        (balls, mg.poses("body", partly), {}, ["row 1: a part of a rotation is NaN"]),
+        (four_bar(), mg.function("A", "D", [[0, np.nan], [0.3, 0.2]]), {}, ["D is NaN at row 0, from which the others are counted"]),
         (balls, mg.poses("body", np.zeros((3, 4, 4))), {}, ["row 0, 1, 2: expected a proper rotation"]),
         (four_bar(), pairs, {"bounds": {"B.point.x": (2, 1)}}, ["bounds['B.point.x'] = (2, 1): expected (least, greatest)"]),
         (four_bar(), pairs, {"conditions": {"size": (np.nan, 1)}}, ["conditions['size'] = (nan, 1)"]),
@@ -344,6 +348,22 @@ def test_real_mechanisms_are_found_where_a_row_asks_nothing() -> None:
     pins = e - apart + apart / abs(apart) * (along + np.array([1j, -1j]) * np.sqrt(reach**2 - along**2))
     constants = np.sort((2 * np.angle((pins - e) / (d - e)) - turn) % (4 * np.pi))
     assert np.sort(s.field("g.constant") % (4 * np.pi)) == pytest.approx(constants, abs=1e-9)
+
+
+def test_real_mechanisms_are_found_where_a_row_is_nearly_out_of_reach() -> None:
+    """Of a row the place of the tip to the left alone is asked: it goes no farther than second crank and rod in one line."""
+    cranks, pins, turns = [[0, 0], [3, 0]], [[0.3, 1.0], [2.7, 1.2]], np.array([[0, 0], [-0.3, 0.2], [-0.1, 0.4]])
+    m = geared_five_bar(*map(tuple, pins)).replace(couplings=[], drives=["A", "E"])
+    tips = mg.kinematics(m, dict(zip("AE", turns.T, strict=True))).link("rod").at("tip").position[:, :2]
+    rows = [{"A": a, "E": e, "rod.tip": tuple(tip)} for (a, e), tip in zip(turns, tips, strict=True)]
+    parts = np.linalg.norm(np.subtract(pins, cranks), axis=1), np.linalg.norm(np.subtract(pins, (1.5, 1.5)), axis=1)
+    (left, right), near = np.add(*parts), abs(np.subtract(*parts))
+    end = 3 - right
+    # there the first crank and its rod come to as well
+    assert near[0] < end < left
+    for room in (1e-3, -1e-3):
+        s = mg.synthesize(m, mg.positions([*rows, {"rod.tip": (end + room, np.nan)}]), ["B.point", "D.point"])
+        assert (s.total, len(s), "no real position" in s.evidence[-1]) == (1, int(room > 0), room < 0)
 
 
 @pytest.mark.parametrize(

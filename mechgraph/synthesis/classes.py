@@ -113,6 +113,12 @@ class TaskClass:
         out.x = x[:, 0]
         return out
 
+    def row(self, i: int) -> TaskClass:
+        """A row by itself."""
+        out = copy(self)
+        out.R, out.given, out.free, out.orders = 1, self.given[[i]], [self.free[i]], self.orders[[i]]
+        return out
+
     def lifted(self, member: ClassMember, x: Array) -> tuple[ClassMember, Array]:
         """A member and states ``x (nx, T)`` of it with all rods in their places."""
         p = self.problem

@@ -20,7 +20,7 @@ import numpy as np
 
 from mechgraph.graph.chains import least_order, ranked
 from mechgraph.graph.linkgraph import components_of_edges, members
-from mechgraph.maths.newton import least_norm_steps
+from mechgraph.maths.newton import closest_zeros, least_norm_steps
 from mechgraph.maths.se3 import Index, Mask
 from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
@@ -299,6 +299,22 @@ def same_motions(motions: Array, i: int) -> Mask:
     return np.abs(motions - motions[:, [i]]).max(axis=0) < MODES.most_noise if len(motions) else np.arange(n) == i
 
 
+class OneRow:
+    """One row of a class at states ``x (nx, T)``: its residual ``(n, T)``, and the smallest steps that take it to zero, unknowns at rest."""
+
+    def __init__(self, of: TaskClass, task: ClassMember, x: Array) -> None:
+        self.of, self.rows = of, of.at(task, x)
+        self.k = of.counted(self.rows.residual.shape[1], 0)
+        self.residual = self.rows.residual[0][: self.k]
+
+    def least(self) -> Array:
+        """These steps ``(n, T)``."""
+        out = np.zeros((self.of.head + self.of.F, self.rows.T), dtype=complex)
+        J = self.rows.by_coordinates[0][: self.k, self.of.free[0]]
+        out[self.of.head + self.of.free[0]] = least_norm_steps(J, self.residual, MODES.generic)
+        return out
+
+
 def placed(
     of: TaskClass,
     member: ClassMember,
@@ -307,35 +323,35 @@ def placed(
     near: Sequence[Array],
     imaginary: float = 0.5,
 ) -> tuple[Array, Mask]:
-    """States ``(nx, n)`` of unknowns ``z (u, n)``, which may be rounded, at a task that they do, from positions ``near (R, nx, n)``, then
-    from random ones with such an ``imaginary`` part; which close.
+    """States ``(nx, n)`` of unknowns ``z (u, n)`` at a task that they do, from positions ``near (R, nx, n)``, then from random ones with
+    such an ``imaginary`` part; which close.
     """
-    p, s, n = of.problem, of.problem.system, z.shape[1]
-    numbers = p.numbers.with_values(p.places, z)
+    s, n = of.problem.system, z.shape[1]
+    head = np.concatenate([z, of.problem.numbers.with_values(of.problem.places, z).norms.reshape(-1, n)[: of.W]])
     X, open_ = np.zeros((of.R, of.nx, n), dtype=complex), np.ones((of.R, n), dtype=bool)
-    # positions, and Gauss-Newton steps from them
-    for attempt in range(16):
-        if attempt < len(near):
-            trial = near[attempt]
-        else:
-            some = rng.normal(size=(s.n_freedoms, of.R * n, 2)) @ [1.0, imaginary * 1j]
-            states = s.advance(np.repeat(p.at_rest[:, None].astype(complex), of.R * n, axis=1), some)
-            trial = np.zeros_like(X)
-            trial[:, : of.states] = np.moveaxis(states.reshape(of.states, of.R, n), 0, 1)
-        x = np.concatenate([z, numbers.norms.reshape(-1, n)[: of.W], np.where(open_[:, None], trial, X).reshape(-1, n)])
-        for _ in range(12):
-            rows = of.at(member, x)
-            step = np.zeros((of.R, of.F, n), dtype=complex)
-            for i, free in enumerate(of.free):
-                k = of.counted(rows.residual.shape[1], i)
-                step[i, free] = least_norm_steps(rows.by_coordinates[i][:k, free], rows.residual[i][:k], MODES.generic)
-            step /= np.maximum(1.0, np.abs(step).max(axis=1, keepdims=True))
-            x = of.advance(of.state(rows), np.concatenate([np.zeros((of.head, n)), step.reshape(-1, n)]))
-        rows, X = of.at(member, x), x[of.head :].reshape(X.shape)
-        # unknowns may be rounded
-        open_ = ~(np.abs(rows.residual).max(axis=1) < 1e-2)
-        if not open_.any():
-            break
+    # unknowns may be rounded but for real ones, of which all digits count: near the limits of reach there is little room
+    enough, goal = (1e-2, 1e-2) if imaginary else (1e-6, 1e-12)
+    for i in range(of.R):
+        one = of.row(i)
+        # the positions given, then so many random ones
+        for given, tries in ((True, len(near)), (False, 16)):
+            left = np.flatnonzero(open_[i])
+            if not left.size or not tries:
+                continue
+            trial = np.zeros((of.nx, tries, left.size), dtype=complex)
+            if given:
+                trial[:] = np.swapaxes([states[i][:, left] for states in near], 0, 1)
+            else:
+                some = rng.normal(size=(s.n_freedoms, tries * left.size, 2)) @ [1.0, imaginary * 1j]
+                rest = np.repeat(of.problem.at_rest[:, None].astype(complex), tries * left.size, axis=1)
+                trial[: of.states] = s.advance(rest, some).reshape(of.states, tries, left.size)
+            x = np.concatenate([np.tile(head[:, left], tries), trial.reshape(of.nx, -1)])
+            task = ClassMember(member.numbers, member.drive[[i]])
+            x, size = closest_zeros(partial(OneRow, one, task), OneRow.least, one.advance, x, goal)
+            size, x = size.reshape(tries, -1), x[of.head :].reshape(of.nx, tries, -1)
+            best, every = size.argmin(axis=0), np.arange(left.size)
+            X[i][:, left], open_[i, left] = x[:, best, every], ~(size[best, every] < enough)
+    x = np.concatenate([head, X.reshape(-1, n)])
     x, closed = polished(of.leg(member, member), x, 1.0, np.zeros(n, dtype=np.intp))
     return x, closed & ~open_.any(axis=0)
 

@@ -634,7 +634,7 @@ def unfolded(
     """
     if start.each == 1:
         return found.x, 0
-    real = _imaginary(found.x[: of.u]) < MODES.real_singular
+    real = imaginary_part(found.x[: of.u]) < MODES.real_singular
     x, exchanges = alike_at(of, start, goal, found.x[:, real], progress), symmetries(of.whole)
     swapped = [x[: of.u][np.argsort(one.places)] for one in exchanges]
     if swapped and x.size:
@@ -644,7 +644,7 @@ def unfolded(
     return np.concatenate([found.x[:, ~real], x], axis=1), int(real.sum()) * start.each - x.shape[1]
 
 
-def _imaginary(values: Array) -> Array:
+def imaginary_part(values: Array) -> Array:
     """Imaginary parts ``(n,)`` of numbers ``(k, n)``, the largest of each column against its size."""
     size = np.maximum(1.0, np.abs(values).max(axis=0, initial=1.0))
     return np.asarray(np.abs(values.imag).max(axis=0, initial=0.0) / size)
@@ -695,7 +695,7 @@ def real_states(of: TaskClass, goal: ClassMember, x: Array) -> tuple[Array, Arra
     Of a row that leaves the mechanism a choice, of a motion or of assemblies, a track may end at a complex position where there are real
     ones: these are looked for from where other rows stand, and then at random.
     """
-    which = np.flatnonzero(_imaginary(x[: of.u]) < MODES.real_singular)
+    which = np.flatnonzero(imaginary_part(x[: of.u]) < MODES.real_singular)
     states, error, good = _closed_real(of, goal, x[:, which])
     if left := int((~good).sum()):
         rows = states[of.head :, ~good].reshape(of.R, of.nx, left)

@@ -44,6 +44,7 @@ from mechgraph.synthesis.solve import (
     endless,
     ends,
     finite,
+    imaginary_part,
     kept,
     movable,
     real_states,
@@ -58,6 +59,7 @@ from mechgraph.synthesis.unknowns import Unknowns
 NO_SCREWS = "ties an angle to a length or by an unknown ratio: the equations are not algebraic, their number of solutions has no end"
 NO_ARRAY = "the equations are not algebraic in it; exact synthesis does not serve it, fits do (fit=)"
 NO_LINE = "All that is asked stands beside angles that are numbers in the equations too: no trace test serves."
+NO_PLACE = "at some row no real position was found, from the other rows and at random"
 NO_CONTACTS = "curves and surfaces are made of pieces: solutions on one cannot be led to those on all others"
 
 
@@ -220,6 +222,9 @@ class Synthesis:
         told += [NO_LINE] * (not movable(self.of).any())
         told += [f"Of {start.each} mechanisms each that do the same all real ones are listed."] * (start.each > 1)
         told += [f"{missing} of these were not found."] * (missing > 0)
+        others = np.delete(every[: self.of.u], which, axis=1)
+        hidden = int((imaginary_part(others) < np.sqrt(MODES.real_closed)).sum())
+        told += [f"Beside these {counted(hidden, 'solution with real dimensions')}: {NO_PLACE}."] * (hidden > 0)
         condition, motions = self._conditions(goal, x[:, fits]), motions_of(self.of, goal, x[:, fits].astype(complex))
         free = endless(self.of, goal, found.singular)
         goal, x = self.of.lifted(goal, self._near_start(x[:, fits]))
@@ -228,7 +233,6 @@ class Synthesis:
         against, merged = done & (error > closed_to[fits]), done & self._merged(goal, x)
         left = done & ~merged & ~against
         x, error, condition, motions = x[:, left], error[left], condition[left], motions[:, left]
-        others = np.delete(every[: of.u], which, axis=1)
         values = p.outside(x[: of.u]).T
         order = np.lexsort(np.round(values, 9).T[::-1]) if len(values) else np.zeros(0, dtype=np.intp)
         x, error, values, condition = x[:, order], error[order], values[order], condition[order]

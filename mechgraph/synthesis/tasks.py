@@ -185,6 +185,11 @@ class PoseTask(RatedTask):
         if wrong_at:
             rows = ", ".join(map(str, wrong_at))
             faults.append(f"poses of {self.link!r}: row {rows}: expected a proper rotation and the last row 0 0 0 1")
+        elif partly := np.flatnonzero(~asked & ~np.isnan(R).all(axis=(1, 2))).tolist():
+            rows = ", ".join(map(str, partly))
+            faults.append(
+                f"poses of {self.link!r}: row {rows}: a part of a rotation is NaN; expected all of it, or nothing"
+            )
         elif m.planar and np.abs(X[asked, 2] - (0, 0, 1, 0)).max(initial=0.0) > 1e-9 * max(1.0, np.abs(X[asked]).max()):
             faults.append(f"poses of {self.link!r}: leave the x-y plane")
         if m.planar:
@@ -249,6 +254,10 @@ class FunctionTask(RatedTask):
             why = m.freedom_fault(name, single=True)
             if why is not None:
                 faults.append(f"function: {why}")
+            elif given is not None and np.isnan(given[0, k]):
+                faults.append(
+                    f"function: {name} is NaN at row 0, from which the others are counted; expected a number there"
+                )
             elif given is not None:
                 full = m.full_name(name)
                 out[full] = given[:, k] - given[0, k] + float(m.start.get(full, m.start.get(name, 0.0)))
