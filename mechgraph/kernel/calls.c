@@ -1,5 +1,5 @@
-/* What the package calls beside the functions of kernel.h: many positions or variants at once, poses of links, and derivatives by complex
- * numbers (derivative.c). */
+/* What the package calls beside the functions of kernel.h: many positions or variants at once, poses of links, rows of fits (tracks.c), and
+ * derivatives by complex numbers (derivative.c). */
 #include "kernel.c"
 #include "motion.c"
 
@@ -309,3 +309,9 @@ void mgk_variants(const int *I, int count, int numbers, const double *P, void *s
     if (!whole[i]) FOR(j, each) FOR(k, length) own[(size_t)j * length + k] = NAN;
   }
 }
+
+typedef double number;
+#define creal(x) (x)
+#define cimag(x) 0.0
+#define cabs(x) fabs(x)
+#include "tracks.c"

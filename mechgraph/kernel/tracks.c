@@ -1,7 +1,8 @@
 /* Tracks of synthesis (synthesis/legs.py) and of assemblies (modes/homotopy.py), one after the other, in complex numbers: the closure at all
  * rows of a task with unknown dimensions, eliminated row by row; of assemblies there is one row and no unknown. A row is a state of the
  * mechanism; its equations are those of loops and couplings and, behind them, of rods (d^2 - l^2) / 2 (synthesis/rods.py). The state of a
- * track: unknowns, norms of directions where any are unknown, then all rows. Part of derivative.c.
+ * track: unknowns, norms of directions where any are unknown, then all rows. Part of derivative.c; of calls.c, in real numbers, mgk_rows and
+ * what it needs.
  *
  * A   rows, unknowns, head, states of a row, pairs with those of rods, rods, moved, asked, then one after the other:
  *       side[links]                             the pose among identity, markers A and markers B in which a link stands
@@ -30,73 +31,6 @@ static void read_arrow(const Model *m, const int *A, Arrow *a) {
 }
 
 static double square_of(number x) { return creal(x) * creal(x) + cimag(x) * cimag(x); }
-
-/* Reflections that make the first `k` columns of M[n][w] triangular; of `order`, where it is given, the largest of the first f columns come
- * first. Right sides are among the columns. v[n], s[w] are room. */
-static void reflected(int n, int w, int f, int k, number *M, int *order, number *v, number *s) {
-  FOR(j, k) {
-    if (order) {
-      int best = j;
-      double most = -1.0;
-      for (int c = j; c < f; c++) {
-        double size = 0.0;
-        for (int r = j; r < n; r++) size += square_of(M[r * w + c]);
-        if (size > most) most = size, best = c;
-      }
-      if (best != j) {
-        const int kept = order[j];
-        order[j] = order[best], order[best] = kept;
-        FOR(r, n) {
-          const number value = M[r * w + j];
-          M[r * w + j] = M[r * w + best], M[r * w + best] = value;
-        }
-      }
-    }
-    double size = 0.0;
-    for (int r = j; r < n; r++) v[r] = M[r * w + j], size += square_of(v[r]);
-    if (j == n - 1) continue;
-    const double long_side = sqrt(size), first = cabs(v[j]);
-    if (size < 1e-280) continue; /* none but what was left of numbers near the smallest */
-    v[j] += first > 1e-140 ? v[j] * (long_side / first) : long_side;
-    const double part = 1.0 / (size + long_side * first);
-    FOR(c, w - j) s[c] = 0.0;
-    for (int r = j; r < n; r++) {
-      const number by = conj(v[r]);
-      FOR(c, w - j) s[c] += by * M[r * w + j + c];
-    }
-    for (int r = j; r < n; r++) {
-      const number by = part * v[r];
-      FOR(c, w - j) M[r * w + j + c] -= by * s[c];
-    }
-  }
-}
-
-/* The least y[f] with the first n rows of M[.][w], triangular, times y = b[n]; `order` of its columns. Room: W[f][n + f], v[f], s[n + f]. */
-static void least(int n, int f, int w, const number *M, const int *order, const number *b, number *y, number *W, number *v, number *s) {
-  if (n == f) {
-    for (int i = n - 1; i >= 0; i--) {
-      number sum = b[i];
-      for (int j = i + 1; j < n; j++) sum -= M[i * w + j] * y[j];
-      y[i] = sum / M[i * w + i];
-    }
-    return;
-  }
-  /* across the rows: M^* = Q R, y = Q R^-* b, of which Q is undone by the reflections of [M^* | I] */
-  const int wide = n + f;
-  FOR(r, f) FOR(c, wide) W[r * wide + c] = c < n ? (c <= r ? conj(M[c * w + r]) : 0.0) : r == c - n;
-  reflected(f, wide, n, n, W, NULL, v, s);
-  number *z = s;
-  FOR(i, n) {
-    z[i] = b[i];
-    FOR(j, i) z[i] -= conj(W[j * wide + i]) * z[j];
-    z[i] /= conj(W[i * wide + i]);
-  }
-  FOR(c, f) {
-    number sum = 0.0;
-    FOR(i, n) sum += conj(W[i * wide + n + c]) * z[i];
-    y[order[c]] = sum;
-  }
-}
 
 /* x[n][k] = S[n][n]^-1 x of rows [n][n + k], by pivots. */
 static void solved_rows(int n, int k, number *S) {
@@ -154,13 +88,6 @@ static void open_track(const int *I, const double *P, const int *A, int numbers,
   t->w.evaluations = 0;
 }
 
-/* Numbers of memory, complex ones, for mgk_tracks. */
-size_t mgk_tracks_size(const int *I, const int *A, int numbers) {
-  Track t;
-  open_track(I, NULL, A, numbers, NULL, &t);
-  return lay_out_track(&t, numbers, NULL);
-}
-
 /* --- the member on the way ---------------------------------------------------------------------------------------------------------- */
 
 /* Points and directions v[3 arrays] moved along the screw `at` eta. */
@@ -205,7 +132,7 @@ static number norm_of(const number *v, const number *near) {
 }
 
 /* What is left of a second direction across a unit axis z. */
-static void across(const number *second, const number *z, number *out) {
+static void left_across(const number *second, const number *z, number *out) {
   const number along = dot(z, second, 3);
   FOR(r, 3) out[r] = second[r] - along * z[r];
 }
@@ -224,7 +151,7 @@ static void put_unknowns(Track *t, number *x) {
     number *X = t->marker + 12 * i, z[3], e[3], y[3];
     t->norm[i] = norm_of(v + 3, norms ? norms + i : NULL);
     FOR(r, 3) z[r] = v[3 + r] / t->norm[i];
-    across(v + 6, z, e);
+    left_across(v + 6, z, e);
     t->norm[2 * p + i] = norm_of(e, norms ? norms + 2 * p + i : NULL);
     FOR(r, 3) e[r] /= t->norm[2 * p + i];
     cross(z, e, y);
@@ -388,131 +315,15 @@ static double put_row(Track *t, int i, const int *row, const number *x, number *
   return size;
 }
 
-/* At a state x, in which unknowns and what is asked are put, the step of Newton's method, and with two `sides` the rates along the way behind
- * it: t->step[sides][head + rows columns]. The largest number in a pose of a link. */
-static double linearized(Track *t, number *x, const number *mixing, int sides) {
-  const Model *m = &t->m;
-  const Arrow *a = &t->a;
-  const int c = m->columns, h = t->height, u = a->unknowns, length = a->head + a->rows * c;
-  const int *row = a->row;
-  double size = 0.0;
-  int at = 0;
-  put_unknowns(t, x), put_twists(t);
-  FOR(i, a->rows) {
-    const int rank = row[0], settled = row[1], free = row[2], mixed = row[3], *columns = row + 4, w = free + u + sides;
-    number *out = t->reduced + (size_t)i * h * t->wide, *M = mixed ? t->raw : out;
-    size = raised(size, put_row(t, i, row, x, M, sides));
-    if (mixed) {
-      memset(out, 0, (size_t)rank * w * sizeof(number));
-      FOR(r, rank) FOR(j, h) {
-        const number part = mixing[r * h + j];
-        FOR(l, w) out[r * w + l] += part * M[j * w + l];
-      }
-      mixing += (size_t)rank * h;
-    }
-    int *order = t->order + i * c;
-    FOR(j, free) order[j] = j;
-    reflected(rank, w, free, settled, out, settled < free ? order : NULL, t->small, t->small + h);
-    FOR(r, rank - settled) FOR(j, u + sides) t->S[(at + r) * (u + sides) + j] = out[(settled + r) * w + free + j];
-    at += rank - settled, row = columns + free;
-  }
-  solved_rows(u, sides, t->S);
-  FOR(j, sides * length) t->step[j] = 0.0;
-  FOR(side, sides) FOR(j, u) t->step[side * length + j] = t->S[j * (u + sides) + u + side];
-  row = a->row;
-  FOR(i, a->rows) {
-    const int settled = row[1], free = row[2], *columns = row + 4, w = free + u + sides;
-    const number *M = t->reduced + (size_t)i * h * t->wide;
-    number *b = t->small, *y = b + h, *v = y + c, *s = v + c;
-    FOR(side, sides) {
-      number *to = t->step + side * length;
-      FOR(r, settled) {
-        b[r] = M[r * w + free + u + side];
-        FOR(j, u) b[r] -= M[r * w + free + j] * to[j];
-      }
-      least(settled, free, w, M, t->order + i * c, b, y, s + 2 * c, v, s);
-      FOR(j, free) to[a->head + i * c + columns[j]] = y[j];
-      FOR(j, side ? a->asked : 0) if (a->column[j] >= 0 && a->given[i * a->asked + j]) {
-        const int place = i * a->asked + j, factor = a->factor[j];
-        to[a->head + i * c + a->column[j]] = factor < 0 ? t->change[place] : t->change[place] * x[factor] + t->drive[place] * to[factor];
-      }
-    }
-    row = columns + free;
-  }
-  return sqrt(size);
-}
-
 /* --- states --------------------------------------------------------------------------------------------------------------------------- */
-
-/* The largest increment against the size of lengths and unknowns. */
-static double size_of_step(const Track *t, const number *x, const number *dq) {
-  const Arrow *a = &t->a;
-  const Model *m = &t->m;
-  double out = 0.0;
-  FOR(j, a->unknowns) out = raised(out, cabs(dq[j]) / (1.0 + cabs(x[j])));
-  FOR(i, a->rows) FOR(c, m->columns) {
-    const double size = cabs(dq[a->head + i * m->columns + c]);
-    out = raised(out, m->is_length[c] ? size / (1.0 + cabs(x[a->head + i * a->states + m->column_state[c]])) : size);
-  }
-  return out;
-}
 
 static void advance_track(const Track *t, number *x, const number *dq) {
   FOR(j, t->a.head) x[j] += dq[j];
   FOR(i, t->a.rows) advance(&t->m, x + t->a.head + i * t->a.states, dq + t->a.head + i * t->m.columns, x + t->a.head + i * t->a.states);
 }
 
-/* Rates of states for those of increments: Q' = (0, w) Q / 2 of rotations. */
-static void state_rates(const Track *t, const number *x, const number *dq, number *out) {
-  const Model *m = &t->m;
-  FOR(j, t->a.head) out[j] = dq[j];
-  FOR(i, t->a.rows) FOR(f, m->factors) {
-    const int s = t->a.head + i * t->a.states + m->state[f], c = t->a.head + i * m->columns + m->column[f];
-    if (m->kind[f] < MGK_ROTATION) out[s] = dq[c];
-    if (m->kind[f] != MGK_ROTATION) continue;
-    const number w[4] = {0.0, 0.5 * dq[c], 0.5 * dq[c + 1], 0.5 * dq[c + 2]};
-    quaternion_product(w, x + s, out + s);
-  }
-}
-
-static void made_normal(const Track *t, number *x) {
-  FOR(i, t->a.rows) FOR(f, t->m.factors) if (t->m.kind[f] == MGK_ROTATION) {
-    number *q = x + t->a.head + i * t->a.states + t->m.state[f];
-    const number size = sqrt(dot(q, q, 4));
-    FOR(r, 4) q[r] /= size;
-  }
-}
-
-/* Tracks at states x[state] on their ways `which`, at `at` of these: the step of Newton's method step[head + rows columns] and the
- * rates; x then has what is asked and the norms of its directions. Where `rate` is not NULL x is a prediction: it is corrected by two
- * steps, the sizes of which are size[0..1], and rates are those of the states, times `rate`. size[2]: the largest number in a pose. */
-void mgk_tracks(const int *I, const double *P, int numbers, const int *A, const number *mixing, const number *const *leg, int ways, int tracks,
-                const int *which, const number *at, const number *rate, number *x, number *step, number *rates, double *size, number *memory) {
-  Track t;
-  open_track(I, P, A, numbers, memory, &t);
-  const size_t T = tracks;
-  const int length = t.a.head + t.a.rows * t.m.columns;
-  FOR(k, tracks) {
-    FOR(j, t.size) t.x[j] = x[j * T + k];
-    put_on_way(&t, leg, ways, which[k], at[k]);
-    if (rate) {
-      made_normal(&t, t.x);
-      linearized(&t, t.x, mixing, 1);
-      advance_track(&t, t.x, t.step);
-      size[k] = size_of_step(&t, t.x, t.step);
-    }
-    size[2 * T + k] = linearized(&t, t.x, mixing, 2);
-    if (rate) {
-      size[T + k] = size_of_step(&t, t.x, t.step);
-      state_rates(&t, t.x, t.step + length, t.moved);
-      FOR(j, t.size) rates[j * T + k] = rate[k] * t.moved[j];
-      advance_track(&t, t.x, t.step);
-    } else {
-      FOR(j, length) step[j * T + k] = t.step[j], rates[j * T + k] = t.step[length + j];
-    }
-    FOR(j, t.size) x[j * T + k] = t.x[j];
-  }
-}
+#ifndef MGK_COMPLEX
+/* --- rows of fits ------------------------------------------------------------------------------------------------------------------ */
 
 /* Loops of equations M[.][w], as they are filled in, taken about the middles of their pairs. */
 static void about_middles(const Track *t, int w, number *M) {
@@ -571,3 +382,200 @@ void mgk_rows(const int *I, const double *P, int numbers, const int *A, const nu
     FOR(j, h * w) rows[(size_t)k * h * w + j] = creal(t.raw[j]);
   }
 }
+
+#else
+/* --- tracks ------------------------------------------------------------------------------------------------------------------------ */
+
+/* Numbers of memory, complex ones, for mgk_tracks. */
+size_t mgk_tracks_size(const int *I, const int *A, int numbers) {
+  Track t;
+  open_track(I, NULL, A, numbers, NULL, &t);
+  return lay_out_track(&t, numbers, NULL);
+}
+
+/* Reflections that make the first `k` columns of M[n][w] triangular; of `order`, where it is given, the largest of the first f columns come
+ * first. Right sides are among the columns. v[n], s[w] are room. */
+static void reflected(int n, int w, int f, int k, number *M, int *order, number *v, number *s) {
+  FOR(j, k) {
+    if (order) {
+      int best = j;
+      double most = -1.0;
+      for (int c = j; c < f; c++) {
+        double size = 0.0;
+        for (int r = j; r < n; r++) size += square_of(M[r * w + c]);
+        if (size > most) most = size, best = c;
+      }
+      if (best != j) {
+        const int kept = order[j];
+        order[j] = order[best], order[best] = kept;
+        FOR(r, n) {
+          const number value = M[r * w + j];
+          M[r * w + j] = M[r * w + best], M[r * w + best] = value;
+        }
+      }
+    }
+    double size = 0.0;
+    for (int r = j; r < n; r++) v[r] = M[r * w + j], size += square_of(v[r]);
+    if (j == n - 1) continue;
+    const double long_side = sqrt(size), first = cabs(v[j]);
+    if (size < 1e-280) continue; /* none but what was left of numbers near the smallest */
+    v[j] += first > 1e-140 ? v[j] * (long_side / first) : long_side;
+    const double part = 1.0 / (size + long_side * first);
+    FOR(c, w - j) s[c] = 0.0;
+    for (int r = j; r < n; r++) {
+      const number by = conj(v[r]);
+      FOR(c, w - j) s[c] += by * M[r * w + j + c];
+    }
+    for (int r = j; r < n; r++) {
+      const number by = part * v[r];
+      FOR(c, w - j) M[r * w + j + c] -= by * s[c];
+    }
+  }
+}
+
+/* The least y[f] with the first n rows of M[.][w], triangular, times y = b[n]; `order` of its columns. Room: W[f][n + f], v[f], s[n + f]. */
+static void least(int n, int f, int w, const number *M, const int *order, const number *b, number *y, number *W, number *v, number *s) {
+  if (n == f) {
+    for (int i = n - 1; i >= 0; i--) {
+      number sum = b[i];
+      for (int j = i + 1; j < n; j++) sum -= M[i * w + j] * y[j];
+      y[i] = sum / M[i * w + i];
+    }
+    return;
+  }
+  /* across the rows: M^* = Q R, y = Q R^-* b, of which Q is undone by the reflections of [M^* | I] */
+  const int wide = n + f;
+  FOR(r, f) FOR(c, wide) W[r * wide + c] = c < n ? (c <= r ? conj(M[c * w + r]) : 0.0) : r == c - n;
+  reflected(f, wide, n, n, W, NULL, v, s);
+  number *z = s;
+  FOR(i, n) {
+    z[i] = b[i];
+    FOR(j, i) z[i] -= conj(W[j * wide + i]) * z[j];
+    z[i] /= conj(W[i * wide + i]);
+  }
+  FOR(c, f) {
+    number sum = 0.0;
+    FOR(i, n) sum += conj(W[i * wide + n + c]) * z[i];
+    y[order[c]] = sum;
+  }
+}
+
+/* At a state x, in which unknowns and what is asked are put, the step of Newton's method, and with two `sides` the rates along the way behind
+ * it: t->step[sides][head + rows columns]. The largest number in a pose of a link. */
+static double linearized(Track *t, number *x, const number *mixing, int sides) {
+  const Model *m = &t->m;
+  const Arrow *a = &t->a;
+  const int c = m->columns, h = t->height, u = a->unknowns, length = a->head + a->rows * c;
+  const int *row = a->row;
+  double size = 0.0;
+  int at = 0;
+  put_unknowns(t, x), put_twists(t);
+  FOR(i, a->rows) {
+    const int rank = row[0], settled = row[1], free = row[2], mixed = row[3], *columns = row + 4, w = free + u + sides;
+    number *out = t->reduced + (size_t)i * h * t->wide, *M = mixed ? t->raw : out;
+    size = raised(size, put_row(t, i, row, x, M, sides));
+    if (mixed) {
+      memset(out, 0, (size_t)rank * w * sizeof(number));
+      FOR(r, rank) FOR(j, h) {
+        const number part = mixing[r * h + j];
+        FOR(l, w) out[r * w + l] += part * M[j * w + l];
+      }
+      mixing += (size_t)rank * h;
+    }
+    int *order = t->order + i * c;
+    FOR(j, free) order[j] = j;
+    reflected(rank, w, free, settled, out, settled < free ? order : NULL, t->small, t->small + h);
+    FOR(r, rank - settled) FOR(j, u + sides) t->S[(at + r) * (u + sides) + j] = out[(settled + r) * w + free + j];
+    at += rank - settled, row = columns + free;
+  }
+  solved_rows(u, sides, t->S);
+  FOR(j, sides * length) t->step[j] = 0.0;
+  FOR(side, sides) FOR(j, u) t->step[side * length + j] = t->S[j * (u + sides) + u + side];
+  row = a->row;
+  FOR(i, a->rows) {
+    const int settled = row[1], free = row[2], *columns = row + 4, w = free + u + sides;
+    const number *M = t->reduced + (size_t)i * h * t->wide;
+    number *b = t->small, *y = b + h, *v = y + c, *s = v + c;
+    FOR(side, sides) {
+      number *to = t->step + side * length;
+      FOR(r, settled) {
+        b[r] = M[r * w + free + u + side];
+        FOR(j, u) b[r] -= M[r * w + free + j] * to[j];
+      }
+      least(settled, free, w, M, t->order + i * c, b, y, s + 2 * c, v, s);
+      FOR(j, free) to[a->head + i * c + columns[j]] = y[j];
+      FOR(j, side ? a->asked : 0) if (a->column[j] >= 0 && a->given[i * a->asked + j]) {
+        const int place = i * a->asked + j, factor = a->factor[j];
+        to[a->head + i * c + a->column[j]] = factor < 0 ? t->change[place] : t->change[place] * x[factor] + t->drive[place] * to[factor];
+      }
+    }
+    row = columns + free;
+  }
+  return sqrt(size);
+}
+
+/* The largest increment against the size of lengths and unknowns. */
+static double size_of_step(const Track *t, const number *x, const number *dq) {
+  const Arrow *a = &t->a;
+  const Model *m = &t->m;
+  double out = 0.0;
+  FOR(j, a->unknowns) out = raised(out, cabs(dq[j]) / (1.0 + cabs(x[j])));
+  FOR(i, a->rows) FOR(c, m->columns) {
+    const double size = cabs(dq[a->head + i * m->columns + c]);
+    out = raised(out, m->is_length[c] ? size / (1.0 + cabs(x[a->head + i * a->states + m->column_state[c]])) : size);
+  }
+  return out;
+}
+
+/* Rates of states for those of increments: Q' = (0, w) Q / 2 of rotations. */
+static void state_rates(const Track *t, const number *x, const number *dq, number *out) {
+  const Model *m = &t->m;
+  FOR(j, t->a.head) out[j] = dq[j];
+  FOR(i, t->a.rows) FOR(f, m->factors) {
+    const int s = t->a.head + i * t->a.states + m->state[f], c = t->a.head + i * m->columns + m->column[f];
+    if (m->kind[f] < MGK_ROTATION) out[s] = dq[c];
+    if (m->kind[f] != MGK_ROTATION) continue;
+    const number w[4] = {0.0, 0.5 * dq[c], 0.5 * dq[c + 1], 0.5 * dq[c + 2]};
+    quaternion_product(w, x + s, out + s);
+  }
+}
+
+static void made_normal(const Track *t, number *x) {
+  FOR(i, t->a.rows) FOR(f, t->m.factors) if (t->m.kind[f] == MGK_ROTATION) {
+    number *q = x + t->a.head + i * t->a.states + t->m.state[f];
+    const number size = sqrt(dot(q, q, 4));
+    FOR(r, 4) q[r] /= size;
+  }
+}
+
+/* Tracks at states x[state] on their ways `which`, at `at` of these: the step of Newton's method step[head + rows columns] and the
+ * rates; x then has what is asked and the norms of its directions. Where `rate` is not NULL x is a prediction: it is corrected by two
+ * steps, the sizes of which are size[0..1], and rates are those of the states, times `rate`. size[2]: the largest number in a pose. */
+void mgk_tracks(const int *I, const double *P, int numbers, const int *A, const number *mixing, const number *const *leg, int ways, int tracks,
+                const int *which, const number *at, const number *rate, number *x, number *step, number *rates, double *size, number *memory) {
+  Track t;
+  open_track(I, P, A, numbers, memory, &t);
+  const size_t T = tracks;
+  const int length = t.a.head + t.a.rows * t.m.columns;
+  FOR(k, tracks) {
+    FOR(j, t.size) t.x[j] = x[j * T + k];
+    put_on_way(&t, leg, ways, which[k], at[k]);
+    if (rate) {
+      made_normal(&t, t.x);
+      linearized(&t, t.x, mixing, 1);
+      advance_track(&t, t.x, t.step);
+      size[k] = size_of_step(&t, t.x, t.step);
+    }
+    size[2 * T + k] = linearized(&t, t.x, mixing, 2);
+    if (rate) {
+      size[T + k] = size_of_step(&t, t.x, t.step);
+      state_rates(&t, t.x, t.step + length, t.moved);
+      FOR(j, t.size) rates[j * T + k] = rate[k] * t.moved[j];
+      advance_track(&t, t.x, t.step);
+    } else {
+      FOR(j, length) step[j * T + k] = t.step[j], rates[j * T + k] = t.step[length + j];
+    }
+    FOR(j, t.size) x[j * T + k] = t.x[j];
+  }
+}
+#endif

@@ -136,6 +136,7 @@ class CompiledTracks:
         unknowns, and what is left open with the other sign; whether it came ``(T,)``.
         """
         x, memory = np.array(x, dtype=float, order="C"), np.empty(self._size, dtype=complex)
+        numbers = LegNumbers(*(np.ascontiguousarray(v.real) for v in numbers))
         height = self.led.system.n_rows + len(self.led.rods)
         out = np.empty((len(x), height, len(self.led.rows[0].free) + self.led.unknowns + 1))
         came, legs = np.empty(len(x), dtype=np.int32), np.array([v.ctypes.data for v in numbers], dtype=np.uintp)
