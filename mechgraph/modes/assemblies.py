@@ -31,17 +31,7 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.certificate import TINY, Certificate, certificate, told_apart
 from mechgraph.modes.family import NO_NUMBERS, Array, Family, Nearby, at_rest, irregular, least_value, searched
 from mechgraph.modes.form import EquationForm, RodChain, Whole, WithoutRods, rods_of
-from mechgraph.modes.start_sets import (
-    NOT_TESTED,
-    Irregular,
-    StartSet,
-    bound,
-    distinct,
-    keep,
-    kept,
-    start_set,
-    tested,
-)
+from mechgraph.modes.start_sets import NOT_TESTED, Irregular, StartSet, bound, distinct, keep, kept, start_set, tested
 from mechgraph.modes.targets import (
     MOST_FOLLOWED,
     Ends,
