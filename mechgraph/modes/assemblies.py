@@ -793,7 +793,6 @@ def _said_apart(sure: Sequence[Certificate | None]) -> tuple[str, ...]:
 
 def _ordered(numbers: Array) -> list[int]:
     """The order of rows by their numbers, of which smaller differences than rounding do not count."""
-
     # difference of link poses (and coordinates) below which the next number decides the order of assemblies
     least = 1e-7 * float(np.abs(numbers).max(initial=1.0))
 
