@@ -31,17 +31,7 @@ from mechgraph.model.mechanism import Mechanism
 from mechgraph.modes.certificate import TINY, Certificate, certificate, told_apart
 from mechgraph.modes.family import NO_NUMBERS, Array, Family, Nearby, at_rest, irregular, least_value, searched
 from mechgraph.modes.form import EquationForm, RodChain, Whole, WithoutRods, rods_of
-from mechgraph.modes.start_sets import (
-    NOT_TESTED,
-    Irregular,
-    StartSet,
-    bound,
-    distinct,
-    keep,
-    kept,
-    start_set,
-    tested,
-)
+from mechgraph.modes.start_sets import NOT_TESTED, Irregular, StartSet, bound, distinct, keep, kept, start_set, tested
 from mechgraph.modes.targets import (
     MOST_FOLLOWED,
     Ends,
@@ -474,8 +464,8 @@ class Question:
         """User coordinates ``(M, F)`` of real states ``(nx, M)``: whole rounds nearest to the start, given ones exactly as given."""
         s = self.system
         start = s.start_coordinates(self.m.start)
-        q = np.stack([s.coordinates_of(x[:, [i]], start)[:, 0] for i in range(x.shape[1])] or [np.zeros(0)])
-        q = q.reshape(x.shape[1], s.n_freedoms)
+        # each by itself
+        q = s.coordinates_of(x[:, :, None], start)[:, :, 0].T
         period = self.periods.copy()
         period[self.columns] = np.inf
         back = np.isfinite(period)
@@ -644,8 +634,10 @@ class Finder:
         others = np.concatenate([others, x[:, complex_]], axis=1)
         evidence = (*evidence, *self.told, *([BESIDE] if more else []))
         # both ways of a leg are one at the limit of its reach
-        kept = np.flatnonzero(made)
-        kept = kept[distinct(self.question.family.prints(Configuration(system, x[:, kept].real)))]
+        kept, prints = np.flatnonzero(made), self.question.family.prints(Configuration(system, x.real))
+        way, root = np.divmod(kept, max(1, solved.shape[1]))
+        each = [kept[root == k] for k in range(solved.shape[1])]
+        kept = np.sort(np.concatenate([kept[:0], *(own[distinct(prints[:, own])] for own in each)]))
         way, root = np.divmod(kept, max(1, solved.shape[1]))
         return Solutions(
             x[:, kept].real, solved, np.stack([root, way]), unreal, others, word, evidence, N, found.infinite * every,
@@ -663,7 +655,11 @@ class Finder:
         q, m, x = self.question, self.question.asked, found.x
         here = Configuration(q.system, x)
         poses = np.moveaxis(user_poses(here), 1, 0)
-        order = sorted(_ordered(q.family.prints(here).T), key=found.of[1].tolist().__getitem__)
+        nearest = np.flatnonzero(found.of[1] == 0)
+        place = {
+            k: i for i, k in enumerate(found.of[0, nearest[_ordered(q.family.prints(here)[:, nearest].T)]].tolist())
+        }
+        order = sorted(range(x.shape[1]), key=lambda i: (found.of[1, i], place[found.of[0, i]]))
         x, poses = x[:, order], poses[order]
         roots, root, count = np.unique(found.of[0, order], return_inverse=True, return_counts=True)
         coordinates = self._coordinates(x, i)
@@ -797,11 +793,12 @@ def _said_apart(sure: Sequence[Certificate | None]) -> tuple[str, ...]:
 
 def _ordered(numbers: Array) -> list[int]:
     """The order of rows by their numbers, of which smaller differences than rounding do not count."""
+    # difference of link poses (and coordinates) below which the next number decides the order of assemblies
+    least = 1e-7 * float(np.abs(numbers).max(initial=1.0))
 
     def compare(i: int, j: int) -> int:
         apart = numbers[i] - numbers[j]
-        # difference of link poses (and coordinates) below which the next number decides the order of assemblies
-        first = int(np.argmax(np.abs(apart) > 1e-7 * max(1.0, float(np.abs(numbers).max()))))
+        first = int(np.argmax(np.abs(apart) > least))
         return int(np.sign(apart[first]))
 
     return sorted(range(len(numbers)), key=cmp_to_key(compare))
