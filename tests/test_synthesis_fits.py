@@ -111,7 +111,7 @@ def test_where_no_start_leads_through_all_rows_nothing_is_found_and_that_is_said
     m, asked = replaced(four_bar(), B=(0, 3)), {"starts": 2, "bounds": {"C.point.x": (3, 3.1)}}
     s = mg.synthesize(m, task, ["C.point.x"], fit="least_squares", **asked)
     assert len(s) == 0
-    assert s.evidence[0].startswith("0 starts of 5 led to all rows")
+    assert s.evidence[0].startswith("0 starts of 13 led to all rows")
     degrees = mg.function("A", "D", np.column_stack([np.rad2deg(angles), 0.3 * np.sin(angles)]))
     with pytest.warns(mg.MechgraphWarning, match="360 rad is asked, 57.3 turns; angles are in radians"):
         s = mg.synthesize(m, degrees, ["C.point.x"], fit="least_squares", **asked)

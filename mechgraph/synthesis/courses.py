@@ -75,6 +75,9 @@ def descended(
         rates = fit.rates(here)
         step = _DampedStep(here, *_left_rates(fit, here, rates, weight), damping, open_, ends)
         dz, dt = step.least(left)
+        # longer steps go half a radian, or half of L, in their direction
+        far = np.abs(fit.moves(rates, dz, each * dt[:, None])).max(axis=(0, 1))
+        dz, dt = (v * np.minimum(1.0, 0.5 / np.maximum(far, 1e-9)) for v in (dz, dt))
         there, came = fit.stepped(here, rates, here.z + part * dz, here.theta + each * (part * dt)[:, None])
         bend = ((_left(fit, there, weight) - left) / part - step.along(dz, dt)) / part
         az, at = step.least(np.where(came[:, None], bend, 0.0))

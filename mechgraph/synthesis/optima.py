@@ -91,15 +91,15 @@ def fitted(
     progress: Callable[[str], None] | None = None,
     exact: Iterable[Array] = (),
 ) -> Fitted:
-    """The optima to which dimensions lead: the declared ones, those that do parts of the task exactly, and four random ones for
-    each of ``starts`` that is left.
+    """The optima to which dimensions lead: the declared ones, those that do parts of the task exactly, and twelve random ones
+    for each of ``starts`` that is left.
 
     ``exact`` are values of all names. ``way``, ``goal`` and ``limits`` are those of ``constrained``.
     """
     low, high = fit.limits(bounds)
     rng, u = np.random.default_rng(seed), len(fit.z0)
     told = [fit.p.inside(values[:, None])[:, 0] for values in exact]
-    many = max(4 * (starts - 1 - len(told)), 0)
+    many = max(12 * (starts - 1 - len(told)), 0)
 
     def box(reach: Array | float) -> tuple[Array, Array]:
         begin, end = low[:u], high[:u]

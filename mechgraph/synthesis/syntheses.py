@@ -522,7 +522,7 @@ def synthesize(
     starts : int
         From how many dimensions a fit begins: the declared ones; all real exact solutions of so many subsets of the positions, or with
         numbers that are free at so many random values, where a start set of such tasks came with the package or is kept (that of a
-        ``sweep`` is); then the best of four times as many random ones about the declared ones or in ``bounds``.
+        ``sweep`` is); then the best of twelve times as many random ones about the declared ones or in ``bounds``.
     seed : int
         Seed of all random numbers; exact results of a mechanism do not depend on it.
     cache : bool
