@@ -300,7 +300,7 @@ def same_motions(motions: Array, i: int) -> Mask:
 
 
 class OneRow:
-    """One row of a class at states ``x (nx, T)``: its residual ``(n, T)``, and the smallest steps that take it to zero, unknowns at rest."""
+    """One row of a class at states ``x (nx, T)``: its residual ``(n, T)``, and the least steps that take it to zero, unknowns at rest."""
 
     def __init__(self, of: TaskClass, task: ClassMember, x: Array) -> None:
         self.of, self.rows = of, of.at(task, x)
