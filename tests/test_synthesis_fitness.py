@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ladder import LADDER, spatial
+from ladder import LADDER, four_bar, spatial
 from mechanisms import FourBarFormula
 
 import mechgraph as mg
@@ -176,6 +176,25 @@ def test_without_a_driver_nothing_is_said_of_defects() -> None:
     m, task, unknown, _ = LADDER["R-R dyad, 5 poses"]()
     s = mg.synthesize(m, task, unknown, require=["full_turn"])
     assert {one.reasons for one in s.rejected} == {("full turn not determined",)}
+
+
+@pytest.mark.parametrize("seed", [8, 10])
+def test_conditions_are_those_of_positions_to_which_the_driver_does_not_lead(seed: int) -> None:
+    """The rocker stands where it is asked; the crank leads it elsewhere, or does not come so far."""
+    pairs = np.random.default_rng(seed).uniform(-0.8, 0.8, (5, 2))
+    pairs[0] = 0.0
+
+    def turned(s: mg.Solution) -> np.ndarray:
+        return s["D"].position
+
+    ends = {turned: (pairs[:, 1].min() - 1e-6, pairs[:, 1].max() + 1e-6)}
+    s = mg.synthesize(four_bar(), mg.function("A", "D", pairs), ["B.point", "C.point"], conditions=ends)
+    assert [one.branch for one in s.fitness] == [True]
+    assert s.rejected == ()
+    beyond = mg.synthesize(
+        four_bar(), mg.function("A", "D", pairs), ["B.point", "C.point"], conditions=ends, over={"A": [0, 3, -3]}
+    )
+    assert [one.reasons for one in beyond.rejected] == [("turned is not determined at all positions",)]
 
 
 def test_from_a_dead_point_a_driver_leads_nowhere_and_two_drivers_leave_defects_unknown() -> None:

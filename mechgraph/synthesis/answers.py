@@ -319,7 +319,9 @@ class Syntheses(Shown, Sequence[Mechanism]):
                 why += [] if keeps(value, least, most) else [f"{name} = {value:.6g} is out of its bounds"]
             for name, measure, least, most in limits:
                 values = measure(m, self.coordinates[i], driver)
-                if not keeps(values, least, most):
+                if np.isnan(values).any():
+                    why.append(f"{name} is not determined at all positions")
+                elif not keeps(values, least, most):
                     ends = dict.fromkeys((float(np.min(values)), float(np.max(values))))
                     why.append(f"{name} = {' to '.join(f'{end:.6g}' for end in ends)}")
             if why:

@@ -32,6 +32,7 @@ from mechgraph.model.setups import is_interval, two_ends
 from mechgraph.modes.circuits import Circuits, in_order
 from mechgraph.modes.family import Family
 from mechgraph.quantities import wrong
+from mechgraph.result.solution import Solution
 from mechgraph.variants.numbers import side_by_side
 from mechgraph.variants.work import Output, named_outputs, quantity
 
@@ -304,7 +305,8 @@ class Measure:
                 raise DeclarationError(f"synthesis of {m.name!r}", faults) from None
 
     def __call__(self, m: Mechanism, q: Array, driver: str | None, smooth: bool = False) -> Array:
-        """Its values ``(k,)`` of a mechanism at positions ``q (n, F)``, NaN where the driver does not lead to one.
+        """Its values ``(k,)`` of a mechanism at positions ``q (n, F)``, each by itself where the driver does not lead from the first
+        to all; NaN ``over`` values to which it does not lead.
 
         ``smooth`` asks for smooth functions of the dimensions of which it is the largest one.
         """
@@ -319,6 +321,8 @@ class Measure:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MechgraphWarning)
             s = solve(m, motions, on_reach="flag")
+            if not self.over and len(q) > 1 and not _passes(s, q):
+                return np.concatenate([self(m, q[[i]], driver, smooth) for i in range(len(q))])
             if self.output is not None:
                 return transmission(s, self.output).transmission_angle.ravel()
             if not callable(self.what):
@@ -329,6 +333,16 @@ class Measure:
                 name = getattr(self.what, "__name__", repr(self.what))
                 told = f"{self.asked}: {name} raised {type(error).__name__}: {error}"
                 raise DeclarationError(f"synthesis of {m.name!r}", [told]) from error
+
+
+def _passes(s: Solution, q: Array) -> bool:
+    """Whether the positions of a solution are those with coordinates ``q (n, F)``, but for whole turns."""
+    m = s.mechanism
+    off = np.concatenate([s[pair.name].position.reshape(-1, pair.type.f) for pair in m.pairs], axis=1) - q
+    turns = np.array([m.turns(name) for name in m.freedom_names()])
+    off = np.where(turns, np.abs(np.exp(1j * off) - 1.0), np.abs(off))
+    # what is followed may be rounded; NaN is nowhere
+    return bool((off < 1e-6 * max(1.0, float(np.abs(q).max()))).all())
 
 
 def limits_of(
