@@ -859,5 +859,7 @@ def assemblies(
     (4, 16, 'proved')
     """
     question = Question(m, values)
-    found = Finder(question, int(seed), cache, progress).positions(int(guesses), float(turns))
+    # of many positions fewer ways of legs each, as all of them are kept
+    most = MOST_FOLLOWED * 16 // max(16, question.drive.shape[1])
+    found = Finder(question, int(seed), cache, progress, most).positions(int(guesses), float(turns))
     return AssembliesOver(tuple(found)) if question.batch else found[0]
