@@ -659,7 +659,7 @@ class Finder:
         place = {
             k: i for i, k in enumerate(found.of[0, nearest[_ordered(q.family.prints(here)[:, nearest].T)]].tolist())
         }
-        order = sorted(range(x.shape[1]), key=lambda i: (found.of[1, i], place[found.of[0, i]]))
+        order = sorted(range(x.shape[1]), key=lambda i: (found.of[1, i], place.get(found.of[0, i], 0)))
         x, poses = x[:, order], poses[order]
         roots, root, count = np.unique(found.of[0, order], return_inverse=True, return_counts=True)
         coordinates = self._coordinates(x, i)
