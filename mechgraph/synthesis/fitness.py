@@ -129,8 +129,10 @@ def fitnesses(
     order = np.argsort(-np.abs(of.of_branch[step]), kind="stable")
     branches, values = np.full((2, len(case)), np.nan)
     branches[k[order]], values[k[order]] = of.of_branch[step[order]], value[order]
-    x[:, k[order]] = there[:, order]
-    rows = Configuration(s.cases(case), x)
+    # difference of coordinates, but for whole turns, of states of a row that are two
+    if asked is not None and (np.abs(np.exp(1j * there) - np.exp(1j * x[:, k])) > 1e-6).any():
+        x[:, k[order]] = there[:, order]
+        rows = Configuration(s.cases(case), x)
     branches, values = branches.reshape(V, -1), values.reshape(V, -1)
     # the first one, also where it is a dead point
     branches[:, 0], values[:, 0] = 0.0, of.x[of.row]
