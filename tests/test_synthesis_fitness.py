@@ -290,7 +290,8 @@ def test_a_leg_that_stands_the_other_way_at_a_row_is_no_defect() -> None:
         mg.Pair("B", "S", "leg", "rocker", point=far),
         mg.Pair("G", "R", "rocker", "frame", point=(1, 3, 0), axis=(0.3, 0.1, 1)),
     ]
-    m = mg.Mechanism("leg", pairs=pairs, drives=["A"], frame="frame")
+    links = [mg.Link(name) for name in ("frame", "crank", "leg")] + [mg.Link("rocker", points={"tip": (2, 2, 1)})]
+    m = mg.Mechanism("leg", links, pairs, drives=["A"], frame="frame")
     b, output = mg.branches(m, "A", samples=6, points=60), m.freedom_names().index("G.Rz")
     rows = b.branches[0].coordinates[[8, 13, 18]]
     # of others at the same place of the crank the one that has the same place of the rocker, and one that has not
@@ -304,11 +305,15 @@ def test_a_leg_that_stands_the_other_way_at_a_row_is_no_defect() -> None:
     assert len(near) == 2
     plain = fitness(m, rows, "A", "G")
     assert fitness(m, other, "A", "G").circuit
-    (found,) = fitnesses([m], other[None], "A", "G", asked=asked)
-    assert (found.branch, found.circuit, found.order) == (plain.branch, plain.circuit, plain.order) == (False,) * 3
-    assert abs(found.transmission - plain.transmission) < 1e-9
+    of_point = {f"rocker.tip.{part}": np.ones(3) for part in ("Tx", "Ty", "Tz")}
+    for names in (asked, of_point, {"rocker.Rz": np.ones(3)}):
+        (found,) = fitnesses([m], other[None], "A", "G", asked=names)
+        assert (found.branch, found.circuit, found.order) == (plain.branch, plain.circuit, plain.order) == (False,) * 3
+        assert abs(found.transmission - plain.transmission) < 1e-9
     # where the output is asked to be elsewhere, this is a defect; nothing is asked at the second row
-    (found,) = fitnesses([m], wrong[None], "A", "G", asked=asked | {"G.Rz": wrong[:, output]})
-    assert found.branch
+    for names in (asked, of_point, {"rocker.Rz": np.ones(3)}, {"leg.Rz": np.ones(3)}):
+        (found,) = fitnesses([m], wrong[None], "A", "G", asked=names)
+        assert found.branch
+    assert fitnesses([m], other[None], "A", "G", asked={"leg.Rz": np.ones(3)})[0].branch
     (found,) = fitnesses([m], wrong[None], "A", "G", asked=asked | {"G.Rz": rows[:, output] * [1, np.nan, 1]})
     assert not found.branch

@@ -659,7 +659,7 @@ class Finder:
         place = {
             k: i for i, k in enumerate(found.of[0, nearest[_ordered(q.family.prints(here)[:, nearest].T)]].tolist())
         }
-        order = sorted(range(x.shape[1]), key=lambda i: (found.of[1, i], place[found.of[0, i]]))
+        order = sorted(range(x.shape[1]), key=lambda i: (found.of[1, i], place.get(found.of[0, i], 0)))
         x, poses = x[:, order], poses[order]
         roots, root, count = np.unique(found.of[0, order], return_inverse=True, return_counts=True)
         coordinates = self._coordinates(x, i)
@@ -859,5 +859,7 @@ def assemblies(
     (4, 16, 'proved')
     """
     question = Question(m, values)
-    found = Finder(question, int(seed), cache, progress).positions(int(guesses), float(turns))
+    # of many positions fewer ways of legs each, as all of them are kept
+    most = MOST_FOLLOWED * 16 // max(16, question.drive.shape[1])
+    found = Finder(question, int(seed), cache, progress, most).positions(int(guesses), float(turns))
     return AssembliesOver(tuple(found)) if question.batch else found[0]

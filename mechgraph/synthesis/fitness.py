@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import combinations
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, cast
 
 import numpy as np
 
@@ -130,8 +130,10 @@ def fitnesses(
     order = np.argsort(-np.abs(of.of_branch[step]), kind="stable")
     branches, values = np.full((2, len(case)), np.nan)
     branches[k[order]], values[k[order]] = of.of_branch[step[order]], value[order]
-    x[:, k[order]] = there[:, order]
-    rows = Configuration(s.cases(case), x)
+    # difference of coordinates, but for whole turns, of states of a row that are two
+    if asked is not None and (np.abs(np.exp(1j * there) - np.exp(1j * x[:, k])) > 1e-6).any():
+        x[:, k[order]] = there[:, order]
+        rows = Configuration(s.cases(case), x)
     branches, values = branches.reshape(V, -1), values.reshape(V, -1)
     # the first one, also where it is a dead point
     branches[:, 0], values[:, 0] = 0.0, of.x[of.row]
@@ -162,19 +164,18 @@ def _asked(
     m, s, out = mechanisms[0], here.system, []
     case, row = np.divmod(k, len(next(iter(asked.values()))))
     for name, values in asked.items():
-        if isinstance(target := target_of(m, name), Target):
-            link = [one.name for one in m.links].index(target.link)
-            X = user_poses(here, slice(link, link + 1))[0, :, :3] / [1.0, 1.0, 1.0, s.par.L]
-            at = [
-                (0, 0, 0, 1) if not target.point else (*one.links[link].points[target.point], 1) for one in mechanisms
-            ]
-            place = np.einsum("tij,tj->it", X, np.array(at)[case])
-            found = np.concatenate([place, *([] if target.point else [X[:, :, :3].reshape(len(k), 9).T])])
-        else:
+        if m.freedom_fault(name, single=True) is None:
             [column] = s.columns_of([name])
             found, period = here.x[s.single_rows[[column]]], of.family.periods[column]
             if np.isfinite(period):
                 found = np.concatenate([np.cos(2 * np.pi * found / period), np.sin(2 * np.pi * found / period)])
+        else:
+            target = cast("Target", target_of(m, name))
+            link = [one.name for one in m.links].index(target.link)
+            at = np.array([one.links[link].points.get(target.point, (0, 0, 0)) for one in mechanisms])[case]
+            X = user_poses(here, slice(link, link + 1))[0]
+            place = (np.einsum("tij,tj->it", X[:, :3, :3], at) + X[:, :3, 3].T) / s.par.L
+            found = place if target.point else np.concatenate([place, X[:, :3, :3].reshape(len(k), 9).T])
         out.append(np.where(np.isnan(values[row]), 0.0, found))
     return np.concatenate(out)
 

@@ -130,7 +130,7 @@ class TaskPencil:
     def __init__(self, equations: TaskClass, base: ClassMember, rng: np.random.Generator) -> None:
         self.of, self.base = equations, base
         open_, length = movable(equations), equations.is_length
-        # any row of those with as many conditions, any angle: of some, poles are too far away to be told
+        # any row of those with as many conditions, any angle, of which the way is as long as any: of short ones poles lie too far away
         most = np.where(open_.any(axis=1), equations.conditions, -1)
         row = int(rng.choice(np.flatnonzero(most == most.max())))
         other = equations.random_members(rng, 1)[0].drive[row, :, 0] - base.drive[row, :, 0]
@@ -140,7 +140,8 @@ class TaskPencil:
         moves = given & length if (given & length).any() else np.arange(len(given)) == rng.choice(np.flatnonzero(given))
         s, F = equations.problem.system, equations.problem.system.n_freedoms
         self.parts = _parts_of_turns(equations) if np.isin(equations.columns[moves], s.coupled_freedoms).any() else 1
-        grown = np.where(length, other, np.exp(1j / self.parts * np.where(length, 0.0, other)) - 1.0)
+        turned = np.exp(1j / self.parts * np.where(length, 1.0, other)) - 1.0
+        grown = np.where(length, other, turned / np.abs(turned))
         points = [(c // F, s.pair_of_freedom[c % F]) for c in equations.columns]
         for own in _together([key if at else None for key, at in zip(points, moves & length, strict=True)]):
             grown[own] = np.linalg.norm(other[own]) * _isotropic(len(own), rng)
