@@ -141,7 +141,7 @@ class TaskPencil:
         s, F = equations.problem.system, equations.problem.system.n_freedoms
         self.parts = _parts_of_turns(equations) if np.isin(equations.columns[moves], s.coupled_freedoms).any() else 1
         turned = np.exp(1j / self.parts * np.where(length, 1.0, other)) - 1.0
-        grown = np.where(length, other, turned / np.abs(turned))
+        grown = np.where(length, other, turned / np.where(turned == 0, 1.0, np.abs(turned)))
         points = [(c // F, s.pair_of_freedom[c % F]) for c in equations.columns]
         for own in _together([key if at else None for key, at in zip(points, moves & length, strict=True)]):
             grown[own] = np.linalg.norm(other[own]) * _isotropic(len(own), rng)
@@ -725,7 +725,9 @@ def _closed_real(of: TaskClass, goal: ClassMember, x: Array) -> tuple[Array, Arr
             here = here.again(of.advance(here.x, step).real.astype(complex))
             if of.size(here.x, step).max() < MODES.real_closed:
                 break
-    error, size = of.error(here.rows), np.maximum(1.0, np.abs(x[: of.u]).max(axis=0, initial=0.0))
+        # of what went off, no number
+        error = of.error(here.rows)
+    size = np.maximum(1.0, np.abs(x[: of.u]).max(axis=0, initial=0.0))
     moved = np.abs(here.x[: of.u] - x[: of.u]).max(axis=0, initial=0.0)
     good = (moved < MODES.real_singular * size) & (of.size(here.x, step) < np.sqrt(MODES.real_closed))
     good &= np.isfinite(here.x).all(axis=0)
