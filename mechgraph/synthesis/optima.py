@@ -7,7 +7,7 @@ the end on all rows.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from itertools import combinations_with_replacement
@@ -105,8 +105,8 @@ def fitted(
         begin, end = low[:u], high[:u]
         return np.where(np.isfinite(begin), begin, fit.z0 - reach), np.where(np.isfinite(end), end, fit.z0 + reach)
 
-    # how far from those declared, in L; what is best in something else may be farther
-    reach = 0.5 * (8.0 if way is None else 1.0) ** rng.uniform(size=(many, 1))
+    # how far from those declared, in L
+    reach = 0.5 * 8.0 ** rng.uniform(size=(many, 1))
     tries = np.concatenate([np.reshape([fit.z0, *told], (-1, u)), rng.uniform(*box(reach))]).T
     tries = np.clip(tries, low[:u, None], high[:u, None])
     begun, count = _best(fit, tries, low, high, goal if way is None else None, limits, progress)
@@ -155,7 +155,7 @@ def fitted(
         words.append(f"{counted(len(told), 'start')} of these do {part} exactly.")
     elif way is None and fit.spare > 0:
         words.append(
-            "None was known to do all that is asked: sweep= over free numbers, with cache=True, keeps a start set for that."
+            "None was known to do all that is asked: such tasks are not solved exactly, or none of their solutions is real."
         )
     if unsafe + lost:
         words.append(
@@ -253,6 +253,14 @@ def _evolved(fit: Fit, low: Array, high: Array, seed: int) -> FitPoint | None:
     )
     here, came = fit.begun(found.x[:, None])
     return here if came[0] else None
+
+
+def _large(sizes: Sequence[float], declared: Mechanism) -> Iterator[str]:
+    """What is said of mechanisms much larger than the declared one."""
+    here = float(distances(declared).max(initial=0.0))
+    if (many := sum(size > 10.0 * here for size in sizes)) and here:
+        grown = f"{many} of {len(sizes)} are more than ten times as large as the declared one ({here:.3g}), up to {max(sizes):.3g}"
+        yield f'{grown}; bounds= or conditions={{"size": (None, most)}} keep links short.'
 
 
 class FittedSynthesis:
@@ -390,6 +398,7 @@ class FittedSynthesis:
         errors = [float(self.fit.errors(here).max(initial=0.0)) for here in points]
         shape = (self.fit.own, len(p.m.links), 4, 4)
         closed = [float(np.abs(here.at.residual).max(initial=0.0)) for here in points]
+        told = tuple(fitnesses([m for m, _ in made], np.array([q for _, q in made]), self.driver, self.output, errors))
         return Syntheses(
             p.first.declared,
             tuple(m for m, _ in made),
@@ -403,8 +412,8 @@ class FittedSynthesis:
             (),
             0,
             "searched",
-            found.evidence,
+            (*found.evidence, *_large([one.size for one in told], p.first.declared)),
             np.array([1.0 / self.fit.margins(here).min() for here in points]),
-            tuple(fitnesses([m for m, _ in made], np.array([q for _, q in made]), self.driver, self.output, errors)),
+            told,
             driver=self.driver,
         )

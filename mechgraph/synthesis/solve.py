@@ -206,9 +206,15 @@ def _parts_of_turns(of: TaskClass) -> int:
 
 
 def start_set(
-    of: TaskClass, rng: np.random.Generator, progress: Progress, published: tuple[int, str] | None = None
+    of: TaskClass,
+    rng: np.random.Generator,
+    progress: Progress,
+    published: tuple[int, str] | None = None,
+    some: bool = False,
 ) -> TaskStart:
-    """All solutions of a random task of a class; where there are as many as were ``published``, no test is needed."""
+    """All solutions of a random task of a class; where there are as many as were ``published``, no test is needed. Where ``some`` of them
+    will do, those known when they turn out to be many.
+    """
     # solutions from which on they are not looked for any further, and from which on one is followed of those that do the same
     (most, source), many = published or (20_000, ""), 100
     group = TrackGroup(of, of.start, of.x[:, None], min(most, many))
@@ -217,9 +223,10 @@ def start_set(
         if source and len(motions_of(of, group.base, group.x)):
             return _of_each(of, group, most, source, rng, progress)
         group.most = most
-        group.grow(MISSED, rng, progress)
+        if not some:
+            group.grow(MISSED, rng, progress)
     known = group.quiet, group.chance
-    if known[1] > MISSED and group.followed >= MOST_TRACKED:
+    if known[1] > MISSED and (some or group.followed >= MOST_TRACKED):
         return TaskStart(
             group.base, group.x[:, :, None], *known, group.lost, group.followed, NOT_PASSED, estimate=group.estimate
         )
@@ -599,10 +606,15 @@ def endless(of: TaskClass, goal: ClassMember, x: Array) -> Mask:
 
 
 def start_of(
-    of: TaskClass, rng: np.random.Generator, cache: bool, progress: Progress, again: bool = False
+    of: TaskClass,
+    rng: np.random.Generator,
+    cache: bool,
+    progress: Progress,
+    again: bool = False,
+    some: bool = False,
 ) -> TaskStart:
-    """The start set of a class: a kept one, of which a test that no one passed may be tried ``again``, or else one that is made, and kept
-    where it is whole.
+    """The start set of a class: a kept one, of which a test that no one passed may be tried ``again``, or else one that is made, see
+    ``start_set``, and kept where it is whole.
 
     That takes so long that somebody who looks at a terminal or a notebook is told of it unasked.
     """
@@ -619,7 +631,7 @@ def start_of(
         progress(
             "first task of its kind: all solutions of a random one are worked out, and kept for others; seconds to minutes"
         )
-    made = start_set(of, rng, progress)
+    made = start_set(of, rng, progress, some=some)
     # where loops ended by their number, those of a later call would get no further
     if cache and (made.word == "tested" or made.chance <= MISSED_AGAIN or made.followed >= MOST_TRACKED):
         _keep(of, made)

@@ -16,7 +16,7 @@ import numpy as np
 from mechgraph.errors import DeclarationError, MechgraphWarning, counted
 from mechgraph.graph.chains import Chain
 from mechgraph.kinematics.state import Configuration
-from mechgraph.maths.se3 import Array
+from mechgraph.maths.se3 import Array, Index
 from mechgraph.maths.tolerances import MODES
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.setups import DefectName, FitName, SynthesisSetup, is_interval, two_ends
@@ -433,37 +433,50 @@ def subset_values(problem: RowProblem, tasks: Any, subsets: int, seed: int, prog
 
 
 def fixed_values(
-    problem: RowProblem, tasks: Any, spare: int, bounds: Mapping[str, Any], values: int, seed: int, progress: Progress
+    problem: RowProblem,
+    tasks: Any,
+    spare: int,
+    bounds: Mapping[str, Any],
+    values: int,
+    seed: int,
+    cache: bool,
+    progress: Progress,
 ) -> Array:
-    """Values ``(n, names)`` of all real solutions of a task with fewer conditions than unknowns, as many of these fixed at random values in
-    ``bounds``, or at any distance from those declared.
+    """Values ``(n, names)`` of real solutions of a task with fewer conditions than unknowns, as many of these fixed at random values in
+    ``bounds``, or at any distance from those declared: all where the class has fewer than a hundred.
 
-    None where no start set of such tasks is kept or came with the package.
+    None where no such tasks are solved exactly.
     """
     rng, names, none = np.random.default_rng(seed), problem.unknowns.names, np.zeros((0, len(problem.unknowns.names)))
     if problem.unknowns.others or not problem.closed_at_start or spare < 1:
         return none
+    found = list[tuple[Index, Synthesis, TaskStart | None]]()
     # choices of what is fixed that are looked at; those that come last first, as frames and pivots are named first
     for fixed in islice(combinations(range(len(names))[::-1], spare), 8):
-        rest, swept = [k for k in range(len(names)) if k not in fixed], dict[str, Array]()
+        swept = dict[str, Array]()
         for k in fixed:
             low, high = two_ends(bounds.get(names[k], (None, None)))
             far = problem.unknowns.declared[k] + 2 * problem.L * rng.standard_cauchy(values)
             swept[names[k]] = rng.uniform(low, high, values) if np.isfinite(high - low) else np.clip(far, low, high)
         try:
-            of = Synthesis(
-                RowProblem(problem.m, tasks, [names[k] for k in rest]), tasks, swept, seed, True, progress, []
-            )
+            rest = RowProblem(problem.m, tasks, [name for name in names if name not in swept])
+            of = Synthesis(rest, tasks, swept, seed, True, progress, [])
         except (NoClass, DeclarationError):
             continue
-        if (start := kept(of.of)) is not None and start.x.shape[1] < TRACKS_TOGETHER:
-            goals, out = of.goals.taken(np.arange(min(values, TRACKS_TOGETHER // start.x.shape[1]))), [none]
-            for i, one in enumerate(ends(of.of, start, goals, rng, progress)):
-                z = real_states(of.of, goals.taken(np.array([i])), one.x)[0][: of.of.u]
-                out.append(np.empty((z.shape[1], len(names))))
-                out[-1][:, rest], out[-1][:, fixed] = of.problem.outside(z).T, of.swept[:, i]
-            return np.concatenate(out)
-    return none
+        found.append((np.array(fixed), of, kept(of.of) if cache else None))
+        if found[-1][2] is not None:
+            break
+    if not found:
+        return none
+    # one that is kept, else the first
+    held, of, known = found[-1] if found[-1][2] is not None else found[0]
+    start = known or start_of(of.of, np.random.default_rng(seed), cache, progress, some=True)
+    goals, out = of.goals.taken(np.arange(min(values, TRACKS_TOGETHER // start.x.shape[1]))), [none]
+    for i, one in enumerate(ends(of.of, start, goals, rng, progress) if len(goals.drive.T) else ()):
+        z = real_states(of.of, goals.taken(np.array([i])), one.x)[0][: of.of.u]
+        out.append(np.empty((z.shape[1], len(names))))
+        out[-1][:, np.delete(np.arange(len(names)), held)], out[-1][:, held] = of.problem.outside(z).T, of.swept[:, i]
+    return np.concatenate(out)
 
 
 @door
@@ -520,9 +533,9 @@ def synthesize(
     over : mapping, optional
         Driver -> values at which conditions hold, in place of the positions.
     starts : int
-        From how many dimensions a fit begins: the declared ones; all real exact solutions of so many subsets of the positions, or with
-        numbers that are free at so many random values, where a start set of such tasks came with the package or is kept (that of a
-        ``sweep`` is); then the best of twelve times as many random ones about the declared ones or in ``bounds``.
+        From how many dimensions a fit begins: the declared ones; all real exact solutions of so many subsets of the positions, where a
+        start set of such tasks came with the package or is kept, or with numbers that are free at so many random values, for which one
+        is made, of a hundred solutions at most; then the best of twelve times as many random ones about the declared ones or in ``bounds``.
     seed : int
         Seed of all random numbers; exact results of a mechanism do not depend on it.
     cache : bool
@@ -603,8 +616,8 @@ def synthesize(
         again, exact = RowProblem(m, tasks, unknown), np.zeros((0, len(problem.unknowns.names)))
         if cache and fit is not None:
             exact = subset_values(again, tasks, *numbers, progress)
-        elif cache:
-            exact = fixed_values(again, tasks, spare, within, *numbers, progress)
+        elif fit is None:
+            exact = fixed_values(again, tasks, spare, within, *numbers, cache, progress)
         answer = fits.answered(fit, within, limits, goals, *numbers, progress, exact)
         return answer._kept(require, within, limits, fits.driver)
     found = Synthesis(problem, tasks, dict(sweep or {}), int(seed), cache, progress, faults)
