@@ -123,6 +123,22 @@ def test_both_ways_of_two_turns_are_those_of_two_pairs_with_a_link_between(slope
     assert maps[0].completeness == ("tested" if slope == 1 else "proved")
 
 
+def test_both_ways_of_a_leg_are_found_where_the_start_alone_lies_between_samples() -> None:
+    """The crank swings by a fortieth of a turn; on the circuit of the start alone the leg would stand in one way."""
+    near, far = NEAR, np.array((1.05, 0.1, 0.2))
+    *pairs, _, ground = turned_leg(np.cross((0.3, 0.2, 1.0), far - near)).pairs
+    m = mg.Mechanism(
+        "short", pairs=[*pairs, mg.Pair("B", "S", "leg", "rocker", point=far), ground], drives=["A"], frame="frame"
+    )
+    b = mg.branches(m, "A", samples=3, points=12)
+    assert (b.circuits, b.open_ends, b.completeness) == (((0, 1), (2, 3)), 0, "proved")
+    (low, again, high, once_more) = (fold.value for fold in b.folds)
+    assert (again, once_more) == pytest.approx((low, high), abs=1e-9)
+    # next to both folds, outside and inside
+    counts = [len(mg.assemblies(m, {"A": angle})) for angle in (low - 1e-3, low + 1e-3, high - 1e-3, high + 1e-3)]
+    assert counts == [0, 4, 4, 0]
+
+
 @pytest.mark.daily(1)
 @pytest.mark.parametrize(
     ("feet", "heads"), [((0, 1, 2, 3, 4, 5), (0, 0, 1, 1, 2, 2)), ((0, 1, 1, 2, 2, 0), (0, 0, 1, 1, 2, 2))]

@@ -197,6 +197,28 @@ def test_conditions_are_those_of_positions_to_which_the_driver_does_not_lead(see
     assert [one.reasons for one in beyond.rejected] == [("turned is not determined at all positions",)]
 
 
+def test_conditions_without_a_driver_are_a_fault_and_those_of_two_drivers_are_taken_at_the_rows() -> None:
+    m = four_bar().replace(drives=[])
+    poses = mg.poses("coupler", [(0, 0, 0), (0.2, 0.1, 0.1), (0.5, 0.1, 0.3)])
+    with pytest.raises(
+        mg.DeclarationError, match=r"conditions: 'D.effort': .* 1 freedom is neither driven nor passive"
+    ):
+        mg.synthesize(m, poses, ["B.point", "C.point"], conditions={"D.effort": (None, 40)})
+
+    def turned(s: mg.Solution) -> np.ndarray:
+        return s["A"].position
+
+    swing = [mg.Pair("D", "R", "swing", "rocker", point=(2.2, 0)), mg.Pair("E", "R", "frame", "swing", point=(5, 1))]
+    five = mg.Mechanism("five-bar", pairs=[*m.pairs[:-1], *swing], drives=["A", "E"], planar=True, frame="frame")
+    rows = mg.positions(
+        [{"A": 0.0, "E": 0.0, "D": 0.0}, {"A": 0.1, "E": 0.2, "D": 0.2}, {"A": 0.3, "E": 0.1, "D": 0.1}]
+    )
+    for most in (0.31, 0.29):
+        s = mg.synthesize(five, rows, ["B.point"], conditions={turned: (None, most)})
+        assert [one.reasons for one in s.rejected] == [("turned = 0 to 0.3",)] * (most < 0.3)
+        assert len(s) == (most > 0.3)
+
+
 def test_from_a_dead_point_a_driver_leads_nowhere_and_two_drivers_leave_defects_unknown() -> None:
     """A slider-crank driven by its slider, with crank and rod in line; a five-bar of which one of two drives is asked."""
     m = mg.Mechanism(

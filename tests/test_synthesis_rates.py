@@ -189,3 +189,13 @@ def test_what_is_wrong_with_rates_is_told() -> None:
     over = np.array([[0.0, 0, 1, 0], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]])
     with pytest.raises(mg.DeclarationError, match="90 degrees about y"):
         mg.synthesize(BALLS, mg.poses("body", [np.eye(4), over], twists=[[1.0] * 6] * 2), ["P.point"])
+
+
+@pytest.mark.parametrize("rates", [[0.5, 0.7], [0.5, NAN]])
+def test_mechanisms_of_which_all_rates_are_asked_are_not_taken_for_the_same(rates: list[float]) -> None:
+    """All have the slopes asked; between the two pairs each one turns its rocker elsewhere."""
+    pairs = [[0, 0], [0.5, 0.4], [0.8, 0.9]][: 2 if rates[1] == 0.7 else 3]
+    task = mg.function("A", "D", pairs, rates=[*rates, NAN][: len(pairs)])
+    s = mg.synthesize(four_bar(), task, ["B.point", "C.point.x"])
+    assert (s.total, s.classes, s.completeness) == (3, 3, "tested")
+    assert s.copies == tuple((i,) for i in range(len(s)))

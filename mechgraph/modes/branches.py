@@ -556,7 +556,8 @@ class _Mapper:
         self, a: Station, b: Station, gap: Gap, pairs: Sequence[tuple[BranchRun, BranchRun]], ways: int
     ) -> tuple[list[Double], list[float], list[float]]:
         """Between stations: double points that are no folds that are known, values between folds that face each other, to which none came,
-        and values next to which something is left that is not accounted for. A double point is a fold in all ``ways`` of rods.
+        and values next to which something is left that is not accounted for. A double point is a fold in all ``ways`` of rods, of which
+        the start gives one alone.
         """
         begins, left = list[Double](), list[tuple[float, int]]()
         folds = [one.fold for one, _ in pairs]
@@ -565,13 +566,12 @@ class _Mapper:
         for sense, doubles in ((-1, gap.rising), (1, gap.falling)):
             mine = [value for value, of in folds if of == sense and a.value <= value <= b.value]
             for one in doubles:
-                mine.sort(key=lambda value: abs(value - one.value))
                 if not one.real:
                     left.append((one.value, -sense))
-                elif mine and abs(mine[0] - one.value) < gap.near:
-                    mine = [value for k, value in enumerate(mine) if k >= ways or abs(value - one.value) >= gap.near]
-                else:
-                    begins.append(one)
+                    continue
+                mine.sort(key=lambda value: abs(value - one.value))
+                known = sum(abs(value - one.value) < gap.near for value in mine[:ways])
+                mine, begins = mine[known:], begins + [one] * (known < ways)
             left += [(value, sense) for value in mine]
         rims = [(one.value, sense) for one, sense in ((a, 1), (b, -1)) if one.x is None]
         facing = pairwise(sorted([*left, *rims]))

@@ -19,7 +19,7 @@ from typing import Annotated, Any, Literal, cast
 import numpy as np
 
 from mechgraph.determinacy.mobility import free_motion
-from mechgraph.errors import DeclarationError, MechgraphWarning, did_you_mean, near_names
+from mechgraph.errors import DeclarationError, IndeterminateError, MechgraphWarning, did_you_mean, near_names
 from mechgraph.kinematics.assembly import closed_start
 from mechgraph.kinematics.prescribed import Target, target_of
 from mechgraph.kinematics.state import CLOSED, Configuration, user_poses
@@ -318,10 +318,14 @@ class Measure:
             return np.array([sizes(m)[self.what == "ratio"]])
         names = m.freedom_names()
         m = m.replace(start=dict(zip(names, q[0].tolist(), strict=True)))
-        motions = self.over or ({} if driver is None else {driver: q[:, names.index(m.full_name(driver))]})
+        drives = [drive.freedom for drive in m.drives] if driver is None else [driver]
+        motions = self.over or {name: q[:, names.index(m.full_name(name))] for name in drives}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MechgraphWarning)
-            s = solve(m, motions, on_reach="flag")
+            try:
+                s = solve(m, motions, on_reach="flag")
+            except IndeterminateError as error:
+                raise DeclarationError(f"synthesis of {m.name!r}", [f"{self._told}: {error}"]) from error
             if not self.over and len(q) > 1 and not _passes(s, q):
                 return np.concatenate([self(m, q[[i]], driver, smooth) for i in range(len(q))])
             if self.output is not None:
@@ -331,9 +335,12 @@ class Measure:
             try:
                 return np.asarray(self.what(s), dtype=float).ravel()
             except Exception as error:
-                name = getattr(self.what, "__name__", repr(self.what))
-                told = f"{self.asked}: {name} raised {type(error).__name__}: {error}"
+                told = f"{self._told} raised {type(error).__name__}: {error}"
                 raise DeclarationError(f"synthesis of {m.name!r}", [told]) from error
+
+    @property
+    def _told(self) -> str:
+        return f"{self.asked}: {getattr(self.what, '__name__', repr(self.what))}"
 
 
 def _passes(s: Solution, q: Array) -> bool:

@@ -274,7 +274,8 @@ def orbits(z: Array, of: tuple[Symmetry, ...], motions: Array) -> list[list[int]
 
 
 def motions_of(of: TaskClass, member: ClassMember, x: Array) -> Array:
-    """Where numbers asked can go from every row, dimensions at rest ``(n, T)``: projectors on these directions; none where all can.
+    """Where numbers asked can go from every row, dimensions at rest ``(n, T)``: projectors on these directions; none where all can, or
+    where all rates are asked.
 
     They are the same for mechanisms that do the same, as Roberts' cognates.
     """
@@ -283,6 +284,9 @@ def motions_of(of: TaskClass, member: ClassMember, x: Array) -> Array:
     n = rows.residual.shape[1] // (1 + len(of.problem.rates))
     for i, given in enumerate(of.given):
         columns = of.columns[given & (of.columns < F)]
+        # where rates of all of them are asked these directions are, of whatever mechanism
+        if np.isin(columns + F, of.columns[given]).all():
+            continue
         J = [v.by_coordinates[i][:n, :F].transpose(2, 0, 1) for v in (first, rows)]
         rank = np.linalg.matrix_rank(J[0][0], MODES.generic)
         ways = np.linalg.svd(np.concatenate(J))[2][:, rank:, columns].conj().swapaxes(1, 2)
