@@ -195,12 +195,13 @@ class Synthesis:
     def answers(self) -> list[Syntheses]:
         """For every value swept."""
         start = start_of(self.of, self.rng, self.cache, self.progress, self.again)
-        start = replace(start, against=int((~doing_all(self.of, start.member, start.x)).sum()))
+        does = doing_all(self.of, start.member, start.x)
+        start, x = replace(start, against=int((~does).sum())), start.x[:, does]
         n, goals = self.swept.shape[1], self.goals
         found = ends(self.of, start, goals, self.rng, self.progress)
-        apart = start.x.shape[1]
+        apart = x.shape[1]
         if start.each == 1:
-            apart = len(orbits(self.of.told(start.x), self.symmetries, motions_of(self.of, start.member, start.x)))
+            apart = len(orbits(self.of.told(x), self.symmetries, motions_of(self.of, start.member, x)))
         return [
             self._answer(start, apart, goals.taken(np.array([i])) if n > 1 else goals, one, i)
             for i, one in enumerate(found)
