@@ -212,7 +212,7 @@ class Synthesis:
         p, of = self.problem, self.of.full
         every, missing = unfolded(self.of, start, goal, found, self.rng, self.progress)
         does = doing_all(self.of, goal, every)
-        every, failing = every[:, does], max(int((~does).sum()) - start.against, 0)
+        every, failing = every[:, does], int((~does).sum()) - start.against
         x, error, which = real_states(self.of, goal, every)
         # rounding of rows grows with lengths, of those of rods with their squares
         power = 1 if self.of.problem is p else 2
@@ -246,7 +246,7 @@ class Synthesis:
             "double": int((~free).sum()),
             "continuum": int(free.sum()),
             # what follows from what is solved for, where known numbers are such as are declared
-            "open": failing + int((~fits).sum() + (~done).sum()),
+            "open": max(failing + int((~fits).sum() + (~done).sum()), 0),
             "coincident": int((merged & ~against).sum()),
             "reversed": int(against.sum()),
         }
