@@ -727,6 +727,6 @@ def test_other_positions_of_a_given_dyad_are_no_solutions() -> None:
     P = mg.kinematics(m, {"A": np.array([0.0, 0.6, 1.2])}).link("coupler").pose
     q = np.stack([P[:, 0, 3], P[:, 1, 3], np.arctan2(P[:, 1, 0], P[:, 0, 0])], axis=1)
     s = mg.synthesize(m, mg.poses("coupler", q), ["A.point"], cache=False)
-    assert (s.total, len(s), len(s.complex), s.degenerate) == (1, 1, 0, ())
+    assert (s.total, s.classes, len(s), len(s.complex), s.degenerate) == (1, 1, 1, 0, ())
     np.testing.assert_allclose(s.values[0], m.pair("A").point[:2], atol=1e-9)
     assert "3 more fail some of what is asked" in " ".join(s.evidence)

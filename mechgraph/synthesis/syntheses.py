@@ -195,12 +195,13 @@ class Synthesis:
     def answers(self) -> list[Syntheses]:
         """For every value swept."""
         start = start_of(self.of, self.rng, self.cache, self.progress, self.again)
-        start = replace(start, against=int((~doing_all(self.of, start.member, start.x)).sum()))
+        does = doing_all(self.of, start.member, start.x)
+        start, x = replace(start, against=int((~does).sum())), start.x[:, does]
         n, goals = self.swept.shape[1], self.goals
         found = ends(self.of, start, goals, self.rng, self.progress)
-        apart = start.x.shape[1]
+        apart = x.shape[1]
         if start.each == 1:
-            apart = len(orbits(self.of.told(start.x), self.symmetries, motions_of(self.of, start.member, start.x)))
+            apart = len(orbits(self.of.told(x), self.symmetries, motions_of(self.of, start.member, x)))
         return [
             self._answer(start, apart, goals.taken(np.array([i])) if n > 1 else goals, one, i)
             for i, one in enumerate(found)
@@ -211,7 +212,7 @@ class Synthesis:
         p, of = self.problem, self.of.full
         every, missing = unfolded(self.of, start, goal, found, self.rng, self.progress)
         does = doing_all(self.of, goal, every)
-        every, failing = every[:, does], max(int((~does).sum()) - start.against, 0)
+        every, failing = every[:, does], int((~does).sum()) - start.against
         x, error, which = real_states(self.of, goal, every)
         # rounding of rows grows with lengths, of those of rods with their squares
         power = 1 if self.of.problem is p else 2
@@ -245,7 +246,7 @@ class Synthesis:
             "double": int((~free).sum()),
             "continuum": int(free.sum()),
             # what follows from what is solved for, where known numbers are such as are declared
-            "open": failing + int((~fits).sum() + (~done).sum()),
+            "open": max(failing + int((~fits).sum() + (~done).sum()), 0),
             "coincident": int((merged & ~against).sum()),
             "reversed": int(against.sum()),
         }
