@@ -9,7 +9,7 @@ from itertools import pairwise
 import machines
 import numpy as np
 import pytest
-from mechanisms import Z, hexapod
+from mechanisms import Z, hexapod, platform
 
 import mechgraph as mg
 from mechgraph.kinematics.state import Configuration
@@ -47,11 +47,9 @@ def test_a_hexapod_has_forty_assemblies_whatever_carries_its_legs() -> None:
         prints = q.family.prints(Configuration(q.system, states(q, modes)))
         assert len(distinct(prints)) == len(modes)
         found.append(modes)
-    platform = [link.name for link in m.links].index("platform")
+    at = [link.name for link in m.links].index("platform")
     both = [
-        np.sort_complex(
-            modes.poses[: modes.postures, platform, 0, 3] + 1j * modes.poses[: modes.postures, platform, 1, 3]
-        )
+        np.sort_complex(modes.poses[: modes.postures, at, 0, 3] + 1j * modes.poses[: modes.postures, at, 1, 3])
         for modes in found
     ]
     assert len(both[0]) == len(both[1]) == 8
@@ -59,6 +57,25 @@ def test_a_hexapod_has_forty_assemblies_whatever_carries_its_legs() -> None:
     # the assembly in which it is declared, legs as they stand there, is among the first
     home = mg.assemblies(m, {f"P{k}": 0.0 for k in range(1, 7)})
     assert np.abs(home.coordinates[: home.postures]).max(axis=1).min() < 1e-9
+
+
+def test_a_platform_is_mapped_with_its_other_legs_at_rest_and_each_posture_once() -> None:
+    """Six legs of 64 ways are too many: they count as one; what held drivers are off grew from step to step."""
+    corners = np.deg2rad([[5, 50, 130, 170, 245, 300], [30, 35, 150, 145, 268, 275]])
+    heights = np.random.default_rng(3).normal(size=(2, 6)) * [[0.1], [0.05]]
+    feet, heads = (
+        np.column_stack([size * np.cos(at), size * np.sin(at), up])
+        for size, at, up in zip((1.0, 0.6), corners, heights + np.array([[0.0], [1.0]]), strict=True)
+    )
+    legs = [(foot, head, np.cross(head - foot, (1, 0, 0))) for foot, head in zip(feet, heads, strict=True)]
+    m = platform(legs, "UPS")
+    held = [f"P{k}.Tz" for k in range(2, 7)]
+    found = mg.branches(m, "P1", over=(0.0, 1.0), samples=5, points=30)
+    columns = [m.freedom_names().index(name) for name in held]
+    assert max(np.abs(one.coordinates[:, columns]).max() for one in found.branches) < 1e-9
+    for value in (0.05, 0.4, 0.8):
+        modes = mg.assemblies(m, {"P1": value, **dict.fromkeys(held, 0.0)})
+        assert sum(one.interval[0] <= value <= one.interval[1] for one in found.branches) == modes.postures > 1
 
 
 def test_assemblies_that_are_not_real_close_the_loops_too() -> None:

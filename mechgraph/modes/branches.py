@@ -458,7 +458,7 @@ class _Mapper:
         self.q = q = Question(self.m, _at(self.m, self.driver, self.samples.tolist()))
         self.column = int(q.columns[self.place])
         finder = Finder(q, seed, cache, progress, MOST_FOLLOWED // self.count)
-        solutions = finder.solutions()
+        solutions, self.family = finder.solutions(), finder.told_apart
         # the position beside the start counts as that of a further sample, which may be the only one on its circuit
         self.row, self.others = int(q.system.single_rows[self.column]), np.delete(q.columns, self.place)
         self.known = [
@@ -580,7 +580,7 @@ class _Mapper:
 
     def _stretches(self) -> Stretches:
         """The branches on which known assemblies lie, pairs that meet in folds, open ends of those on none."""
-        s, family = self.q.system, self.q.family
+        s, family = self.q.system, self.family
         values, states, S = np.array([value for value, _ in self.known]), [x for _, x in self.known], len(self.known)
         prints = [family.prints(Configuration(s, x)) for x in states]
         left, rank = [np.ones(x.shape[1], dtype=bool) for x in states], s.n_freedoms - 1 - family.idle.shape[1]
@@ -643,7 +643,7 @@ class _Mapper:
         for i, one in enumerate(every):
             mine = one.of.run == one.run
             nodes = CircuitNodes.joined(part.taken(mine & part.meets) for part in (one.of.a, one.of.b))
-            prints = self.q.family.prints(Configuration(self.q.system, nodes.x))
+            prints = self.family.prints(Configuration(self.q.system, nodes.x))
             for value, at in zip(nodes.x[one.of.row].tolist(), prints.T, strict=True):
                 for known, numbers, there in out:
                     gap = value - known - (2 * np.pi * np.round((value - known) / (2 * np.pi)) if self.closed else 0.0)

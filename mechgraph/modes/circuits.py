@@ -152,7 +152,10 @@ class Circuits:
             left, J = self.compiled.at(x, case)
         if self.held.size:
             # each step carries on by a few times what they are off, unless they are led back
-            rest, rows = np.broadcast_to(np.eye(F)[self.held, :, None], (len(self.held), F, T)), self.s.single_rows[self.held]
+            rest, rows = (
+                np.broadcast_to(np.eye(F)[self.held, :, None], (len(self.held), F, T)),
+                self.s.single_rows[self.held],
+            )
             J, left = np.concatenate([J, rest]), np.concatenate([left, x[rows] - self.x[np.ix_(rows, case)]])
         m = len(J)
         with np.errstate(all="ignore"):

@@ -42,6 +42,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Hashable, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -197,6 +198,14 @@ class Family:
         still = (s.single_rows >= 0) & (np.abs(self.idle).max(axis=1, initial=0.0) < MODES.span)
         back = np.isfinite(self.periods)
         return s.single_rows[still & back], s.single_rows[still & ~back]
+
+    def without(self, links: Index) -> Family:
+        """The same, but for links, as of legs that can stand in several ways, by which assemblies are not told apart."""
+        s, out = self.system, copy(self)
+        rows = s.single_rows[(np.isin(s.a, links) | np.isin(s.b, links))[s.pair_of_freedom]]
+        vars(out)["settled_links"] = np.setdiff1d(self.settled_links, links)
+        vars(out)["settled_rows"] = tuple(np.setdiff1d(own, rows) for own in self.settled_rows)
+        return out
 
     @property
     def settled_rotations(self) -> Index:
