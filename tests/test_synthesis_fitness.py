@@ -148,6 +148,25 @@ def test_places_of_a_slider_crank_are_met_on_a_branch_if_the_rod_stays_on_one_si
     assert (crank_driven.size, crank_driven.ratio) == pytest.approx((rod, rod))
 
 
+def test_sizes_are_those_of_axes_and_centers_wherever_on_these_points_are_declared() -> None:
+    """A crank of 3, a rod of 13 with a ball at each end, and a slider of which the cylinder passes 5 beside its ball."""
+    found = []
+    for along, aside in ((0.0, 0.0), (7.0, -40.0)):
+        m = mg.Mechanism(
+            "crank and slider",
+            pairs=[
+                mg.Pair("A", "R", "frame", "crank", point=(0, 0, along), axis=(0, 0, 1)),
+                mg.Pair("B", "S", "crank", "rod", point=(3, 0, 0)),
+                mg.Pair("C", "S", "rod", "slider", point=(8, 12, 0)),
+                mg.Pair("D", "C", "frame", "slider", point=(8 + aside, 12, 5), axis=(1, 0, 0)),
+            ],
+            drives=["A"],
+        )
+        found.append(fitness(m, np.zeros((1, 6 + 3)), None, None))
+    # from the axis of the crank to that of the slider, across both: 12
+    assert [(one.size, one.ratio) for one in found] == [pytest.approx((13.0, 13.0 / 3.0))] * 2
+
+
 def test_verdicts_on_a_spatial_mechanism_are_those_of_the_map_of_its_branches() -> None:
     """RSSR, of which the ball-jointed rod may spin: places of one branch, of two, of another circuit."""
     m = mg.load("rssr")

@@ -33,6 +33,7 @@ from mechgraph.modes.circuits import Circuits, in_order
 from mechgraph.modes.family import Family
 from mechgraph.quantities import wrong
 from mechgraph.result.solution import Solution
+from mechgraph.synthesis.unknowns import idle_moves
 from mechgraph.variants.numbers import side_by_side
 from mechgraph.variants.work import Output, named_outputs, quantity
 
@@ -57,7 +58,8 @@ class Fitness:
         Least transmission angle at the positions, and from the first to the last [rad]; NaN where the driver holds no output, at change
         points, or where it does not come to the last.
     size, ratio : float
-        Largest distance of two elements of a link; longest over shortest of such distances.
+        Largest distance of two elements of a link (axes, centers, named points; of a slide the direction alone counts); longest over
+        shortest of such distances.
     error : float
         Largest distance from what was asked, in the units of the task.
     """
@@ -387,12 +389,23 @@ def frame_outputs(m: Mechanism, driver: str) -> list[str]:
 
 
 def distances(m: Mechanism) -> Array:
-    """Distances of two elements of a link (points of its pairs, named points), of all links; elements at one place left out."""
-    at: dict[str, list[Array]] = {link.name: [np.asarray(p) for p in link.points.values()] for link in m.links}
+    """Distances of two elements of a link, of all links: named points, centers, axes (from each other the least), not slides, which have a
+    direction alone; elements at one place left out.
+    """
+    none = np.zeros((3, 0))
+    at: dict[str, list[tuple[Array, Array]]] = {
+        link.name: [(np.asarray(p, dtype=float), none) for p in link.points.values()] for link in m.links
+    }
     for pair in m.pairs:
-        for link, marker in zip((pair.a, pair.b), pair.markers, strict=True):
-            at[link].append(np.asarray(marker.point))
-    lengths = np.array([np.linalg.norm(a - b) for points in at.values() for a, b in combinations(points, 2)])
+        idle = none if pair.contact is not None else idle_moves(pair.type)
+        for link, marker in zip((pair.a, pair.b), pair.markers, strict=True) if idle.shape[1] < 3 else ():
+            at[link].append((np.asarray(marker.point, dtype=float), marker.pose()[:, :3] @ idle))
+    out = []
+    for elements in at.values():
+        for (a, along), (b, other) in combinations(elements, 2):
+            d, ways = a - b, np.concatenate([along, other], axis=1)
+            out.append(np.linalg.norm(d - ways @ (np.linalg.pinv(ways, MODES.generic) @ d)))
+    lengths = np.array(out)
     # elements nearer to each other, as part of the longest distance, are at one place
     return lengths[lengths > 1e-9 * lengths.max(initial=0.0)]
 

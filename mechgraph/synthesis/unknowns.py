@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from functools import cached_property
+from functools import cache, cached_property
 from math import lcm
 from typing import Any
 
@@ -27,9 +27,10 @@ from mechgraph.maths.se3 import Array, cross, move_twist
 from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism, chain_numbers
-from mechgraph.model.pair import Pair
+from mechgraph.model.pair import Link, Pair
 from mechgraph.model.parameters import declared
 from mechgraph.modes.family import span
+from mechgraph.pairs.pair_type import PairType
 from mechgraph.quantities import wrong
 from mechgraph.variants.numbers import (
     MARKER,
@@ -305,6 +306,16 @@ def _told(k: int, side: int, m: Mechanism) -> Array:
             change = move_twist(D[:, :, (s.a, s.b)[side][0]], np.eye(6))
         rows.append(change - basis @ (basis.T @ change))
     return np.concatenate(rows)
+
+
+@cache
+def idle_moves(kind: PairType) -> Array:
+    """Directions ``(3, k)``, from its marker, in which the place of a pair may be moved on both links and its motion stays the same."""
+    pitch = 1.0 if kind.takes_pitch else None
+    pair = Pair("pair", kind, "a", "b", point=(0, 0, 0), axis=(0, 0, 1), second=(1, 0, 0), pitch=pitch)
+    told = _told(0, 0, Mechanism(pair.name, [Link("a"), Link("b")], [pair]))
+    _, sigma, V = np.linalg.svd(told[:, 3:])
+    return np.asarray(V[sigma < MODES.span].T)
 
 
 def marker_twists(numbers: Sequence[Array], norms: Array, rates: Array) -> Array:
