@@ -193,8 +193,8 @@ def to_text(document: Document, width: int = WIDTH) -> str:
     """Return the document as plain text of at most `width` columns.
 
     Paragraphs, bullets and equations are wrapped at spaces; a word longer than the line stands whole and
-    overhangs. Cells of a table that is too wide are wrapped, first between words, then inside them; a table
-    overhangs only when its columns would have no room at all. Preformatted text is never wrapped. Nothing is
+    overhangs. Cells of a table that is too wide are wrapped, first between words, then inside them, but not inside numbers; a table
+    overhangs only when these would have no room. Preformatted text is never wrapped. Nothing is
     ever cut. ValueError for `width` < 1.
     """
     parts = [_underlined(document.title, "=", width)]
@@ -270,13 +270,20 @@ def _fitted(natural: list[int], least: list[int], room: int) -> list[int] | None
     return None
 
 
+_NUMBER = re.compile(r"[(\[±~<>=]*[-+]?\.?\d")
+
+
 def column_widths(lines: list[tuple[str, ...]], width: int) -> list[int]:
-    """Return column widths that stay within `width`: cells whole, else words whole, else neither."""
+    """Return column widths that stay within `width`: cells whole, else words whole, else numbers: one in two parts reads as another."""
     columns = list(zip(*lines, strict=True))
     natural = [max(1, *(len(cell) for cell in column)) for column in columns]
     words = [max(1, *(len(word) for cell in column for word in cell.split() or [""])) for column in columns]
     room = width - 2 * (len(columns) - 1)
-    for least in (natural, words, [1] * len(columns)):
+    numbers = [
+        max(1, *(len(word) * bool(_NUMBER.match(word)) for cell in column for word in cell.split() or [""]))
+        for column in columns
+    ]
+    for least in (natural, words, numbers):
         widths = _fitted(natural, least, room)
         if widths is not None:
             return widths

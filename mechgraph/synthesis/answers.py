@@ -384,7 +384,7 @@ class Syntheses(Shown, Sequence[Mechanism]):
             if len(self.unknown) + len(judged) < 8:
                 parts = [((*self.unknown, *judged), [(*a, *b) for a, b in zip(own, fits, strict=True)])]
         tables = [
-            Table(("mechanism", *header), tuple((str(i), *row) for i, row in enumerate(rows))) for header, rows in parts
+            Table(("k", *header), tuple((str(i), *row) for i, row in enumerate(rows))) for header, rows in parts
         ]
         told = " ".join([f"Completeness: {self.completeness}.", *self.evidence, *(one.text for one in self.degenerate)])
         if any(fit.branch is None for fit in self.fitness):
