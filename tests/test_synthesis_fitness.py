@@ -234,7 +234,7 @@ def test_conditions_without_a_driver_are_a_fault_and_those_of_two_drivers_are_ta
     )
     for most in (0.31, 0.29):
         s = mg.synthesize(five, rows, ["B.point"], conditions={turned: (None, most)})
-        assert [one.reasons for one in s.rejected] == [("turned = 0 to 0.3",)] * (most < 0.3)
+        assert [one.reasons for one in s.rejected] == [(f"turned = 0 to 0.3; asked: at most {most:g}",)] * (most < 0.3)
         assert len(s) == (most > 0.3)
 
 

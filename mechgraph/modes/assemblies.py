@@ -570,15 +570,6 @@ class Finder:
         every = self.form.ways
         return every if every * prod(start.x.shape[1] for start in self.starts) <= self._most else 1
 
-    @cached_property
-    def told_apart(self) -> Family:
-        """What tells assemblies apart: not rods where these are put back in one way alone."""
-        q = self.question
-        if self.ways == self.form.ways:
-            return q.family
-        rods = rods_of(q.system, np.concatenate([q.columns, q.family.held]))
-        return q.family.without(np.array([link for rod in rods for link in rod.links], dtype=np.intp))
-
     @property
     def told(self) -> tuple[str, ...]:
         """What is said of rods."""

@@ -37,9 +37,10 @@ from mechgraph.modes.assemblies import (
 from mechgraph.modes.between_samples import Double, Gap, Station, Unreal
 from mechgraph.modes.circuits import CircuitNodes, Circuits, in_order
 from mechgraph.modes.family import Array
+from mechgraph.modes.form import rods_of
 from mechgraph.modes.targets import MOST_FOLLOWED
 from mechgraph.quantities import Index as Seed
-from mechgraph.quantities import at_least, door, is_numeric, wrong
+from mechgraph.quantities import at_least, door, is_numeric, real_array, wrong
 
 GOLDEN = 0.5 * (3.0 - 5.0**0.5)
 """Place of the first sample, as part of the distance of two: double points are likely at whole parts of a turn."""
@@ -216,7 +217,7 @@ class Branches(Shown):
             for b in self.branches
         )
 
-    def defects(self, positions: Iterable[Mechanism | Mapping[str, float]]) -> Defects:
+    def defects(self, positions: Iterable[Mechanism | Mapping[str, float] | Sequence[float]]) -> Defects:
         """Report branch, circuit and order defects of a sequence of positions.
 
         A position lies on a branch if mechgraph comes to it along the circuit.
@@ -224,7 +225,7 @@ class Branches(Shown):
         Parameters
         ----------
         positions : iterable
-            Assemblies (Mechanism with ``start``), or coordinates of all freedoms, in their order.
+            Assemblies (Mechanism with ``start``), or coordinates of all freedoms, by name or in their order, one position after the other.
 
         Returns
         -------
@@ -244,9 +245,11 @@ class Branches(Shown):
         >>> b.defects(places).branches
         (0, 1)
         """
-        places, faults = [], []
+        places, faults, names = [], [], self.mechanism.freedom_names()
         for number, position in enumerate(positions):
             start = position.start if isinstance(position, Mechanism) else position
+            if (listed := real_array(start)) is not None and listed.shape == (len(names),):
+                start = dict(zip(names, listed.tolist(), strict=True))
             if not isinstance(start, Mapping) or not all(is_numeric(value, ()) for value in start.values()):
                 wanted = "an assembly, or coordinates of freedoms"
                 raise DeclarationError(f"defects of {self.mechanism.name!r}", [wrong(position, "position", wanted)])
@@ -458,7 +461,11 @@ class _Mapper:
         self.q = q = Question(self.m, _at(self.m, self.driver, self.samples.tolist()))
         self.column = int(q.columns[self.place])
         finder = Finder(q, seed, cache, progress, MOST_FOLLOWED // self.count)
-        solutions, self.family = finder.solutions(), finder.told_apart
+        solutions = finder.solutions()
+        # legs that are put back in one way alone tell no assemblies apart
+        few = finder.ways < finder.form.ways
+        rods = rods_of(q.system, np.concatenate([q.columns, q.family.held])) if few else []
+        self.family = q.family.without(np.array([link for rod in rods for link in rod.links], dtype=np.intp))
         # the position beside the start counts as that of a further sample, which may be the only one on its circuit
         self.row, self.others = int(q.system.single_rows[self.column]), np.delete(q.columns, self.place)
         self.known = [

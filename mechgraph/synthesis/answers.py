@@ -322,8 +322,15 @@ class Syntheses(Shown, Sequence[Mechanism]):
                 if np.isnan(values).any():
                     why.append(f"{name} is not determined at all positions")
                 elif not keeps(values, least, most):
-                    ends = dict.fromkeys((float(np.min(values)), float(np.max(values))))
-                    why.append(f"{name} = {' to '.join(f'{end:.6g}' for end in ends)}")
+                    # transmission angles in degrees, as in tables
+                    size, unit = (1.0, "") if measure.output is None else (np.rad2deg(1.0), " deg")
+                    ends = dict.fromkeys(f"{size * end:.6g}" for end in (np.min(values), np.max(values)))
+                    wanted = [
+                        f"at {word} {size * end:.6g}"
+                        for word, end in (("least", least), ("most", most))
+                        if end is not None
+                    ]
+                    why.append(f"{name} = {' to '.join(ends)}{unit}; asked: {', '.join(wanted)}{unit}")
             if why:
                 out.append(RejectedAnswer(m, tuple(self.values[i].tolist()), tuple(why)))
             else:
@@ -383,9 +390,7 @@ class Syntheses(Shown, Sequence[Mechanism]):
             parts += [(judged, fits)]
             if len(self.unknown) + len(judged) < 8:
                 parts = [((*self.unknown, *judged), [(*a, *b) for a, b in zip(own, fits, strict=True)])]
-        tables = [
-            Table(("k", *header), tuple((str(i), *row) for i, row in enumerate(rows))) for header, rows in parts
-        ]
+        tables = [Table(("k", *header), tuple((str(i), *row) for i, row in enumerate(rows))) for header, rows in parts]
         told = " ".join([f"Completeness: {self.completeness}.", *self.evidence, *(one.text for one in self.degenerate)])
         if any(fit.branch is None for fit in self.fitness):
             told += " No single driver determines the positions: nothing is known of defects and transmission."

@@ -345,12 +345,11 @@ def _content(m: Mechanism, report: DeterminacyReport, s: Solution | None, study:
 def _answers_content(found: Syntheses) -> dict[str, Any]:
     """What a page of syntheses holds: the table, what is played, all side by side, and the declaration."""
     m, document = found.mechanism, found.document()
-    good, tested = len(found.good), found.completeness == "tested"
-    side, word = (
-        ("good", "Complete")
-        if good and tested
-        else ("fair", "Others may exist" if good else "None runs through all positions")
-    )
+    good = len(found.good)
+    whole = {"proved": "All solutions, proved", "tested": "All solutions, by a trace test"}.get(found.completeness)
+    side, word = "good" if good and whole else "fair", whole or "Others may exist"
+    if not good:
+        word = "None runs through all positions"
     return {
         "name": m.name or "mechanism", "about": m.description, "side": side, "word": word, "verdict": document.title, "remarks": [],
         "numbers": [("mechanisms", str(len(found))), ("without defects", str(good)), ("left out", str(len(found.rejected)))],
