@@ -21,7 +21,7 @@ def told_first(chains: Any, task: Any) -> list[str]:
     told: list[str] = []
 
     def listen(text: str) -> None:
-        if "track" in text or "start" in text or "random member" in text:
+        if any(word in text for word in ("track", "start", "random member", "first task")):
             raise Enough
         told.append(text)
 
