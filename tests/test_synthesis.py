@@ -231,6 +231,14 @@ def test_what_is_not_served_is_refused_by_name() -> None:
     )
     with pytest.raises(mg.DeclarationError, match="pair A: ties an angle to a length"):
         mg.synthesize(screw, mg.positions([{"B": 0}, {"B": 0.1}]), ["A.pitch"])
+    # of a planar mechanism neither axes nor places across the plane
+    for name, meant in (("B.pont", "B.point"), ("tip", "coupler.tip"), ("coupler.tp", "coupler.tip")):
+        with pytest.raises(
+            mg.DeclarationError, match=rf"'{name}': no element or number .*did you mean {meant}( or|\?)"
+        ) as caught:
+            mg.synthesize(four_bar(), mg.function("A", "D", pairs), [name])
+        assert ".z" not in str(caught.value)
+        assert "axis" not in str(caught.value)
     # declared or not
     for name in ("coupler.mass", "coupler.center.x"):
         with pytest.raises(mg.DeclarationError, match=f"'{name}': stands in no equation of closure"):

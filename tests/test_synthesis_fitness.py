@@ -358,3 +358,20 @@ def test_a_leg_that_stands_the_other_way_at_a_row_is_no_defect() -> None:
     assert fitnesses([m], other[None], "A", "G", asked={"leg.Rz": np.ones(3)})[0].branch
     (found,) = fitnesses([m], wrong[None], "A", "G", asked=asked | {"G.Rz": rows[:, output] * [1, np.nan, 1]})
     assert not found.branch
+
+
+def test_of_a_point_or_link_only_what_is_asked_counts() -> None:
+    """At crank angle 0 a four-bar and its mirror image have the end of the coupler one above the other, and turned by opposite angles."""
+    known, places = FourBarFormula(np.random.default_rng(0)), [(-0.4, 1), (0.0, -1), (0.5, 1)]
+    known.lengths = 1.0, 2.5, 3.0, 2.0
+    m = known.mechanism(*places[0])
+    coupler = m.pairs[1].b
+    m = m.replace(links=[link.replace(points={"end": (2.5, 0, 0)} if link.name == coupler else {}) for link in m.links])
+    q = rows_of(m, [known.start(*at) for at in places])[None]
+    every = {f"{coupler}.{part}": np.ones(3) for part in ("Rx", "Ry", "Rz")}
+    free, away = ["end.Tx", "end.T(1,0,0)", "Rx", "Ry"], ["end.Ty", "end.T(1,1,0)", "Rz"]
+    for names, wrong in ((free, False), (away, True)):
+        for name in names:
+            asked = {f"{coupler}.{name}": np.ones(3)}
+            assert fitnesses([m], q, "O0", "O3", asked=asked)[0].circuit is wrong
+    assert fitnesses([m], q, "O0", "O3", asked=every)[0].circuit

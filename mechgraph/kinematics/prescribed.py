@@ -66,7 +66,7 @@ def target_of(m: Mechanism, name: str) -> Target | str:
             return Target(link.name, rest, "")
         if found and found["point"] in link.points:
             target = Target(link.name, found["point"], found["part"])
-            fits = target.part in slides or _direction(m, target.part) is not None
+            fits = direction_of(m, target.part) is not None
             return target if fits else (_OUT_OF_PLANE if m.planar else _NO_DIRECTION).format(name)
         if m.freedom_fault(rest, single=False) is not None:
             point = found["point"] if found else rest
@@ -98,10 +98,10 @@ def coordinate(m: Mechanism, name: str) -> bool | str:
     return f"{name!r} has several coordinates; give one or more of {', '.join(f'{name}.{part}' for part in parts)}"
 
 
-def _direction(m: Mechanism, part: str) -> Array | None:
-    """Unit vector of ``T(1,0,1)``, in a plane also of ``T(1,1)``."""
+def direction_of(m: Mechanism, part: str) -> Array | None:
+    """Unit vector of a slide, ``Tx`` or ``T(1,0,1)``, in a plane also of ``T(1,1)``; None where it is none, or leaves the plane."""
     try:
-        d = np.array([float(v) for v in part[2:-1].split(",")])
+        d = np.eye(3)[SLIDES.index(part)] if part in SLIDES else np.array([float(v) for v in part[2:-1].split(",")])
     except ValueError:
         return None
     if m.planar:
@@ -263,7 +263,7 @@ class Prescription:
         """The free pair that has a coordinate; every line has one of its own."""
         if not target.part.startswith("T("):
             return self._made(target.owner, target, _of_points if target.point else lambda: TABLE["Fr"])
-        d = _direction(self.m, target.part)
+        d = direction_of(self.m, target.part)
         assert d is not None
         across = np.array([-d[1], d[0], 0.0]) if self.m.planar else np.linalg.svd(d[None])[2][1]
 

@@ -207,13 +207,15 @@ class Assemblies(Shown, Sequence[Mechanism]):
                     word,
                 )
             )
-        title = f"{m.name}: {counted(len(self), 'mode')} at {values_text(m, self.at)}"
+        several = self.postures < len(self)
+        postures = f"{counted(self.postures, 'posture')} in " if several else ""
+        title = f"{m.name}: {postures}{counted(len(self), 'mode')} at {values_text(m, self.at)}"
         moving = [
             f"Continuum of dimension {one.dimension}: {', '.join(one.moves)} move with the drivers at rest."
             for one in self.continua
         ]
-        if len(rows) < len(self):
-            moving.append(f"{len(self) - len(rows)} more are the same with legs the other way.")
+        if several:
+            moving.append(f"{len(self) - self.postures} more modes are the same postures with legs the other way.")
         words = " ".join([*moving, f"Completeness: {self.completeness}.", *self.evidence])
         return Document(title, (Table(header, tuple(rows)), Paragraph(words)))
 

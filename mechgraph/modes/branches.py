@@ -37,7 +37,6 @@ from mechgraph.modes.assemblies import (
 from mechgraph.modes.between_samples import Double, Gap, Station, Unreal
 from mechgraph.modes.circuits import CircuitNodes, Circuits, in_order
 from mechgraph.modes.family import Array
-from mechgraph.modes.form import rods_of
 from mechgraph.modes.targets import MOST_FOLLOWED
 from mechgraph.quantities import Index as Seed
 from mechgraph.quantities import at_least, door, is_numeric, real_array, wrong
@@ -463,9 +462,8 @@ class _Mapper:
         finder = Finder(q, seed, cache, progress, MOST_FOLLOWED // self.count)
         solutions = finder.solutions()
         # legs that are put back in one way alone tell no assemblies apart
-        few = finder.ways < finder.form.ways
-        rods = rods_of(q.system, np.concatenate([q.columns, q.family.held])) if few else []
-        self.family = q.family.without(np.array([link for rod in rods for link in rod.links], dtype=np.intp))
+        legs = finder.form.turning if finder.ways < finder.form.ways else []
+        self.family = q.family.without(np.array([link for leg in legs for link in leg.links], dtype=np.intp))
         # the position beside the start counts as that of a further sample, which may be the only one on its circuit
         self.row, self.others = int(q.system.single_rows[self.column]), np.delete(q.columns, self.place)
         self.known = [

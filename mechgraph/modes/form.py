@@ -294,6 +294,8 @@ class EquationForm(Protocol):
     """What is to be said of them, in words."""
     spare: int
     """Rods without a row, which may not fit where they are put back."""
+    turning: list[RodChain]
+    """Rods that stand in two ways each, on universal joints."""
     ways: int
     """In how many ways rods can be put back."""
 
@@ -316,6 +318,7 @@ class Whole:
     def __init__(self, family: Family, drive: Array) -> None:
         self.family, self.drive, self.given = family, drive, drive
         self.told: tuple[str, ...] = ()
+        self.turning = list[RodChain]()
         self.spare, self.ways = 0, 1
 
     def at(self, position: int) -> System:
@@ -425,13 +428,14 @@ class WithoutRods:
         )
         self._own = np.isin(whole.columns, self.kept)
         self.drive = np.concatenate([drive[self._own], self._squares()])
-        self._turning = [rod for rod in rods if not is_ball(s.m.pairs[rod.steps[0].pair].type)]
-        self.ways = 2 ** len(self._turning)
+        self.turning = [rod for rod in rods if not is_ball(s.m.pairs[rod.steps[0].pair].type)]
+        self.ways = 2 ** len(self.turning)
         self.told: tuple[str, ...] = ()
-        if self._turning:
-            legs = counted(len(self._turning), "leg")
+        if self.turning:
+            legs = counted(len(self.turning), "leg")
             self.told += (
-                f"Two turns carry {legs}: each assembly that is found without rods stands in {self.ways} ways.",
+                f"Universal joints carry {legs}, each in two ways (the cross turned by half a turn or not): a posture can be put together "
+                f"in {self.ways} ways.",
             )
         if self.spare:
             self.told += (
@@ -565,7 +569,7 @@ class WithoutRods:
         begin = out.copy()
         with np.errstate(all="ignore"):
             for rod in self._all:
-                other = way >> self._turning.index(rod) & 1 == 1 if rod in self._turning else way < 0
+                other = way >> self.turning.index(rod) & 1 == 1 if rod in self.turning else way < 0
                 self._put_back(rod, here, out, begin, other)
         return out
 

@@ -21,7 +21,7 @@ import numpy as np
 from mechgraph.determinacy.mobility import free_motion
 from mechgraph.errors import DeclarationError, IndeterminateError, MechgraphWarning, did_you_mean, near_names
 from mechgraph.kinematics.assembly import closed_start
-from mechgraph.kinematics.prescribed import Target, target_of
+from mechgraph.kinematics.prescribed import Target, direction_of, parts_of, target_of
 from mechgraph.kinematics.state import CLOSED, Configuration, user_poses
 from mechgraph.kinetostatics import kinematics, solve, transmission
 from mechgraph.maths.se3 import Array, Index, cross
@@ -174,10 +174,18 @@ def _asked(
         else:
             target = cast("Target", target_of(m, name))
             link = [one.name for one in m.links].index(target.link)
-            at = np.array([one.links[link].points.get(target.point, (0, 0, 0)) for one in mechanisms])[case]
             X = user_poses(here, slice(link, link + 1))[0]
-            place = (np.einsum("tij,tj->it", X[:, :3, :3], at) + X[:, :3, 3].T) / s.par.L
-            found = place if target.point else np.concatenate([place, X[:, :3, :3].reshape(len(k), 9).T])
+            if target.turns:
+                # about x, the new y and the new z; these are no chart everywhere: where all are asked the whole rotation counts
+                R, every = X[:, :3, :3], [asked.get(f"{target.link}.{turn}", np.nan) for turn in parts_of(m)[1]]
+                whole = ~np.isnan(np.sum(np.broadcast_arrays(*every), axis=0))[row]
+                angle = {"Rx": R[:, 1:, 2], "Ry": R[:, :1, 2], "Rz": R[:, 0, :2]}[target.part].T
+                angle = angle if len(angle) == 1 else angle / np.linalg.norm(angle, axis=0)
+                found = np.concatenate([np.where(whole, 0.0, angle), np.where(whole, R.reshape(len(k), 9).T, 0.0)])
+            else:
+                at = np.array([one.links[link].points.get(target.point, (0, 0, 0)) for one in mechanisms])[case]
+                place = (np.einsum("tij,tj->it", X[:, :3, :3], at) + X[:, :3, 3].T) / s.par.L
+                found = (cast("Array", direction_of(m, target.part)) @ place)[None]
         out.append(np.where(np.isnan(values[row]), 0.0, found))
     return np.concatenate(out)
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from mechgraph.errors import DeclarationError
+from mechgraph.errors import DeclarationError, did_you_mean, near_names
 from mechgraph.fields import XYZ
 from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
@@ -104,7 +104,10 @@ class Unknowns:
                 if _of_body(m, one):
                     faults.append(f"unknown {one!r}: {NOT_MET}")
                 elif isinstance(found, str):
-                    faults.append(f"unknown {found}")
+                    near = did_you_mean(near_names(one, self._elements, 0.4))
+                    faults.append(
+                        f"unknown {one!r}: no element or number of that name; {near}" if near else f"unknown {found}"
+                    )
                 elif one in self.fields:
                     faults.append(f"unknown {one!r} is named twice")
                 else:
@@ -147,6 +150,15 @@ class Unknowns:
                 asked = [what] if what in own else own
                 out += mattering(self.m, k, [f"{owner}.{field}.{at}" for field in asked for at in axes])
         return out or [name]
+
+    @cached_property
+    def _elements(self) -> list[str]:
+        """Names of all named points, and of points and directions of pairs, then of their numbers."""
+        named = [f"{link.name}.{point}" for link in self.m.links for point in link.points]
+        sides = [(pair.name, side) for pair in self.m.pairs for side in (SIDES if pair.on_a is not None else ("",))]
+        named += [".".join(filter(None, (name, side, field))) for name, side in sides for field in MARKER[:2]]
+        numbers = {name: own for name in named if (own := self._expanded(name)) != [name]}
+        return [*numbers, *(number for own in numbers.values() for number in own)]
 
     @property
     def names(self) -> tuple[str, ...]:
