@@ -565,10 +565,9 @@ class TrackGroup:
                 progress(
                     f"{counted(N, 'solution')} of a random member so far{self.estimate}, {self.quiet} loops brought no further one"
                 )
-            # so many that where none brings a further one they are enough, and no fewer than are followed at the cost of one
+            # so many that where none brings a further one they are enough, and no more than are followed at the cost of one
             enough = int(np.ceil(np.log(missed / self.chance) / -np.log(N + 1.0)))
-            # 96 tracks are followed together at least, of as many loops as it takes: a step of so many costs little more than one of few
-            loops = max(min(enough, TRACKS_TOGETHER // N), 96 // N, 1)
+            loops = max(min(enough, TRACKS_TOGETHER // N), 1)
             there, loop = self._round(family, loops, rng, progress)
             poses = self.equations.fingerprints(self.base, there)
             for mine in (loop == k for k in range(loops)):
