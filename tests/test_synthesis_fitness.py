@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from ladder import LADDER, four_bar, spatial
 from mechanisms import FourBarFormula
 
 import mechgraph as mg
-from mechgraph.synthesis.fitness import Fitness, fitnesses
+from mechgraph.synthesis.fitness import Fitness, fitnesses, least_between
 
 
 def fitness(m: mg.Mechanism, q: np.ndarray, *of: str) -> Fitness:
@@ -375,3 +377,22 @@ def test_of_a_point_or_link_only_what_is_asked_counts() -> None:
             asked = {f"{coupler}.{name}": np.ones(3)}
             assert fitnesses([m], q, "O0", "O3", asked=asked)[0].circuit is wrong
     assert fitnesses([m], q, "O0", "O3", asked=every)[0].circuit
+
+
+@pytest.mark.parametrize("end", [0.0, 1.0])
+def test_the_least_of_angles_is_found_beside_an_end_that_is_a_node_too_but_for_rounding(end: float) -> None:
+    """A parabola with its least value .0028 from the end; what rounding puts upon it makes a dip of the end itself."""
+    sense = 1.0 if end == 0.0 else -1.0
+    nodes = np.array([[end, end + sense * 1e-16, end + sense * 0.015]])
+    of = SimpleNamespace(
+        V=1, row=0, home=[0], of_branch=np.zeros(3), a=SimpleNamespace(case=np.zeros(3, dtype=np.intp), x=nodes),
+        along=lambda _, values: (np.zeros(len(values), dtype=np.intp), values),
+        states=lambda _, values: (values[None], np.ones(len(values), dtype=bool)),
+        here=lambda x, _: x,
+    )  # fmt: skip
+
+    def angles(x: np.ndarray, *_: np.ndarray) -> np.ndarray:
+        return 0.1 + (x[0] - end - sense * 0.0028) ** 2 + 1e-14 * (x[0] != end)
+
+    found = least_between(of, np.zeros(1, dtype=np.intp), np.zeros(1), np.ones(1), angles)
+    assert found == pytest.approx(0.1, abs=1e-9)

@@ -147,7 +147,7 @@ def fitnesses(
     good, between = np.array([v for v in range(V) if ways[v] is not None], dtype=np.intp), np.full(V, np.nan)
     if good.size and outputs:
         low, high = np.sort([way[[0, -1]] for way in ways if way is not None], axis=1).T
-        between[good] = np.minimum(at[good], _least_between(of, good, low, high, angles))
+        between[good] = np.minimum(at[good], least_between(of, good, low, high, angles))
     full_turn = (of.turns > 0) & m.turns(driver)
     for v, (one, dead, off, apart, turns) in enumerate(
         zip(out, *(np.asarray(told).tolist() for told in (of.dead, branch, circuit, full_turn)), strict=True)
@@ -190,7 +190,7 @@ def _asked(
     return np.concatenate(out)
 
 
-def _least_between(
+def least_between(
     of: Circuits, cases: Index, low: Array, high: Array, angles: Callable[[Configuration, Index, Index], Array]
 ) -> Array:
     """Least ``angles (n,)`` of some mechanisms between driver values on the branches of their first states; NaN where not all are met."""
@@ -207,6 +207,9 @@ def _least_between(
             break
         order = np.lexsort((values, own))
         own, values = own[order], values[order]
+        # of values that are one but for rounding (radians, or lengths over L) the first; no lower one lies between them
+        apart = (np.diff(own, prepend=-1) > 0) | (np.diff(values, prepend=0.0) > 1e-9)
+        own, values = own[apart], values[apart]
         each = [of.along(of.home[case], values[own == case]) for case in np.unique(own)]
         there, met = of.states(*(np.concatenate(part) for part in zip(*each, strict=True)))
         found = np.where(met, angles(of.here(there, own), own, own), np.nan)
