@@ -416,4 +416,5 @@ class FittedSynthesis:
             np.array([1.0 / self.fit.margins(here).min() for here in points]),
             told,
             driver=self.driver,
+            asked=p.tasks,
         )

@@ -53,7 +53,7 @@ from mechgraph.synthesis.solve import (
 )
 from mechgraph.synthesis.structures import of_chains
 from mechgraph.synthesis.system import RowNumbers, RowProblem
-from mechgraph.synthesis.tasks import FunctionTask, function, path, poses, positions
+from mechgraph.synthesis.tasks import FunctionTask, asked_of, function, path, poses, positions
 from mechgraph.synthesis.unknowns import Unknowns
 
 NO_SCREWS = "ties an angle to a length or by an unknown ratio: the equations are not algebraic, their number of solutions has no end"
@@ -279,6 +279,7 @@ class Synthesis:
             (*self.symmetries, *cognates(alike, self.symmetries, motions)),
             tuple(tuple(copies[k]) for k in range(len(values))),
             driver=driver_of(p.m, self.tasks)[0],
+            asked=asked_of(p.first.declared, self.tasks, []),
             certificates=PerMechanism.at_once(partial(certificates, of, goal, x), len(values)),
         )
         # of a sweep nothing is said of fitness, which takes longer than the solutions, until it is asked for
