@@ -60,6 +60,25 @@ def test_a_file_is_read_with_its_degrees_and_keeps_the_schema(tmp_path: Path) ->
     assert np.allclose(task.pairs, np.deg2rad([[0, 0], [20, 31], [45, 52]]), rtol=0, atol=1e-15)
 
 
+def test_angles_by_name_may_be_in_degrees(tmp_path: Path) -> None:
+    path, quarter = tmp_path / "function.toml", np.pi / 2
+    text = FILE.replace(
+        '{ "D.effort" = [-inf, 40] }', '{ "transmission D_deg" = [40, inf], size = [1, 3] }\nover = { A_deg = [0, 90] }'
+    )
+    path.write_text(
+        text.partition("kind =")[0] + 'kind = "path"\npoint = "coupler.tip"\npoints = [[0, 0], [1, 1]]\nat = { A_deg = [0, 90] }'
+        '\n[[synthesis.task]]\nkind = "positions"\nrows = [{ D = 0 }, { D_deg = 90, "coupler.tip" = [1, 1] }]\n', encoding="utf-8",
+    )  # fmt: skip
+    jsonschema.Draft202012Validator(schema("mechanism")).validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    asked = mg.load(path).synthesis
+    assert asked.conditions == {"transmission D": (pytest.approx(np.deg2rad(40)), np.inf), "size": (1, 3)}
+    assert [asked.over["A"], asked.tasks[0].at["A"]] == [pytest.approx([0, quarter])] * 2
+    assert asked.tasks[1].rows == ({"D": 0}, {"D": pytest.approx(quarter), "coupler.tip": pytest.approx([1, 1])})
+    path.write_text(text.replace("[40, inf]", '"a"'), encoding="utf-8")
+    with pytest.raises(mg.DeclarationError, match="transmission D_deg = 'a': expected numbers"):
+        mg.load(path)
+
+
 def test_faults_of_a_task_in_a_file_stand_alone_with_its_name(tmp_path: Path) -> None:
     path = tmp_path / "function.toml"
     for wrong, fault in (
