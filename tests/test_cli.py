@@ -772,6 +772,15 @@ def test_a_motion_in_whole_numbers_beyond_two_turns_is_doubted_in_python_too() -
         mg.Motion([0.0, 20.0, 40.0], 20.0, t=[0, 1, 2]),
     ):
         assert told(quiet) == []
+    # where nothing closes there is no solution to say so
+    rocker, word = m.replace(drives=["D"]), r"D\.Rz: read as radians, 7\.162 turns; for degrees write np\.deg2rad"
+    with pytest.raises(mg.ReachError, match=f"{word}.*on_reach"):
+        mg.kinematics(rocker, {"D": [0, 45]})
+    with pytest.raises(mg.ReachError) as caught:
+        mg.kinematics(rocker, {"D": 2.5})
+    assert "read as" not in str(caught.value)
+    assert re.search(word, " ".join(str(mg.assemblies(rocker, {"D": 45})).split()))
+    assert "read as" not in str(mg.assemblies(m, {"A": 45})) + str(mg.assemblies(rocker, {"D": 2.5}))
 
 
 def test_a_drive_without_a_motion_is_answered_in_options(tmp_path: Path) -> None:

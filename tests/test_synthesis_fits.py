@@ -113,7 +113,7 @@ def test_where_no_start_leads_through_all_rows_nothing_is_found_and_that_is_said
     assert len(s) == 0
     assert s.evidence[0].startswith("0 starts of 13 led to all rows")
     degrees = mg.function("A", "D", np.column_stack([np.rad2deg(angles), 0.3 * np.sin(angles)]))
-    with pytest.warns(mg.MechgraphWarning, match="360 rad is asked, 57.3 turns; angles are in radians"):
+    with pytest.warns(mg.MechgraphWarning, match="360 is asked: read as radians, 57.3 turns; for degrees"):
         s = mg.synthesize(m, degrees, ["C.point.x"], fit="least_squares", **asked)
     assert len(s) == 0
 

@@ -46,6 +46,7 @@ from mechgraph.modes.targets import (
 )
 from mechgraph.quantities import Count, Positive, door
 from mechgraph.quantities import Index as Seed
+from mechgraph.result.notes import doubted_angles
 
 
 @dataclass(frozen=True)
@@ -214,7 +215,10 @@ class Assemblies(Shown, Sequence[Mechanism]):
         ]
         if len(rows) < len(self):
             moving.append(f"{len(self) - len(rows)} more are the same with legs the other way.")
-        words = " ".join([*moving, f"Completeness: {self.completeness}.", *self.evidence])
+        doubts = () if len(self) else doubted_angles(m, self.at)
+        words = " ".join(
+            [*moving, f"Completeness: {self.completeness}.", *self.evidence, *(f"{one}." for one in doubts)]
+        )
         return Document(title, (Table(header, tuple(rows)), Paragraph(words)))
 
     def plot(self) -> Any:

@@ -21,7 +21,7 @@ from mechgraph.maths.tolerances import MODES
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.setups import DefectName, FitName, SynthesisSetup, is_interval, two_ends
 from mechgraph.modes.homotopy import ELSEWHERE, TRACKS_TOGETHER, Mask
-from mechgraph.quantities import Count, door, items_of, real_array, wrong
+from mechgraph.quantities import Count, angle_hint, door, items_of, real_array, wrong
 from mechgraph.quantities import Index as Seed
 from mechgraph.synthesis.answers import (
     ComplexSyntheses,
@@ -661,8 +661,8 @@ def _foretold(p: RowProblem, unknown: Sequence[str]) -> Iterator[str]:
         yield f"{of} stay as declared, whatever the dimensions"
     # a whole turn more or less changes nothing, and many take long to follow
     most = np.nan_to_num(np.abs(p.asked[:, ~p.system.is_length[p.columns]])).max(initial=0.0)
-    if most > 4 * np.pi:
-        yield f"an angle of {most:.4g} rad is asked, {most / (2 * np.pi):.3g} turns; angles are in radians, not degrees"
+    if told := angle_hint(float(most)):
+        yield f"an angle of {most:.4g} is asked: {told}; for degrees write np.deg2rad(...)"
 
 
 def _faults_of_bounds(bounds: Mapping[str, Any], fitting: bool) -> list[str]:
