@@ -560,7 +560,7 @@ def test_the_table_of_assemblies_shows_their_coordinates() -> None:
 
 def test_faults_of_what_is_given_name_the_question() -> None:
     with pytest.raises(mg.DeclarationError, match="assemblies of 'andrews': 1 fault"):
-        mg.assemblies(mg.load("andrews"), {})
+        mg.assemblies(mg.load("andrews"), {"no": 0})
 
 
 @pytest.mark.usefixtures("empty")

@@ -832,7 +832,7 @@ def assemblies(
         The mechanism.
     values : mapping, optional
         As in ``solve``: freedom -> value, ``"bucket.tip"`` -> point, ``"platform"`` -> pose ``(4, 4)``. Lists of values give
-        ``AssembliesOver``.
+        ``AssembliesOver``. Declared drives that it does not name take their stored motion, else stay at the start.
     seed : int
         Seed of all random numbers; modes and their order do not depend on it.
     guesses : int
@@ -862,6 +862,11 @@ def assemblies(
     >>> len(modes), modes.total, modes.completeness
     (4, 16, 'proved')
     """
+    drives = {m.full_name(drive.freedom): drive.motion for drive in m.drives}
+    named = {name if m.freedom_fault(name, single=True) else m.full_name(name) for name in values or {}}
+    if named <= drives.keys():
+        still = {name for name, motion in drives.items() if motion is None} - named
+        values = {**{name: m.start.get(name, 0.0) for name in still}, **(values or {})}
     question = Question(m, values)
     # of many positions fewer ways of legs each, as all of them are kept
     most = MOST_FOLLOWED * 16 // max(16, question.drive.shape[1])

@@ -168,7 +168,9 @@ class Syntheses(Shown, Sequence[Mechanism]):
         Of each what is proved of it, found when first asked for: a mechanism that does what is asked exactly lies within ``error``, and no
         other within ``radius`` (radians, lengths over L), see ``Certificate``. None of fits, and where rates or factors are asked.
     fitness : sequence
-        Of each, see ``Fitness``; found when first asked for.
+        Of each, found when first asked for: defects ``branch``, ``circuit``, ``order``; ``full_turn`` of the driver; ``transmission`` at
+        the positions and ``transmission_between`` them [rad]; ``size`` [length], ``ratio`` [1]; ``error`` of fits [length, rad where angles
+        alone are asked]; ``good``, without a defect, whatever the error. ``help(s.fitness[0])`` tells more.
     rejected : tuple
         Mechanisms that ``require``, ``conditions`` and ``bounds`` left out: ``mechanism``, ``values``, ``reasons``.
     driver : str or None
@@ -409,7 +411,8 @@ class Syntheses(Shown, Sequence[Mechanism]):
         if any(fit.branch is None for fit in self.fitness):
             told += " No single driver determines the positions: nothing is known of defects and transmission."
         title = f"{'chains' if self.sources else self.mechanism.name}: {counted(len(self), 'mechanism')}"
-        title += "" if self.total is None else f", of {counted(self.total, 'solution')} over the complex numbers"
+        if self.total is not None:
+            title += f"; such tasks have {counted(self.total, 'solution')} over the complex numbers"
         left_out = [f"{', '.join(f'{v:.6g}' for v in one.values)}: {'; '.join(one.reasons)}" for one in self.rejected]
         blocks: list[Block] = [*tables, Paragraph(told)]
         return Document(title, blocks + ([Heading("Left out", 2), Bullets(left_out)] if left_out else []))

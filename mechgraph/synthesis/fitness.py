@@ -58,10 +58,11 @@ class Fitness:
         Least transmission angle at the positions, and from the first to the last [rad]; NaN where the driver holds no output, at change
         points, or where it does not come to the last.
     size, ratio : float
-        Largest distance of two elements of a link (axes, centers, named points; of a slide the direction alone counts); longest over
-        shortest of such distances.
+        Largest distance of two elements of a link [length] (axes, centers, named points; of a slide the direction alone counts); longest
+        over shortest of such distances [1].
     error : float
-        Largest distance from what was asked, in the units of the task.
+        Of fits the largest distance from what was asked at a row: a length, angles beside lengths as arcs of the mechanism's characteristic
+        length; where angles alone are asked, radians.
     """
 
     branch: Annotated[bool | None, "a defect"]

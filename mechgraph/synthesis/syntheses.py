@@ -218,7 +218,7 @@ class Synthesis:
         power = 1 if self.of.problem is p else 2
         closed_to = CLOSED_TO * np.maximum(1.0, np.abs(x[: self.of.u]).max(axis=0, initial=0.0)) ** power
         fits = error <= closed_to
-        told = [*start.evidence, self._tracks(start, found), *self.foretold]
+        told = [*self.foretold, *start.evidence, self._tracks(start, found)]
         told += [f"{name}: {NO_SCREWS}." for name in p.plain_angles[1]]
         told += [NO_LINE] * (not movable(self.of).any())
         told += [f"Of {start.each} mechanisms each that do the same all real ones are listed."] * (start.each > 1)
