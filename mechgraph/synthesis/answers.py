@@ -13,7 +13,7 @@ from mechgraph import methods
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, counted
 from mechgraph.files import optional, plain
-from mechgraph.kinematics.prescribed import coordinate
+from mechgraph.kinematics.prescribed import coordinate, obtained
 from mechgraph.maths.se3 import Array
 from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
@@ -23,7 +23,7 @@ from mechgraph.modes.certificate import Certificate
 from mechgraph.quantities import items_of, place_among, real_array, unit_of, wrong
 from mechgraph.synthesis.fitness import Fitness
 from mechgraph.synthesis.labelling import Symmetry
-from mechgraph.synthesis.tasks import Asked, obtained
+from mechgraph.synthesis.tasks import Asked
 
 if TYPE_CHECKING:
     import pandas

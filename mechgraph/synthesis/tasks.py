@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from mechgraph.kinematics.prescribed import Prescription, Target, coordinate, coordinates, is_pose, parts_of, target_of
+from mechgraph.kinematics.prescribed import Target, coordinate, is_pose, parts_of, target_of
 from mechgraph.kinematics.state import Configuration, user_poses
 from mechgraph.maths.se3 import Array
 from mechgraph.maths.tolerances import MODES
@@ -492,16 +492,6 @@ def asked_of(m: Mechanism, tasks: Any, faults: list[str]) -> Asked | None:
         faults.append("tasks: nothing is asked beyond the declared configuration; give two positions or more")
         return None
     return Asked(values[0], tuple(scaled), values[1 : 1 + orders])
-
-
-def obtained(m: Mechanism, name: str, X: Array, q: Array) -> Array:
-    """A freedom, or a coordinate of a point or link, at poses ``X (n, N, 4, 4)`` of the links and coordinates ``q (n, F)``."""
-    if m.freedom_fault(name, single=True) is None:
-        return np.asarray(q[:, m.freedom_names().index(m.full_name(name))])
-    given = Prescription(m, [])
-    given.add(name, 0.0)
-    (pair,), (full,) = given.free.values(), given.motions
-    return np.asarray(coordinates(pair, X[:, m.place_of_link(pair.b)])[pair.freedom_names.index(full)])
 
 
 class FirstPoses:
