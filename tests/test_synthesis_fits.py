@@ -112,7 +112,9 @@ def test_where_no_start_leads_through_all_rows_nothing_is_found_and_that_is_said
     s = mg.synthesize(m, task, ["C.point.x"], fit="least_squares", **asked)
     assert len(s) == 0
     assert s.evidence[0].startswith("0 starts of 13 led to all rows")
-    assert s.evidence[1] == "They are the declared dimensions, 12 random ones: twelve for each that is left of starts=2."
+    assert (
+        s.evidence[1] == "They are the declared dimensions, 12 random ones: twelve for each that is left of starts=2."
+    )
     degrees = mg.function("A", "D", np.column_stack([np.rad2deg(angles), 0.3 * np.sin(angles)]))
     with pytest.warns(mg.MechgraphWarning, match="360 is asked: read as radians, 57.3 turns; for degrees"):
         s = mg.synthesize(m, degrees, ["C.point.x"], fit="least_squares", **asked)
