@@ -72,7 +72,7 @@ from mechgraph.model.parameters import declared
 from mechgraph.outcome import FollowedPositions, Options, Outcome, Starts, closed_beside, compiled, served_before
 from mechgraph.quantities import door, wrong
 from mechgraph.result.contacts import with_other_flanks
-from mechgraph.result.notes import WHY_NOT
+from mechgraph.result.notes import WHY_NOT, doubted_angles
 from mechgraph.result.solution import Solution
 from mechgraph.result.values import OK, PositionLabels, ranges
 from mechgraph.result.views import CouplingResult
@@ -363,7 +363,9 @@ def _unreached(line: Pipeline, outcome: Outcome, solution: Solution) -> Exceptio
         why += f"{_listed(reached.items())} (see mechgraph.check)"
     if outcome.found.left[first]:
         what, why = "is not reachable (status 'out of reach')", outcome.found.left[first]
-    text = f"{head} {what}: {why}. {FLAG}"
+    every = zip(line.drive.names, line.drive.values("position", outcome.batch), strict=True)
+    doubts = doubted_angles(line.m, dict(every) if solution.t is None else {})
+    text = ". ".join([f"{head} {what}: {why}", *map(str, doubts), FLAG])
     if not dead:
         return ReachError(text, reached, solution)
     error = DeadPointError(text, reached, solution)

@@ -235,3 +235,10 @@ def test_circuits_of_two_loops_that_meet_at_one_place_are_one() -> None:
     assert (b.circuits, b.full_turn, b.open_ends) == (((0, 1, 2, 3),), (True,) * 4, 0)
     assert [at.branches for at in b.bifurcations] == [(0, 1, 2, 3)] * 2
     assert np.allclose(np.sin([at.value + np.arctan2(0.8, 0.6) for at in b.bifurcations]), 0.0, atol=1e-5)
+
+
+def test_a_whole_turn_has_no_ends_in_the_table() -> None:
+    b = mg.branches(mg.load("four-bar"), "A", samples=6, points=60)
+    assert [row[2:] for row in b.document().blocks[0].rows] == [("all round", "yes")] * 2
+    swings = mg.branches(mg.load("four-bar"), "D", samples=6, points=60)
+    assert all(" .. " in row[2] for row in swings.document().blocks[0].rows)

@@ -244,8 +244,14 @@ def test_assemblies_with_other_drives_at_their_start(tmp_path: Path) -> None:
     points = [(-1, 0, 0), (-1, 1, 0), (0, 2, 0), (1, 1, 0), (1, 0, 0)]
     links = ["frame", "a", "b", "c", "d", "frame"]
     pairs = [mg.Pair(f"J{i}", "R", *links[i : i + 2], point=p, axis=(0, 0, 1)) for i, p in enumerate(points)]
-    mg.save(mg.Mechanism("five-bar", pairs=pairs, drives=["J0", "J4"]), tmp_path / "m.toml")
+    m = mg.Mechanism("five-bar", pairs=pairs, drives=["J0", "J4"])
+    mg.save(m, tmp_path / "m.toml")
     assert "J0.Rz = 5 deg, J4.Rz = 0 deg" in run("assemblies", tmp_path / "m.toml", "--at", "J0=5deg").stdout
+    # in Python too
+    m = m.replace(start=mg.assemblies(m, {"J0": 0.1, "J4": 0.2})[0].start)
+    for given, at in ((None, (0.1, 0.2)), ({"J0": 0.15}, (0.15, 0.2))):
+        assert dict(mg.assemblies(m, given).at) == pytest.approx(dict(zip(("J0.Rz", "J4.Rz"), at, strict=True)))
+    assert [*mg.assemblies(m, {"J0": 0.1, "J1": m.start["J1.Rz"]}).at] == ["J0.Rz", "J1.Rz"]
 
 
 def test_equations_with_numbers() -> None:
@@ -772,6 +778,15 @@ def test_a_motion_in_whole_numbers_beyond_two_turns_is_doubted_in_python_too() -
         mg.Motion([0.0, 20.0, 40.0], 20.0, t=[0, 1, 2]),
     ):
         assert told(quiet) == []
+    # where nothing closes there is no solution to say so
+    rocker, word = m.replace(drives=["D"]), r"D\.Rz: read as radians, 7\.162 turns; for degrees write np\.deg2rad"
+    with pytest.raises(mg.ReachError, match=f"{word}.*on_reach"):
+        mg.kinematics(rocker, {"D": [0, 45]})
+    with pytest.raises(mg.ReachError) as caught:
+        mg.kinematics(rocker, {"D": 2.5})
+    assert "read as" not in str(caught.value)
+    assert re.search(word, " ".join(str(mg.assemblies(rocker, {"D": 45})).split()))
+    assert "read as" not in str(mg.assemblies(m, {"A": 45})) + str(mg.assemblies(rocker, {"D": 2.5}))
 
 
 def test_a_drive_without_a_motion_is_answered_in_options(tmp_path: Path) -> None:

@@ -558,9 +558,32 @@ def test_the_table_of_assemblies_shows_their_coordinates() -> None:
     assert re.search(r"^\d +0 +0 +0 +regular", str(mg.assemblies(mg.load("slider-crank"), {"A": 1e-17})), re.MULTILINE)
 
 
+def test_platforms_are_told_by_their_poses_where_these_tell_all_apart() -> None:
+    """Three legs of two bars: poses of the platform, in degrees; where two assemblies differ in legs alone the angles of pairs."""
+    pairs = []
+    for i, turn in enumerate(2 * np.pi * np.arange(3) / 3):
+        out = np.array([np.cos(turn), np.sin(turn), 0.0])
+        at = [3 * out, 2 * out + np.array([-out[1], out[0], 0.0]), out]
+        links = ["ground", f"crank {i}", f"bar {i}", "platform"]
+        pairs += [
+            mg.Pair(f"{name}{i}", "R", a, b, point=p[:2])
+            for name, a, b, p in zip("ABC", links[:3], links[1:], at, strict=True)
+        ]
+    m = mg.Mechanism("platform", pairs=pairs, frame="ground", planar=True)
+    modes = mg.assemblies(m, {"A0": 0.1, "A1": 0.1, "A2": 0.15})
+    table = modes.document().blocks[0]
+    assert table.header[1:4] == ("platform.Tx", "platform.Ty", "platform.Rz [deg]")
+    for row, X in zip(table.rows, modes.poses[:, modes[0].link_names().index("platform")], strict=True):
+        x, y, angle = X[0, 3], X[1, 3], np.rad2deg(np.arctan2(X[1, 0], X[0, 0]))
+        assert row[1:4] == tuple(f"{v:.5g}" for v in (x, y, angle))
+    alike = mg.assemblies(m, {"platform": np.eye(4)})
+    assert len(alike) == 8
+    assert alike.document().blocks[0].header[1] == "A0.Rz [deg]"
+
+
 def test_faults_of_what_is_given_name_the_question() -> None:
     with pytest.raises(mg.DeclarationError, match="assemblies of 'andrews': 1 fault"):
-        mg.assemblies(mg.load("andrews"), {})
+        mg.assemblies(mg.load("andrews"), {"no": 0})
 
 
 @pytest.mark.usefixtures("empty")

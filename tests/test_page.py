@@ -31,6 +31,7 @@ from mechgraph.show.canvas import PALETTE, REACTION
 from mechgraph.show.page import content, write
 from mechgraph.show.page.content import packed
 from mechgraph.show.page.write import json_for_script, report_page
+from mechgraph.synthesis.answers import compared
 
 pytestmark = pytest.mark.filterwarnings("ignore::mechgraph.MechgraphWarning")
 
@@ -469,7 +470,11 @@ def found() -> mg.Syntheses:
 
 def test_mechanisms_of_a_synthesis_stand_side_by_side_and_move_through_the_positions() -> None:
     data = data_of(report_page(found()))
-    assert [item["title"].split(",")[0] for item in data["items"]] == ["0: good", "1: good", "2: branch defect"]
+    assert [item["title"].split(",")[0] for item in data["items"]] == [
+        "0: no defect",
+        "1: no defect",
+        "2: branch defect",
+    ]
     for k, (m, item) in enumerate(zip(found(), data["items"], strict=True)):
         assert item["figure"] == k
         figure, motion = data["figures"][k], item["motion"]
@@ -492,6 +497,32 @@ def test_a_synthesis_without_a_driver_is_shown_position_by_position() -> None:
         report_page(found().taken([]))
     with pytest.raises(mg.DeclarationError, match="no solution and no study"):
         report_page(found(), mg.solve(mg.load("four-bar")))
+
+
+def test_what_is_asked_stands_beside_what_each_does() -> None:
+    """A link that begins elsewhere and turns more than once: angles obtained are those that were asked, in degrees."""
+    places = [(0.3, 0.1, 3.5), (1, 0.5, 4.0), (2, 0.4, 9)]
+    s = mg.synthesize(dyad().replace(units={"length": "mm"}), mg.poses("body", places), ["B.point"])
+    ((position, *slides), (_, *turns)) = (list(zip(table.header, *table.rows, strict=True)) for table in compared(s, 0))
+    assert position == ("position", "0", "1", "2")
+    assert [column[0] for column in slides] == [
+        "body.Tx asked [mm]",
+        "obtained",
+        "error",
+        "body.Ty asked [mm]",
+        "obtained",
+        "error",
+    ]
+    assert [column[0] for column in turns] == ["body.Rz asked [deg]", "obtained", "error"]
+    for k, (asked, done, error) in enumerate((slides[:3], slides[3:], turns)):
+        want = np.array(places)[:, k] * (np.rad2deg(1.0) if k == 2 else 1.0)
+        assert asked[1:] == done[1:] == tuple(f"{v:.6g}" for v in want)
+        assert max(abs(float(v)) for v in error[1:]) < 1e-12
+    asked = mg.poses("body", [(0, 0, 0), (1, 0.5, 0.4), (2, 0.4, 1.1)], at={"A": [0, 0.3, 0.8], "B": [0, 0.1, 0.3]})
+    nearly = mg.synthesize(dyad().replace(drives=["A", "B"]), asked, ["B.point"], fit="minimax", starts=1)
+    _, *columns = zip(*compared(nearly, 0)[0].rows, strict=True)
+    X = nearly.poses[0, :, nearly[0].link_names().index("body")]
+    assert columns[2] == tuple(f"{v:.2g}" for v in X[:, 0, 3] - (0, 1, 2))
 
 
 # --- on the command line -----------------------------------------------------------------------------------------------

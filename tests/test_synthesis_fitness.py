@@ -218,6 +218,31 @@ def test_conditions_are_those_of_positions_to_which_the_driver_does_not_lead(see
     assert [one.reasons for one in beyond.rejected] == [("turned is not determined at all positions",)]
 
 
+def test_a_sweep_is_kept_ranked_and_tabled_value_by_value() -> None:
+    task = mg.function("A", "D", np.deg2rad([[0, 0], [72, -30], [144, -10], [216, 10]]))
+    sweep = {"C.point.x": [-0.3, 0.1, 0.2]}
+    every = mg.synthesize(four_bar(), task, ["B.point", "C.point.y"], sweep=sweep)
+    kept = mg.synthesize(
+        four_bar(), task, ["B.point", "C.point.y"], sweep=sweep, bounds={"B.point.x": (0.7, None)},
+        conditions={"transmission D": (np.deg2rad(15), None)}, require=["branch"],
+    )  # fmt: skip
+    assert [len(s) for s in every] == [1, 3, 1]
+    assert [len(s) for s in kept] == [1, 2, 0]
+    for one, some, out in zip(every, kept, kept.rejected, strict=True):
+        fits = [not f.branch and x >= 0.7 and f.transmission >= np.deg2rad(15)
+                for f, x in zip(one.fitness, one.field("B.point.x"), strict=True)]  # fmt: skip
+        assert np.allclose(some.values, one.values[fits], rtol=0, atol=1e-9)
+        assert len(out) == len(one) - len(some)
+    assert "left out" in str(kept)
+    assert [[f.good for f in fits] for fits in every.good.fitness] == [[True], [True, True], []]
+    assert [s.values.tolist() for s in every.distinct] == [s.distinct.values.tolist() for s in every]
+    table = every.ranked("size").to_pandas()
+    assert table.index.tolist() == [(0, 0), (1, 0), (1, 1), (1, 2), (2, 0)]
+    assert table["C.point.x"].tolist() == [-0.3, 0.1, 0.1, 0.1, 0.2]
+    assert table.loc[1, "size"].is_monotonic_increasing
+    assert every.good[2:][0].to_pandas().empty
+
+
 def test_conditions_without_a_driver_are_a_fault_and_those_of_two_drivers_are_taken_at_the_rows() -> None:
     m = four_bar().replace(drives=[])
     poses = mg.poses("coupler", [(0, 0, 0), (0.2, 0.1, 0.1), (0.5, 0.1, 0.3)])

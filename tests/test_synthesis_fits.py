@@ -112,8 +112,11 @@ def test_where_no_start_leads_through_all_rows_nothing_is_found_and_that_is_said
     s = mg.synthesize(m, task, ["C.point.x"], fit="least_squares", **asked)
     assert len(s) == 0
     assert s.evidence[0].startswith("0 starts of 13 led to all rows")
+    assert (
+        s.evidence[1] == "They are the declared dimensions, 12 random ones: twelve for each that is left of starts=2."
+    )
     degrees = mg.function("A", "D", np.column_stack([np.rad2deg(angles), 0.3 * np.sin(angles)]))
-    with pytest.warns(mg.MechgraphWarning, match="360 rad is asked, 57.3 turns; angles are in radians"):
+    with pytest.warns(mg.MechgraphWarning, match="360 is asked: read as radians, 57.3 turns; for degrees"):
         s = mg.synthesize(m, degrees, ["C.point.x"], fit="least_squares", **asked)
     assert len(s) == 0
 
@@ -266,3 +269,17 @@ def test_mechanisms_that_are_much_larger_than_the_declared_one_are_told() -> Non
     s = mg.synthesize(four_bar(), task, ["C.point"], fit="least_squares", starts=1, cache=False)
     assert s.fitness[0].size == pytest.approx(np.hypot(*s.values[0]), rel=0.02)
     assert s.evidence[-1].startswith("1 of 1 are more than ten times as large as the declared one (3.35), up to 10")
+
+
+@pytest.mark.parametrize("at", [{"B": (0, 0, 0), "C": (3, 0, 0)}, {"B": (1, 0, 0), "C": (2, 0, 0)}])
+def test_declared_points_that_coincide_or_lie_in_line_are_named_as_what_leaves_the_rest_open(
+    at: dict[str, tuple[float, float, float]],
+) -> None:
+    m = four_bar()
+    m = m.replace(pairs=[p.replace(point=at.get(p.name, p.point)) for p in m.pairs])
+    task = mg.function("A", "D", np.deg2rad([[0, 0], [20, 16], [40, 31], [60, 44], [80, 53], [100, 60]]))
+    with pytest.raises(mg.DeclarationError, match=r"D\.Rz open; at the declared values .* declare other ones"):
+        mg.synthesize(m, task, ["B.point", "C.point"], fit="least_squares", starts=1)
+    # without a driver it is not the points
+    with pytest.raises(mg.DeclarationError, match="open; declare drives"):
+        mg.synthesize(ladder.dyad(), mg.poses("body", [(0, 0, 0), (1, 0.5, 0.4)]), ["B.point"], fit="minimax")

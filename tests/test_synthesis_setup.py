@@ -60,6 +60,25 @@ def test_a_file_is_read_with_its_degrees_and_keeps_the_schema(tmp_path: Path) ->
     assert np.allclose(task.pairs, np.deg2rad([[0, 0], [20, 31], [45, 52]]), rtol=0, atol=1e-15)
 
 
+def test_angles_by_name_may_be_in_degrees(tmp_path: Path) -> None:
+    path, quarter = tmp_path / "function.toml", np.pi / 2
+    text = FILE.replace(
+        '{ "D.effort" = [-inf, 40] }', '{ "transmission D_deg" = [40, inf], size = [1, 3] }\nover = { A_deg = [0, 90] }'
+    )
+    path.write_text(
+        text.partition("kind =")[0] + 'kind = "path"\npoint = "coupler.tip"\npoints = [[0, 0], [1, 1]]\nat = { A_deg = [0, 90] }'
+        '\n[[synthesis.task]]\nkind = "positions"\nrows = [{ D = 0 }, { D_deg = 90, "coupler.tip" = [1, 1] }]\n', encoding="utf-8",
+    )  # fmt: skip
+    jsonschema.Draft202012Validator(schema("mechanism")).validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    asked = mg.load(path).synthesis
+    assert asked.conditions == {"transmission D": (pytest.approx(np.deg2rad(40)), np.inf), "size": (1, 3)}
+    assert [asked.over["A"], asked.tasks[0].at["A"]] == [pytest.approx([0, quarter])] * 2
+    assert asked.tasks[1].rows == ({"D": 0}, {"D": pytest.approx(quarter), "coupler.tip": pytest.approx([1, 1])})
+    path.write_text(text.replace("[40, inf]", '"a"'), encoding="utf-8")
+    with pytest.raises(mg.DeclarationError, match="transmission D_deg = 'a': expected numbers"):
+        mg.load(path)
+
+
 def test_faults_of_a_task_in_a_file_stand_alone_with_its_name(tmp_path: Path) -> None:
     path = tmp_path / "function.toml"
     for wrong, fault in (
@@ -145,7 +164,11 @@ def test_a_mechanism_is_found_ranked_drawn_and_written_by_the_program(tmp_path: 
     assert result.exit_code == 0
     assert "Completeness: searched" in result.output
     assert picture.read_text(encoding="utf-8").startswith("<?xml")
-    assert "0: good" in page.read_text(encoding="utf-8")
+    told = page.read_text(encoding="utf-8")
+    # what is asked, what is obtained, and the error of the fit
+    assert "<summary>0: no defect, " in told
+    for cell in ("D.Rz asked [deg]", '<td class="right">53</td>', '<td class="right">0.12</td>'):
+        assert cell in told
     told = json.loads(run("synthesize", path, "--good", "--rank", "size", "--json").output)
     jsonschema.Draft202012Validator(schema("output")).validate(told)
     assert told["fitness"][0]["error"] < 0.02
@@ -171,8 +194,41 @@ def test_the_program_says_where_nothing_is_left_and_what_is_not_there(tmp_path: 
     page = tmp_path / "s.html"
     assert "there are 3 mechanisms, counted from 0" in bad("synthesize", path, "--solution", "3", "--page", page)
     assert not page.exists()
-    path.write_text(FITTED + '\n[synthesis.sweep]\n"A.point.x" = [0, 1]\n', encoding="utf-8")
-    assert "sweep" in bad("synthesize", path)
+
+
+SWEPT = """
+[synthesis]
+unknown = ["B.point", "C.point.y"]
+require = ["branch"]
+
+[synthesis.sweep]
+"C.point.x" = [-0.3, 0.1, 0.2]
+
+[[synthesis.task]]
+kind = "function"
+input = "A"
+output = "D"
+pairs_deg = [[0, 0], [72, -30], [144, -10], [216, 10]]
+"""
+"""Four pairs: one coordinate less, for three values of which one to three mechanisms do it."""
+
+
+def test_a_sweep_is_told_drawn_and_written_by_the_program(tmp_path: Path) -> None:
+    path, picture, page = (tmp_path / name for name in ("f.toml", "s.svg", "s.html"))
+    path.write_text(FILE.partition("[synthesis]")[0] + SWEPT, encoding="utf-8")
+    result = run("synthesize", path, "--good", "--rank", "size", "--plot", picture, "--page", page)
+    assert result.exit_code == 0
+    found = mg.synthesize(mg.load(path)).good.ranked("size")
+    assert str(found) in result.output
+    assert "circle points" in picture.read_text(encoding="utf-8")
+    assert "<summary>0, 0: no defect" in page.read_text(encoding="utf-8")
+    told = json.loads(run("synthesize", path, "--good", "--rank", "size", "--json").output)
+    jsonschema.Draft202012Validator(schema("output")).validate(told)
+    assert told["sweep"] == {"C.point.x": [-0.3, 0.1, 0.2]}
+    assert [np.shape(one["values"])[0] for one in told["positions"]] == list(map(len, found))
+    assert "a sweep" in bad("synthesize", path, "--out", tmp_path / "best.toml")
+    path.write_text(path.read_text(encoding="utf-8").replace("[-0.3, 0.1, 0.2]", "[0.2]"), encoding="utf-8")
+    assert run("synthesize", path).exit_code == 1
 
 
 def test_faults_of_tasks_and_unknowns_are_told_together_and_no_field_twice(tmp_path: Path) -> None:

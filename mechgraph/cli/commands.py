@@ -711,7 +711,9 @@ def synthesize(
     solution: Annotated[
         int, typer.Option("--solution", help="Which one is written, counted from 0.", metavar="NUMBER", min=0)
     ] = 0,
-    plot: Annotated[Path | None, opt.option("--plot", "Also plot them side by side.", "FILE")] = None,
+    plot: Annotated[
+        Path | None, opt.option("--plot", "Also plot them side by side; of a sweep center and circle points.", "FILE")
+    ] = None,
     page: Annotated[Path | None, opt.option("--page", "Also write a page on which each can be played.", "FILE")] = None,
     json: opt.AsJson = False,
 ) -> None:
@@ -728,26 +730,27 @@ def synthesize(
     m = opt.loaded(mechanism)
     if m.synthesis is None:
         opt.refuse("synthesize", "what is asked? The mechanism has no [synthesis] that says it")
-    if m.synthesis.sweep:
-        opt.refuse("synthesize", "[synthesis] has a sweep, which has no command; call mg.synthesize")
+    if m.synthesis.sweep and out is not None:
+        opt.refuse("--out", "[synthesis] has a sweep; call mg.synthesize, and mg.save of one of its mechanisms s[k][i]")
     with opt.working(f"synthesis of {m.name}") as say:
         found = mg.synthesize(m, progress=say)
         found = found.good if good else found
         found = found if rank is None else found.ranked(rank)
-        if found and solution >= len(found):
-            there = f"there are {counted(len(found), 'mechanism')}, counted from 0"
+        left = sum(map(len, found)) if m.synthesis.sweep else len(found)
+        if left and not m.synthesis.sweep and solution >= left:
+            there = f"there are {counted(left, 'mechanism')}, counted from 0"
             opt.refuse("synthesize", f"--solution {solution}: {there}")
-        figure = found.plot() if plot is not None and len(found) else None
-        if page is not None and found:
+        figure = found.plot().figure if plot is not None and left else None
+        if page is not None and left:
             mg.write_report(found, path=page)
-    if out is not None and found:
+    if out is not None and left:
         mg.save(found[solution], out)
     _tell_found("synthesize", found, figure, plot, json)
-    if out is not None and found and not json:
+    if out is not None and left and not json:
         opt.write(f"\nWrote mechanism {solution} to {out}.\n")
-    if page is not None and found and not json:
+    if page is not None and left and not json:
         opt.write(f"\nWrote {page}.\n")
-    if not found:
+    if not left:
         raise typer.Exit(opt.NO_ANSWER)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any
+from urllib.parse import quote
 
 import mechgraph as mg
 from mechgraph.cli.options import write
@@ -21,7 +22,7 @@ from mechgraph.modes.branches import BranchesData
 from mechgraph.response.respond import ResponseData
 from mechgraph.result.over_time import OverTimeData
 from mechgraph.result.summary import SolutionData
-from mechgraph.synthesis.answers import SynthesesData
+from mechgraph.synthesis.answers import SynthesesData, SynthesesOverData
 
 
 @dataclass(frozen=True)
@@ -331,20 +332,24 @@ COMMANDS: dict[str, Callable[[Json], Json]] = {
     "branches": _record(BranchesData, file=Annotated[str | None, "the picture that was drawn"]),
 }
 """The schema of what every command prints."""
+SWEPT = {
+    "synthesize, swept": _record(SynthesesOverData, file=Annotated[str | None, "the picture that was drawn"]),
+}
+"""The same where the mechanism holds a sweep."""
 
 
 def output_schema() -> Json:
     """The JSON Schema (draft 2020-12) of all that is printed with ``--json``."""
     defs: Json = {}
     kinds = {}
-    for name, make in COMMANDS.items():
+    for name, make in (COMMANDS | SWEPT).items():
         made = make(defs)
-        first = {"schema": {"const": VERSION}, "command": {"const": name}}
+        first = {"schema": {"const": VERSION}, "command": {"const": name.partition(",")[0]}}
         kinds[f"command {name}"] = object_schema(made["description"], first | made["properties"])
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": "output.schema.json",
         "title": "what mechgraph prints with --json",
-        "oneOf": [{"$ref": f"#/$defs/{kind.replace(' ', '%20')}"} for kind in kinds],
+        "oneOf": [{"$ref": f"#/$defs/{quote(kind)}"} for kind in kinds],
         "$defs": kinds | defs,
     }

@@ -388,6 +388,19 @@ def _rates(pair: Pair, q: Array, twist: Any, change: Any, *, at_rest: bool) -> t
     return first, np.concatenate([ddp, np.linalg.solve(E, left)[..., 0]], axis=-1)
 
 
+def obtained(m: Mechanism, name: str, X: Array, q: Array) -> Array:
+    """A freedom, or a coordinate of a point or link (angles within half a turn), at poses ``X (n, N, 4, 4)`` of the links and
+    coordinates ``q (n, F)``.
+    """
+    if m.freedom_fault(name, single=True) is None:
+        return np.asarray(q[:, m.freedom_names().index(m.full_name(name))])
+    given = Prescription(m, [])
+    given.add(name, 0.0)
+    (pair,), (full,) = given.free.values(), given.motions
+    found = coordinates(pair, X[:, m.place_of_link(pair.b)])[pair.freedom_names.index(full)]
+    return np.angle(np.exp(1j * found)) if full.endswith(TURNS) else np.asarray(found)
+
+
 def with_free_pairs(m: Mechanism, free: Sequence[Pair], names: Sequence[Any], poses: Array, q: Array) -> Mechanism:
     """The mechanism with free pairs behind its own and the drives ``names``, starting at coordinates ``q (F,)``, poses ``(N, 4, 4)``."""
     start = dict(zip(m.freedom_names(), q.tolist(), strict=True))

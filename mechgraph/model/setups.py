@@ -12,7 +12,6 @@ import numpy as np
 from mechgraph.errors import DeclarationError
 from mechgraph.fields import (
     BY_FREEDOM,
-    FACTS,
     FLAG,
     FREEDOM_NAME,
     INTEGER,
@@ -359,6 +358,7 @@ TaskName = Literal["function", "path", "poses", "positions"]
 FitName = Literal["least_squares", "minimax"]
 DefectName = Literal["branch", "circuit", "order", "full_turn"]
 _ROWS: Schema = {"type": "array", "items": {"type": "array"}}
+_LISTED: Schema = {"additionalProperties": {"type": "array"}}
 _HELD: dict[TaskName, tuple[str, ...]] = {
     "function": ("input", "output", "pairs", "scale", "rates", "accelerations"),
     "path": ("point", "points", "at", "velocities", "accelerations"),
@@ -390,7 +390,7 @@ class SynthesisTask(Described):
     scale: Annotated[
         str,
         TEXT(
-            "of a function: `free` where its output is times an unknown factor, which is not sought so far",
+            "of a function: `free` where its output is times an unknown factor, `D.Tz.scale` among what is found",
             choices=("given", "free"),
         ),
     ] = "given"
@@ -406,12 +406,17 @@ class SynthesisTask(Described):
     ] = None
     rows: Annotated[
         Any,
-        OTHER(
-            "of positions: tables, freedom, point or link → value",
+        BY_FREEDOM(
+            "of positions: tables, freedom, point or link → value; degrees with `_deg` added",
             rules={"type": "array", "items": {"type": "object"}},
         ),
     ] = None
-    at: Annotated[Any, FACTS("freedom → values at the same positions (timing)", default="none")] = None
+    at: Annotated[
+        Any,
+        BY_FREEDOM(
+            "freedom → values at the same positions (timing); degrees with `_deg` added", rules=_LISTED, default="none"
+        ),
+    ] = None
     rates: Annotated[
         Any, OTHER("of a function: derivatives of the output by the input, nan where none is asked", default="none")
     ] = None
@@ -498,17 +503,38 @@ class SynthesisSetup(Described):
     fit: Annotated[
         FitName | None, TEXT("how more is met than can be met exactly", choices=get_args(FitName), default="exactly")
     ] = None
-    bounds: Annotated[Any, FACTS("number → [least, greatest]", default="none")] = None
+    bounds: Annotated[
+        Any, BY_FREEDOM("number → [least, greatest]; degrees with `_deg` added", rules=_LISTED, default="none")
+    ] = None
     conditions: Annotated[
-        Any, FACTS("quantity → [least, greatest] at the positions; `inf` is no end", default="none")
+        Any,
+        BY_FREEDOM(
+            'quantity → [least, greatest] at the positions, `inf` for none; degrees with `_deg` added: `"transmission D_deg" = [40, inf]`',
+            rules=_LISTED,
+            default="none",
+        ),
     ] = None
     require: Annotated[
         Any, NAMES("of `branch`, `circuit`, `order` (no such defect) and `full_turn`", default="none")
     ] = ()
     minimize: Annotated[Any, TEXT("quantity on which freedom that is left is spent", default="none")] = None
     maximize: Annotated[Any, TEXT("likewise, to be as large as can be", default="none")] = None
-    sweep: Annotated[Any, FACTS("number → values that it takes one after the other", default="none")] = None
-    over: Annotated[Any, FACTS("driver → values at which conditions hold", default="the positions")] = None
+    sweep: Annotated[
+        Any,
+        BY_FREEDOM(
+            "number → values that it takes one after the other; degrees with `_deg` added",
+            rules=_LISTED,
+            default="none",
+        ),
+    ] = None
+    over: Annotated[
+        Any,
+        BY_FREEDOM(
+            "driver → values at which conditions hold; degrees with `_deg` added",
+            rules=_LISTED,
+            default="the positions",
+        ),
+    ] = None
     starts: Annotated[int, INTEGER("from how many dimensions fits begin")] = 64
 
     def __post_init__(self) -> None:

@@ -231,8 +231,10 @@ class _Reader:
         self.faults.append(wrong(kind, f"{where}: kind", f"one of {', '.join(KINDS[key])}"))
         return None
 
-    def by_freedom(self, raw: Any, where: str = "start") -> dict[str, Any]:
-        """Values by freedoms, degrees turned into radians."""
+    def by_freedom(self, raw: Any, where: str = "start") -> Any:
+        """Values by freedoms, or a list of such tables, degrees turned into radians."""
+        if isinstance(raw, list):
+            return [self.by_freedom(one, f"{where} {i}") for i, one in enumerate(raw)]
         if not isinstance(raw, Mapping):
             self.faults.append(wrong(raw, f"[{where}]", "a table"))
             return {}

@@ -19,7 +19,7 @@ from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, counted
 from mechgraph.files import plain
 from mechgraph.kinematics.assembly import closed_start, named_columns
-from mechgraph.kinematics.prescribed import DriverMotion
+from mechgraph.kinematics.prescribed import DriverMotion, coordinate, obtained, parts_of
 from mechgraph.kinematics.state import CLOSED, Configuration, close_all, user_poses
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import rank_of, singular_values
@@ -46,6 +46,7 @@ from mechgraph.modes.targets import (
 )
 from mechgraph.quantities import Count, Positive, door
 from mechgraph.quantities import Index as Seed
+from mechgraph.result.notes import doubted_angles
 
 
 @dataclass(frozen=True)
@@ -185,28 +186,24 @@ class Assemblies(Shown, Sequence[Mechanism]):
         single = [
             name for pair in m.pairs for name, one in zip(pair.freedom_names, pair.type.drivable, strict=True) if one
         ]
-        # most coordinates of an assembly in its table; all are in ``start`` of the mode
-        shown = [name for name in single if name not in self.at][:4]
-        places = [m.freedom_names().index(name) for name in shown]
-        far = float(np.abs(self.poses[:, :, :3, 3]).max(initial=0.0))
-        names = [f"{name} [deg]" if m.turns(name) else name for name in shown]
+        kinds, far = self.kinds[: self.postures], float(np.abs(self.poses[:, :, :3, 3]).max(initial=0.0))
+
+        def cells(names: Sequence[str]) -> list[tuple[str, ...]]:
+            columns = [obtained(m, name, self.poses, self.coordinates)[: len(kinds)] for name in names]
+            each = (zip(names, values, strict=True) for values in np.array(columns).reshape(len(names), -1).T.tolist())
+            return [tuple(f"{in_degrees(m, name, value, far):.5g}" for name, value in one) for one in each]
+
+        # most coordinates of an assembly in its table, but where the pose of a platform tells all apart; all are in ``start`` of the mode
+        shown = [name for name in _of_body(m) if name not in self.at]
+        if not shown or len(set(cells(shown))) < len(kinds):
+            shown = [name for name in single if name not in self.at][:4]
+        names = [f"{name} [deg]" if unit_of(m, name) else name for name in shown]
         header = ("mode", *names, "kind", "condition", "unique within")
         rows = []
-        for i, kind in enumerate(self.kinds[: self.postures]):
+        for i, (kind, told) in enumerate(zip(kinds, cells(shown) if shown else [()] * len(kinds), strict=True)):
             sure = self.certificates[i]
             word = "none" if sure is None else f"{sure.radius:.2g}" if sure.proved else "not proved"
-            rows.append(
-                (
-                    str(i),
-                    *(
-                        f"{in_degrees(m, name, self.coordinates[i, k], far):.5g}"
-                        for name, k in zip(shown, places, strict=True)
-                    ),
-                    kind,
-                    f"{self.condition[i]:.3g}",
-                    word,
-                )
-            )
+            rows.append((str(i), *told, kind, f"{self.condition[i]:.3g}", word))
         several = self.postures < len(self)
         postures = f"{counted(self.postures, 'posture')} in " if several else ""
         title = f"{m.name}: {postures}{counted(len(self), 'mode')} at {values_text(m, self.at)}"
@@ -216,7 +213,10 @@ class Assemblies(Shown, Sequence[Mechanism]):
         ]
         if several:
             moving.append(f"{len(self) - self.postures} more modes are the same postures with legs the other way.")
-        words = " ".join([*moving, f"Completeness: {self.completeness}.", *self.evidence])
+        doubts = () if len(self) else doubted_angles(m, self.at)
+        words = " ".join(
+            [*moving, f"Completeness: {self.completeness}.", *self.evidence, *(f"{one}." for one in doubts)]
+        )
         return Document(title, (Table(header, tuple(rows)), Paragraph(words)))
 
     def plot(self) -> Any:
@@ -301,6 +301,16 @@ class AssembliesOver(Shown, Sequence[Assemblies]):
         return {"positions": [p.to_dict() for p in self.positions]}
 
 
+def _of_body(m: Mechanism) -> list[str]:
+    """Coordinates of the link that most chains carry, three at least, where none of its own pairs stands on the frame; none elsewhere."""
+    ends = [{pair.a, pair.b} for pair in m.pairs]
+    count = {
+        name: sum(name in of for of in ends) for name in m.link_names() if not any({name, m.frame} <= of for of in ends)
+    }
+    body = max(count, key=count.__getitem__, default="")
+    return [f"{body}.{part}" for parts in parts_of(m) for part in parts] if count.get(body, 0) > 2 else []
+
+
 def values_text(m: Mechanism, at: Mapping[str, float]) -> str:
     """Values given, turns in degrees: ``A.Rz = 30 deg, B.Tz = 0.1``."""
     return ", ".join(f"{name} = {in_degrees(m, name, value):.6g}{unit_of(m, name)}" for name, value in at.items())
@@ -308,7 +318,7 @@ def values_text(m: Mechanism, at: Mapping[str, float]) -> str:
 
 def in_degrees(m: Mechanism, name: str, value: float, far: float = 0.0) -> float:
     """A value of a freedom or coordinate as it is shown: turns in degrees, zero where it is rounding (of lengths beside one of ``far``)."""
-    turns = m.turns(name)
+    turns = coordinate(m, name) is True
     # angle (radians), or part of the largest length, that tables show as zero
     if abs(value) <= 1e-12 * (1.0 if turns else far):
         return 0.0
@@ -317,7 +327,7 @@ def in_degrees(m: Mechanism, name: str, value: float, far: float = 0.0) -> float
 
 def unit_of(m: Mechanism, name: str) -> str:
     """What is written after it."""
-    return " deg" if m.turns(name) else ""
+    return " deg" if coordinate(m, name) is True else ""
 
 
 WORDS = ("proved", "tested", "searched")
@@ -830,7 +840,7 @@ def assemblies(
         The mechanism.
     values : mapping, optional
         As in ``solve``: freedom -> value, ``"bucket.tip"`` -> point, ``"platform"`` -> pose ``(4, 4)``. Lists of values give
-        ``AssembliesOver``.
+        ``AssembliesOver``. Declared drives that it does not name take their stored motion, else stay at the start.
     seed : int
         Seed of all random numbers; modes and their order do not depend on it.
     guesses : int
@@ -860,6 +870,11 @@ def assemblies(
     >>> len(modes), modes.total, modes.completeness
     (4, 16, 'proved')
     """
+    drives = {m.full_name(drive.freedom): drive.motion for drive in m.drives}
+    named = {name if m.freedom_fault(name, single=True) else m.full_name(name) for name in values or {}}
+    if named <= drives.keys():
+        still = {name for name, motion in drives.items() if motion is None} - named
+        values = {**{name: m.start.get(name, 0.0) for name in still}, **(values or {})}
     question = Question(m, values)
     # of many positions fewer ways of legs each, as all of them are kept
     most = MOST_FOLLOWED * 16 // max(16, question.drive.shape[1])

@@ -315,7 +315,12 @@ class Branches(Shown):
         m, driver = self.mechanism, self.driver
         unit = " [deg]" if m.turns(driver) else ""
         rows = tuple(
-            (str(i), str(b.circuit), " .. ".join(f"{in_degrees(m, driver, v):.6g}" for v in b.interval), _turns(b))
+            (
+                str(i),
+                str(b.circuit),
+                "all round" if b.full_turn else " .. ".join(f"{in_degrees(m, driver, v):.6g}" for v in b.interval),
+                _turns(b),
+            )
             for i, b in enumerate(self.branches)
         )
         folds = tuple(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from mechgraph.maths.tolerances import MOTIONS
 from mechgraph.memo import dataclass
 from mechgraph.model.belts import BeltDrive
 from mechgraph.model.friction import WAYS, Friction, coupling_of
+from mechgraph.model.mechanism import Mechanism
 from mechgraph.quantities import FORCE, MOMENT, angle_hint, unit_of
 from mechgraph.result.trajectory import Trajectory
 from mechgraph.result.values import OK, PositionLabels
@@ -127,10 +129,17 @@ class Remark:
 
 
 def angle_remarks(values: Trajectory) -> Iterator[Remark]:
-    """Turns that are driven, without times, through whole numbers beyond two turns: radians hardly are, degrees are."""
-    names, m = values.whole.freedom_names(), values.whole
-    for name in values.prescribed if values.t is None else ():
-        at = values.coordinates_at(np.arange(values.status().size))[names.index(name)]
+    """Of turns that are driven, without times, see ``doubted_angles``."""
+    names = values.prescribed if values.t is None else ()
+    places = [values.whole.freedom_names().index(name) for name in names]
+    at = values.coordinates_at(np.arange(values.status().size))[places]
+    return doubted_angles(values.whole, dict(zip(names, at, strict=True)))
+
+
+def doubted_angles(m: Mechanism, values: Mapping[str, Any]) -> Iterator[Remark]:
+    """Angles given by name as whole numbers beyond two turns: radians hardly are, degrees are."""
+    for name, at in values.items():
+        at = np.atleast_1d(at)
         told = angle_hint(float(max(at, key=abs, default=0.0))) if m.turns(name) and (at == np.round(at)).all() else ""
         if told:
             yield Remark(name, f"{name}: {told}; for degrees write np.deg2rad(...)")

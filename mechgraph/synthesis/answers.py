@@ -13,15 +13,17 @@ from mechgraph import methods
 from mechgraph.document import Block, Bullets, Document, Heading, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, counted
 from mechgraph.files import optional, plain
+from mechgraph.kinematics.prescribed import coordinate, obtained
 from mechgraph.maths.se3 import Array
 from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.setups import keeps
 from mechgraph.modes.assemblies import weakest
 from mechgraph.modes.certificate import Certificate
-from mechgraph.quantities import items_of, place_among, real_array, wrong
+from mechgraph.quantities import items_of, place_among, real_array, unit_of, wrong
 from mechgraph.synthesis.fitness import Fitness
 from mechgraph.synthesis.labelling import Symmetry
+from mechgraph.synthesis.tasks import Asked
 
 if TYPE_CHECKING:
     import pandas
@@ -67,7 +69,10 @@ class PerMechanism(Shown, Sequence[Any]):
         named = [f for f in fields(kind) if str(f.type) not in ("int", "str")] if kind else []
         named = [f for f in named if any(getattr(one, f.name, None) != f.default for one in every)]
         turns = ["radians" in str(f.type) for f in named]
-        header = [f.name.replace("_", " ") + " [deg]" * turn for f, turn in zip(named, turns, strict=True)]
+        header = [
+            f.name.replace("_", " ") + " defect" * ("defect" in str(f.type)) + " [deg]" * turn
+            for f, turn in zip(named, turns, strict=True)
+        ]
         rows = [
             [_cell(getattr(one, f.name, None), turn) for f, turn in zip(named, turns, strict=True)] for one in every
         ]
@@ -163,11 +168,15 @@ class Syntheses(Shown, Sequence[Mechanism]):
         Of each what is proved of it, found when first asked for: a mechanism that does what is asked exactly lies within ``error``, and no
         other within ``radius`` (radians, lengths over L), see ``Certificate``. None of fits, and where rates or factors are asked.
     fitness : sequence
-        Of each, see ``Fitness``; found when first asked for.
+        Of each, found when first asked for: defects ``branch``, ``circuit``, ``order``; ``full_turn`` of the driver; ``transmission`` at
+        the positions and ``transmission_between`` them [rad]; ``size`` [length], ``ratio`` [1]; ``error`` of fits [length, rad where angles
+        alone are asked]; ``good``, without a defect, whatever the error. ``help(s.fitness[0])`` tells more.
     rejected : tuple
         Mechanisms that ``require``, ``conditions`` and ``bounds`` left out: ``mechanism``, ``values``, ``reasons``.
     driver : str or None
         The freedom that leads a mechanism through the rows: the input, the one with timing, or the only drive.
+    asked : object
+        ``values (rows,)`` by name: freedoms, coordinates of points and links as they are asked [rad, length]; NaN where nothing is.
     mechanism_of : tuple of Mechanism
         For each the mechanism that it comes from: of chains one of many, with numbers of their own; what one does not have is NaN.
 
@@ -206,6 +215,7 @@ class Syntheses(Shown, Sequence[Mechanism]):
     sources: tuple[Mechanism, ...] = ()
     driver: str | None = None
     certificates: Sequence[Certificate | None] = ()
+    asked: Asked | None = None
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -340,6 +350,8 @@ class Syntheses(Shown, Sequence[Mechanism]):
     def to_pandas(self) -> pandas.DataFrame:
         """Return a DataFrame, a row per mechanism: unknowns, fitness, residual.
 
+        In columns ``branch``, ``circuit`` and ``order`` True is a defect, see ``Fitness``; ``good`` is True where there is none.
+
         Returns
         -------
         pandas.DataFrame
@@ -373,10 +385,14 @@ class Syntheses(Shown, Sequence[Mechanism]):
     def document(self) -> Document:
         """A table of the mechanisms, and how sure it is that these are all."""
         fits: list[tuple[str, ...]] = [
-            (_cell(fit.good if fit.branch is not None else None), _cell(fit.transmission, True), _cell(fit.size))
+            (
+                ", ".join(fit.defects) or ("-" if fit.branch is None else "none"),
+                _cell(fit.transmission, True),
+                _cell(fit.size),
+            )
             for fit in self.fitness
         ]
-        judged: tuple[str, ...] = ("good", "transmission [deg]", "size")
+        judged: tuple[str, ...] = ("defects", "transmission [deg]", "size")
         if self.total is None:
             judged, fits = (*judged, "error"), [(*a, f"{b.error:.3g}") for a, b in zip(fits, self.fitness, strict=True)]
         parts: list[tuple[tuple[str, ...], Sequence[tuple[str, ...]]]]
@@ -395,7 +411,8 @@ class Syntheses(Shown, Sequence[Mechanism]):
         if any(fit.branch is None for fit in self.fitness):
             told += " No single driver determines the positions: nothing is known of defects and transmission."
         title = f"{'chains' if self.sources else self.mechanism.name}: {counted(len(self), 'mechanism')}"
-        title += "" if self.total is None else f", of {counted(self.total, 'solution')} over the complex numbers"
+        if self.total is not None:
+            title += f"; such tasks have {counted(self.total, 'solution')} over the complex numbers"
         left_out = [f"{', '.join(f'{v:.6g}' for v in one.values)}: {'; '.join(one.reasons)}" for one in self.rejected]
         blocks: list[Block] = [*tables, Paragraph(told)]
         return Document(title, blocks + ([Heading("Left out", 2), Bullets(left_out)] if left_out else []))
@@ -426,6 +443,14 @@ class Syntheses(Shown, Sequence[Mechanism]):
         return plain(self.data)
 
 
+@dataclass(frozen=True)
+class SynthesesOverData:
+    """All mechanisms that do what is asked, for every value of what is swept."""
+
+    sweep: Annotated[Mapping[str, tuple[float, ...]], "the values given, by name"]
+    positions: Annotated[tuple[SynthesesData, ...], "for every value"]
+
+
 @dataclass(frozen=True, repr=False)
 class SynthesesOver(Shown, Sequence[Syntheses]):
     """Mechanisms for several values of what is swept, ``s[k][i]``. Returned by ``synthesize`` with ``sweep``.
@@ -434,6 +459,8 @@ class SynthesesOver(Shown, Sequence[Syntheses]):
     ----------
     sweep : mapping
         The values ``(n,)`` given, by name.
+    fitness, rejected : tuple
+        Those of ``s[k]`` for every value.
 
     Examples
     --------
@@ -462,6 +489,45 @@ class SynthesesOver(Shown, Sequence[Syntheses]):
         """The weakest of all."""
         return weakest(s.completeness for s in self.positions)
 
+    @property
+    def fitness(self) -> tuple[Sequence[Fitness], ...]:
+        """Of the mechanisms for every value."""
+        return tuple(s.fitness for s in self)
+
+    @property
+    def rejected(self) -> tuple[tuple[RejectedAnswer, ...], ...]:
+        """Mechanisms that were left out, for every value."""
+        return tuple(s.rejected for s in self)
+
+    @property
+    def distinct(self) -> SynthesesOver:
+        """For every value the first of every set of copies."""
+        return replace(self, positions=tuple(s.distinct for s in self))
+
+    @property
+    def good(self) -> SynthesesOver:
+        """For every value those without a defect that is known."""
+        return replace(self, positions=tuple(s.good for s in self))
+
+    def ranked(self, by: str | Callable[[Mechanism], float] = "transmission") -> SynthesesOver:
+        """Sort the mechanisms for every value, the best first; see ``Syntheses.ranked``."""
+        return replace(self, positions=tuple(s.ranked(by) for s in self))
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a DataFrame, a row per mechanism ``s[k][i]`` with index ``(k, i)``: what is swept and sought, fitness, residual.
+
+        Returns
+        -------
+        pandas.DataFrame
+
+        Raises
+        ------
+        MissingExtraError
+            Without pandas.
+        """
+        found = {k: s.to_pandas() for k, s in enumerate(self) if s} or {0: self[0].to_pandas()}
+        return optional("pandas", "pandas").concat(found, names=["k", "i"])
+
     def plot(self) -> Any:
         """Draw where the pairs that are sought or swept stand: center points at the frame, circle points (at row 0) of moving pairs.
 
@@ -481,15 +547,31 @@ class SynthesesOver(Shown, Sequence[Syntheses]):
     def document(self) -> Document:
         """How many mechanisms there are for every value."""
         rows = tuple(
-            (*(f"{v[k]:.6g}" for v in self.sweep.values()), str(len(s)), str(len(s.complex)), s.completeness)
-            for k, s in enumerate(self.positions)
+            (
+                *(f"{v[k]:.6g}" for v in self.sweep.values()),
+                str(len(s)),
+                str(len(s.rejected)),
+                str(len(s.complex)),
+                s.completeness,
+            )
+            for k, s in enumerate(self)
         )
-        header = (*self.sweep, "real", "not real", "completeness")
-        return Document(f"{self.positions[0].mechanism.name}: syntheses", (Table(header, rows),))
+        header = ("k", *self.sweep, "mechanisms", "left out", "not real", "completeness")
+        title = (
+            f"{self[0].mechanism.name}: {counted(sum(map(len, self)), 'mechanism')} for {counted(len(self), 'value')}"
+        )
+        return Document(title, (Table(header, tuple((str(k), *row) for k, row in enumerate(rows))),))
+
+    @property
+    def data(self) -> SynthesesOverData:
+        """Everything but arrays of poses as a record."""
+        return SynthesesOverData(
+            {name: tuple(values.tolist()) for name, values in self.sweep.items()}, tuple(s.data for s in self)
+        )
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything as plain data."""
-        return {"sweep": plain(dict(self.sweep)), "positions": [s.to_dict() for s in self.positions]}
+        """The same as plain data."""
+        return plain(self.data)
 
 
 def joined_answers(found: Sequence[Syntheses], told: Sequence[str]) -> Syntheses:
@@ -534,8 +616,34 @@ def joined_answers(found: Sequence[Syntheses], told: Sequence[str]) -> Syntheses
         tuple(s.mechanism for s in found for _ in s),
         found[0].driver,
         PerMechanism([partial(s.certificates.__getitem__, k) for s in found for k in range(len(s.certificates))]),
+        found[0].asked,
     )
     return out._sorted
+
+
+def compared(found: Syntheses, k: int) -> tuple[Table, ...]:
+    """What is asked at every row beside what a mechanism does, as wide as a page; angles in degrees."""
+    m, asked, columns = found[k], found.asked or Asked({}), list[tuple[str, Sequence[str]]]()
+    for name, values in asked.values.items():
+        factor = found.field(f"{name}.scale")[k] if name in asked.scaled else 1.0
+        turns, want = bool(coordinate(m, name)), factor * values
+        off = obtained(m, name, found.poses[k], found.coordinates[k]) - want
+        off -= 2 * np.pi * np.round(off / (2 * np.pi)) if turns else 0.0
+        unit, size = ("deg", np.rad2deg(1.0)) if turns else (unit_of(m.units, (1, 0, 0)), 1.0)
+        columns += [
+            (title, ["-" if np.isnan(v) else f"{size * v + 0.0:.{digits}g}" for v in column])
+            for title, column, digits in (
+                (f"{name} asked" + f" [{unit}]" * bool(unit), want, 6),
+                ("obtained", want + off, 6),
+                ("error", off, 2),
+            )
+        ]
+    rows = ("position", [str(i) for i in range(len(found.coordinates[k]))])
+    each = [(rows, *columns[i : i + 6]) for i in range(0, len(columns), 6)]
+    return tuple(
+        Table([title for title, _ in some], list(zip(*(c for _, c in some), strict=True)), "r" * len(some))
+        for some in each
+    )
 
 
 def _one_of(items: Sequence[Any], i: int | slice, what: str = "mechanism") -> Any:

@@ -58,15 +58,16 @@ class Fitness:
         Least transmission angle at the positions, and from the first to the last [rad]; NaN where the driver holds no output, at change
         points, or where it does not come to the last.
     size, ratio : float
-        Largest distance of two elements of a link (axes, centers, named points; of a slide the direction alone counts); longest over
-        shortest of such distances.
+        Largest distance of two elements of a link [length] (axes, centers, named points; of a slide the direction alone counts); longest
+        over shortest of such distances [1].
     error : float
-        Largest distance from what was asked, in the units of the task.
+        Of fits the largest distance from what was asked at a row: a length, angles beside lengths as arcs of the mechanism's characteristic
+        length; where angles alone are asked, radians.
     """
 
-    branch: bool | None
-    circuit: bool | None
-    order: bool | None
+    branch: Annotated[bool | None, "a defect"]
+    circuit: Annotated[bool | None, "a defect"]
+    order: Annotated[bool | None, "a defect"]
     full_turn: bool | None
     transmission: Annotated[float, "radians"]
     transmission_between: Annotated[float, "radians"]
@@ -75,15 +76,19 @@ class Fitness:
     error: float = 0.0
 
     @property
+    def defects(self) -> tuple[str, ...]:
+        """Names of the defects that are known."""
+        return tuple(name for name in ("branch", "circuit", "order") if getattr(self, name))
+
+    @property
     def good(self) -> bool:
-        """Whether no defect is known; so too without a driver."""
-        return not (self.branch or self.circuit or self.order)
+        """Whether no defect is known; so too without a driver. It says nothing of errors."""
+        return not self.defects
 
     @property
     def words(self) -> str:
         """Defects and transmission, as under a picture."""
-        defects = [name for name in ("branch", "circuit", "order") if getattr(self, name)]
-        told = f"{' and '.join(defects)} defect" if defects else "good" if self.branch is not None else "no driver"
+        told = "no driver" if self.branch is None else f"{' and '.join(self.defects) or 'no'} defect"
         return told + (f", {np.rad2deg(self.transmission):.3g} deg" if np.isfinite(self.transmission) else "")
 
     def lacks(self, wanted: Iterable[Defect]) -> tuple[Defect, ...]:

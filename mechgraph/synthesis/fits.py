@@ -176,16 +176,21 @@ class Fit:
     def _check(self, x: Array) -> None:
         """Refuse what drivers do not determine, and what cannot be fitted."""
         faults = []
-        numbers = self.p.numbers.with_values(self.p.places, self.z0[:, None])
-        J = self.p.equations(numbers, x.T[:, :, None]).by_coordinates[0, :, :, 0]
-        left = scipy.linalg.null_space(J[:, self.free], MODES.generic)
+
+        def left_at(z: Array) -> Array:
+            numbers = self.p.numbers.with_values(self.p.places, z[:, None])
+            J = self.p.equations(numbers, x.T[:, :, None]).by_coordinates[0, :, :, 0]
+            return np.asarray(scipy.linalg.null_space(J[:, self.free], MODES.generic))
+
+        left = left_at(self.z0)
         self.rank = len(self.free) - left.shape[1]
         loose = self.free[np.abs(left).max(axis=1, initial=0.0) > MODES.span]
         names = self.p.whole.freedom_names()
         if loose.size and np.isin(loose, self.others).any():
-            faults.append(
-                f"the drivers leave {listed(names[k] for k in loose)} open; declare drives that move the rest"
-            )
+            told = "declare drives that move the rest"
+            if left_at(self.z0 + np.random.default_rng(0).normal(size=len(self.z0))).shape[1] < left.shape[1]:
+                told = "at the declared values of what is unknown points of a link coincide, or links lie in line; declare other ones"
+            faults.append(f"the drivers leave {listed(names[k] for k in loose)} open; {told}")
         if len(self.drivers) > 1 and self.open.any():
             faults.append("several drivers without timing: give their values at all rows, e.g. mg.path(..., at={...})")
         if not np.isfinite(self.wanted).any():

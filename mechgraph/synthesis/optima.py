@@ -145,15 +145,15 @@ def fitted(
         if all(np.abs(here.z - other.z).max() > 1e-3 for other in kept):
             kept.append(here)
     same = sum(abs(value(here) - value(ends[0])) <= 1e-4 * abs(value(ends[0])) + 1e-12 for here in ends) if ends else 0
-    followed = (
-        f"; the best {len(begun)} that differ were followed to the end, {same} of them to the best one" if begun else ""
-    )
+    several = f"; the best {len(begun)} that differ were followed to the end, {same} of them to the best one"
+    followed = ("", "; the best one was followed to the end", several)[min(len(begun), 2)]
     followed = followed if evolved is None else "; the best that differential evolution finds was followed to the end"
     words = [f"{counted(count, 'start')} of {tries.shape[1]} led to all rows{followed}."]
-    if told:
-        part = "all that is asked" if way is None else "a part of the positions"
-        words.append(f"{counted(len(told), 'start')} of these do {part} exactly.")
-    elif way is None and fit.spare > 0:
+    part = "all that is asked" if way is None else "a part of the positions"
+    begins = "They are the declared dimensions" + f", {len(told)} that do {part} exactly" * bool(told)
+    left = f", {many} random ones: twelve for each that is left of starts={starts}" * bool(many)
+    words.append(f"{begins}{left}." if told or many else f"{begins} alone: starts={starts}.")
+    if way is None and fit.spare > 0 and not told:
         words.append(
             "None was known to do all that is asked: such tasks are not solved exactly, or none of their solutions is real."
         )
@@ -416,4 +416,5 @@ class FittedSynthesis:
             np.array([1.0 / self.fit.margins(here).min() for here in points]),
             told,
             driver=self.driver,
+            asked=p.tasks,
         )

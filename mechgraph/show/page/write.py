@@ -11,8 +11,9 @@ import json
 import os
 import re
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache, partial
+from html import escape
 from importlib.resources import files
 from typing import Any
 from urllib.parse import quote
@@ -46,7 +47,7 @@ from mechgraph.show.scene import scene_at
 from mechgraph.show.shapes import Shape
 from mechgraph.show.skeleton import draw_skeleton
 from mechgraph.show.stage import DrawnPart, DrawnPlace
-from mechgraph.synthesis.answers import Syntheses
+from mechgraph.synthesis.answers import Syntheses, SynthesesOver, compared
 from mechgraph.variants.study import IGNORED_TAIL, Study
 
 WEB = "web"
@@ -233,7 +234,7 @@ START = "mechgraphView.start();"
 
 @door
 def write_report(
-    m: Mechanism | Syntheses,
+    m: Mechanism | Syntheses | SynthesesOver,
     solution: Solution | None = None,
     study: Study | None = None,
     *,
@@ -246,8 +247,8 @@ def write_report(
 
     Parameters
     ----------
-    m : Mechanism or Syntheses
-        The mechanism; or what ``synthesize`` found: all mechanisms side by side, each to be played.
+    m : Mechanism, Syntheses or SynthesesOver
+        The mechanism; or what ``synthesize`` found: all mechanisms side by side, each to be played, and what each does of what is asked.
     solution : Solution, optional
         Of that mechanism. Default: the stored motions, if all drives have one.
     study : Study, optional
@@ -277,9 +278,11 @@ def write_report(
     write_whole(path, [report_page(m, solution, study)])
 
 
-def report_page(m: Mechanism | Syntheses, solution: Solution | None = None, study: Study | None = None) -> str:
+def report_page(
+    m: Mechanism | Syntheses | SynthesesOver, solution: Solution | None = None, study: Study | None = None
+) -> str:
     """The page as text; see ``write_report``."""
-    if isinstance(m, Syntheses):
+    if isinstance(m, Syntheses | SynthesesOver):
         if solution is not None or study is not None:
             raise DeclarationError("write_report", ["a page of syntheses has no solution and no study"])
         return _filled(_answers_content(m))
@@ -342,20 +345,26 @@ def _content(m: Mechanism, report: DeterminacyReport, s: Solution | None, study:
     }  # fmt: skip
 
 
-def _answers_content(found: Syntheses) -> dict[str, Any]:
-    """What a page of syntheses holds: the table, what is played, all side by side, and the declaration."""
-    m, document = found.mechanism, found.document()
-    good = len(found.good)
+def _answers_content(found: Syntheses | SynthesesOver) -> dict[str, Any]:
+    """What a page of syntheses holds: the table, what is played, all in one picture, what each does, and the declaration."""
+    every, document = list(found) if isinstance(found, SynthesesOver) else [found], found.document()
+    m, shown = every[0].mechanism, _shown_answers(every)
+    count, good = sum(map(len, every)), sum(len(s.good) for s in every)
     whole = {"proved": "All solutions, proved", "tested": "All solutions, by a trace test"}.get(found.completeness)
     side, word = "good" if good and whole else "fair", whole or "Others may exist"
     if not good:
         word = "None runs through all positions"
+    numbers = ("mechanisms", count), ("without defects", good), ("left out", sum(len(s.rejected) for s in every))
+    title, caption = "Side by side", "Where each begins, with its least transmission angle"
+    if isinstance(found, SynthesesOver):
+        title, caption = "Where the pairs stand", "Center points at the frame, circle points at the first position"
+    tables = [f"<details><summary>{escape(one.title)}</summary>{_html(one.compared())}</details>" for one in shown]
     return {
         "name": m.name or "mechanism", "about": m.description, "side": side, "word": word, "verdict": document.title, "remarks": [],
-        "numbers": [("mechanisms", str(len(found))), ("without defects", str(good)), ("left out", str(len(found.rejected)))],
-        "brief": _html(Document("", document.blocks)), "report": "", "data": json_for_script(answers_data(found)),
+        "numbers": [(name, str(n)) for name, n in numbers],
+        "brief": _html(Document("", document.blocks)), "report": "", "data": json_for_script(answers_data(shown, count)),
         "seen": "The mechanisms", "stills": [], "graph": [],
-        "results": [("Side by side", "", [("Where each begins, with its least transmission angle", _picture(found.plot))])],
+        "results": [("Asked and obtained", "".join(tables), []), (title, "", [(caption, _picture(found.plot))])],
         "equations": "", "provenance": _html(provenance(m, None)), "declaration": declaration(m),
         "version": version(), "libraries": libraries(),
     }  # fmt: skip
@@ -473,18 +482,23 @@ SAMPLES = 73
 """Driver values at which a mechanism is shown beside those of the rows."""
 
 
-def answers_data(found: Syntheses) -> Data:
-    """Figures and motions of the first of many answers.
+def _shown_answers(every: Sequence[Syntheses]) -> list[_ShownAnswer]:
+    """The first of many answers, of one synthesis or of those of a sweep.
 
     Raises
     ------
     DeclarationError
         where there are none.
     """
-    if not len(found):
+    names = [(s, k, f"{i}, " * (len(every) > 1) + f"{k}") for i, s in enumerate(every) for k in range(len(s))]
+    if not names:
         raise DeclarationError("page of syntheses", ["there is no mechanism to show"])
-    shown = [_ShownAnswer(found, k) for k in range(min(len(found), MOST_ITEMS))]
-    rest = f"Of {counted(len(found), 'mechanism')} the first {len(shown)} are shown." if len(found) > len(shown) else ""
+    return [_ShownAnswer(*one, figure) for figure, one in enumerate(names[:MOST_ITEMS])]
+
+
+def answers_data(shown: Sequence[_ShownAnswer], count: int) -> Data:
+    """Figures and motions of the first of ``count`` answers."""
+    rest = f"Of {counted(count, 'mechanism')} the first {len(shown)} are shown." if count > len(shown) else ""
     return {
         "figures": [one.figure.data(dict(_facts(one.m))) for one in shown],
         "items": [one.item() for one in shown],
@@ -499,8 +513,9 @@ class _ShownAnswer:
     ``words`` say where it stands, ``rows`` are the numbers of those that were asked.
     """
 
-    def __init__(self, found: Syntheses, k: int) -> None:
-        self.found, self.k, self.m, self.fit = found, k, found[k], found.fitness[k]
+    def __init__(self, found: Syntheses, k: int, name: str, number: int) -> None:
+        self.found, self.k, self.m, self.fit, self.number = found, k, found[k], found.fitness[k], number
+        self.title = plain(f"{name}: {self.fit.words}")
         q = found.coordinates[k]
         n = int(np.isfinite(q).any(axis=1).sum())
         self.q, self.X = q[:n, : len(self.m.freedom_names())], found.poses[k][:n, : len(self.m.links)]
@@ -554,10 +569,14 @@ class _ShownAnswer:
         alone = "" if self.led else ". No driver leads it through the positions: they are shown one by one"
         motion = self.figure.motion(self.scene.frames, "cycle" if self.led and self.fit.full_turn else "swing")
         return {
-            "group": "Mechanisms", "title": plain(f"{self.k}: {self.fit.words}"), "text": plain(f"{text}{alone}."), "figure": self.k,
+            "group": "Mechanisms", "title": self.title, "text": plain(f"{text}{alone}."), "figure": self.number,
             "motion": motion | {"places": [plain(word) for word in self.words]}, "arrows": [], "marked": [], "axes": [],
             "pieces": [self.figure.piece(part) for part in self._paths()], "after": None,
         }  # fmt: skip
+
+    def compared(self) -> Document:
+        """What was asked beside what it does."""
+        return Document("", compared(self.found, self.k))
 
     def _paths(self) -> Iterator[DrawnPart]:
         """Of every named point on a moving link its places at the rows, and its path."""
