@@ -401,6 +401,16 @@ def obtained(m: Mechanism, name: str, X: Array, q: Array) -> Array:
     return np.angle(np.exp(1j * found)) if full.endswith(TURNS) else np.asarray(found)
 
 
+def of_platform(m: Mechanism) -> list[str]:
+    """Coordinates of the link that most chains carry, three at least, where none of its own pairs stands on the frame; none elsewhere."""
+    ends = [{pair.a, pair.b} for pair in m.pairs]
+    count = {
+        name: sum(name in of for of in ends) for name in m.link_names() if not any({name, m.frame} <= of for of in ends)
+    }
+    body = max(count, key=count.__getitem__, default="")
+    return [f"{body}.{part}" for parts in parts_of(m) for part in parts] if count.get(body, 0) > 2 else []
+
+
 def with_free_pairs(m: Mechanism, free: Sequence[Pair], names: Sequence[Any], poses: Array, q: Array) -> Mechanism:
     """The mechanism with free pairs behind its own and the drives ``names``, starting at coordinates ``q (F,)``, poses ``(N, 4, 4)``."""
     start = dict(zip(m.freedom_names(), q.tolist(), strict=True))

@@ -19,7 +19,7 @@ from mechgraph.document import Document, Paragraph, Shown, Table
 from mechgraph.errors import DeclarationError, counted
 from mechgraph.files import plain
 from mechgraph.kinematics.assembly import closed_start, named_columns
-from mechgraph.kinematics.prescribed import DriverMotion, coordinate, obtained, parts_of
+from mechgraph.kinematics.prescribed import DriverMotion, coordinate, obtained, of_platform
 from mechgraph.kinematics.state import CLOSED, Configuration, close_all, user_poses
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import rank_of, singular_values
@@ -194,7 +194,7 @@ class Assemblies(Shown, Sequence[Mechanism]):
             return [tuple(f"{in_degrees(m, name, value, far):.5g}" for name, value in one) for one in each]
 
         # most coordinates of an assembly in its table, but where the pose of a platform tells all apart; all are in ``start`` of the mode
-        shown = [name for name in _of_body(m) if name not in self.at]
+        shown = [name for name in of_platform(m) if name not in self.at]
         if not shown or len(set(cells(shown))) < len(kinds):
             shown = [name for name in single if name not in self.at][:4]
         names = [f"{name} [deg]" if unit_of(m, name) else name for name in shown]
@@ -299,16 +299,6 @@ class AssembliesOver(Shown, Sequence[Assemblies]):
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain data."""
         return {"positions": [p.to_dict() for p in self.positions]}
-
-
-def _of_body(m: Mechanism) -> list[str]:
-    """Coordinates of the link that most chains carry, three at least, where none of its own pairs stands on the frame; none elsewhere."""
-    ends = [{pair.a, pair.b} for pair in m.pairs]
-    count = {
-        name: sum(name in of for of in ends) for name in m.link_names() if not any({name, m.frame} <= of for of in ends)
-    }
-    body = max(count, key=count.__getitem__, default="")
-    return [f"{body}.{part}" for parts in parts_of(m) for part in parts] if count.get(body, 0) > 2 else []
 
 
 def values_text(m: Mechanism, at: Mapping[str, float]) -> str:
