@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechgraph.maths.se3 import Mask
+from mechgraph.maths.se3 import Index, Mask
 from mechgraph.maths.tolerances import MODES
 from mechgraph.modes.circuits import root_between
 from mechgraph.modes.family import Array, Member
@@ -152,22 +152,24 @@ class Unreal:
         leg = RealLeg(self.equations, Member(self.family.target, begin), Member(self.family.target, end), which)
         came = follow(leg, x, care)
         prints = leg.prints(came.x, came.s, np.arange(len(which)))
-        out = []
-        for i, (a, b, _) in enumerate(legs):
-            mine = which == i
-            left = np.flatnonzero(mine & ~came.arrived)
-            values = self._values(a, b, came.s[left]).tolist()
-            doubles = list(map(Double, values, came.x[:, left].T, prints[:, left].T))
-            lost[i] += [one.value for one, infinite in zip(doubles, came.infinite[left], strict=True) if infinite]
-            doubles = [one for one, infinite in zip(doubles, came.infinite[left], strict=True) if not infinite]
-            out.append((prints[:, mine & came.arrived], doubles))
+        left = np.flatnonzero(~came.arrived)
+        out = [(prints[:, (which == i) & came.arrived], list[Double]()) for i in range(len(legs))]
+        for k, value in zip(left.tolist(), self._values(legs, which[left], came.s[left]).tolist(), strict=True):
+            i = int(which[k])
+            if came.infinite[k]:
+                lost[i].append(value)
+            else:
+                out[i][1].append(Double(value, came.x[:, k], prints[:, k]))
         return out
 
-    def _values(self, a: Station, b: Station, s: Array) -> Array:
-        """Driver values at parts ``s`` of the way."""
-        k, way = int(np.argmax(np.abs(b.asked - a.asked))), b.value - a.value
-        goal = a.asked[k] + s * (b.asked - a.asked)[k]
-        return np.asarray(a.value + way * root_between(lambda u: self.at(a.value + way * u).drive[k] - goal, len(s)))
+    def _values(self, legs: Sequence[tuple[Station, Station, Array | None]], which: Index, s: Array) -> Array:
+        """Driver values at parts ``s`` of the way of some legs."""
+        begin, way = np.array([(a.value, b.value - a.value) for a, b, _ in legs]).T[:, which]
+        change = np.array([b.asked - a.asked for a, b, _ in legs])
+        row = np.argmax(np.abs(change), axis=1)[which]
+        goal = np.array([a.asked for a, _, _ in legs])[which, row] + s * change[which, row]
+        n = np.arange(len(s))
+        return np.asarray(begin + way * root_between(lambda u: self.at(begin + way * u).drive[row, n] - goal, len(s)))
 
 
 def _same(one: Array, other: Array) -> Mask:
