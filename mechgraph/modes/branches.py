@@ -16,8 +16,9 @@ from typing import Annotated, Any, TypeAlias
 import numpy as np
 
 from mechgraph import methods
+from mechgraph.determinacy.report import check, structure_error
 from mechgraph.document import Document, Paragraph, Shown, Table
-from mechgraph.errors import DeclarationError, counted
+from mechgraph.errors import DeclarationError, IndeterminateError, counted
 from mechgraph.files import plain
 from mechgraph.graph.linkgraph import components_of_edges, members
 from mechgraph.kinematics.reach import BEYOND_END
@@ -442,6 +443,13 @@ class _Mapper:
 
     def __init__(self, m: Mechanism, driver: str, over: tuple[float, float] | None, samples: int, points: int) -> None:
         probe = Question(m, _at(m, driver, [0.0]))
+        if not probe.freedoms.mobility:
+            raise structure_error(m, [driver])
+        if probe.freedoms.dependent and not probe.freedoms.undriven:
+            others = ", ".join(name for name in probe.names if name != driver)
+            raise IndeterminateError(
+                f"mechanism {m.name!r}: {driver} cannot move while {others} rest; remove one of these drives", check(m)
+            )
         self.place, L = probe.names.index(driver), probe.system.par.L
         self.unit = float(probe.unit[self.place])
         self.begin = float(probe.declared.x[probe.family.rows[self.place], 0] * self.unit)
@@ -600,7 +608,7 @@ class _Mapper:
             x, met = of.states(step, value)
             there = family.prints(Configuration(s, x))
             for case in range(of.V):
-                if not left[i][start[case]]:
+                if of.twin[case] or not left[i][start[case]]:
                     continue
                 left[i][start[case]] = False
                 still += [prints[i][:, [start[case]]]] * bool(of.dead[case])
