@@ -205,6 +205,12 @@ def test_a_platform_on_legs_that_spin_has_as_many_branches_as_assemblies() -> No
     assert len(set(b.defects(list(found)).branches)) == len(found)
 
 
+def test_nothing_is_lost_where_a_leg_passes_length_zero() -> None:
+    """Squares of its length turn back there, between samples."""
+    b = mg.branches(hexapod("UPS"), "P1", over=(-2.5, -1.5), samples=3, points=3)
+    assert (len(b), b.completeness) == (0, "proved")
+
+
 def test_of_assemblies_on_one_circuit_one_is_followed(monkeypatch: pytest.MonkeyPatch) -> None:
     made = list[Circuits]()
     monkeypatch.setattr(branches, "Circuits", lambda *given: made.append(Circuits(*given)) or made[-1])

@@ -87,6 +87,21 @@ class Unreal:
         once = ~np.tril(_same(prints, prints), -1).any(axis=1)
         return Station(value, asked[:, 0], x[:, once], prints[:, once])
 
+    def turning(self, a: Station, b: Station) -> list[Station]:
+        """Stations between two others at which what is asked turns back, as the square of a length does at zero; none where it does not."""
+        step = (b.value - a.value) / 16
+        value = a.value + step * np.arange(17)
+        asked = self.at(value).drive
+        k = int(np.argmax(np.ptp(asked, axis=1)))
+        turns = 1 + np.flatnonzero(np.diff(np.sign(np.diff(asked[k]))))
+        if not turns.size:
+            return []
+        begin, h = value[turns] - step, 1e-3 * step
+        part = root_between(
+            lambda u: np.subtract(*(self.at(begin + 2 * step * u + side).drive[k] for side in (h, -h))), len(turns)
+        )
+        return [self.station(at) for at in (begin + 2 * step * part).tolist()]
+
     def gaps(self, ends: Sequence[tuple[Station, Station]]) -> list[Gap]:
         """What is met between stations; what is lost is led once more, more carefully."""
         out, left = [Gap((), (), (), 0.0)] * len(ends), list(range(len(ends)))

@@ -517,13 +517,20 @@ class _Mapper:
         if not finder.starts:
             return every, weakest(words), ("Circuits that lie wholly between samples were not looked for.",)
         tracks = Unreal(finder.form, self.q.drive[self.place])
+
+        def round_to(first: list[Station]) -> list[Station]:
+            """The first station a turn further on, where all comes back."""
+            return [tracks.station(one.value + 2 * np.pi, one.x) for one in first if self.around]
+
         at = [tracks.station(value, found.unreal) for (value, _), found in zip(self.known, solutions, strict=False)]
         if not self.around:
             at = [tracks.station(self.low / self.unit), *at, tracks.station(self.high / self.unit)]
+        at += [one for a, b in pairwise([*at, *round_to(at[:1])]) for one in tracks.turning(a, b)]
+        at.sort(key=lambda one: one.value)
         gaps: dict[tuple[float, float], Gap] = {}
         tried: set[float] = set()
         while True:
-            ends = list(pairwise([*at, tracks.station(at[0].value + 2 * np.pi, at[0].x)] if self.around else at))
+            ends = list(pairwise([*at, *round_to(at[:1])]))
             new = [two for two in ends if (two[0].value, two[1].value) not in gaps]
             gaps |= zip([(a.value, b.value) for a, b in new], tracks.gaps(new), strict=True)
             told = [self._untold(a, b, gaps[a.value, b.value], every[1], finder.ways) for a, b in ends]

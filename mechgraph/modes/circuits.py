@@ -331,7 +331,7 @@ class Circuits:
         going[1::2][met], closing[met] = False, True
         self.gap[closing] = d[closing]
         # a little more than what is left, or less, by what a step may be off
-        short = d * (1.0 - 0.2 * np.minimum(2.0 * d / h[::2], 1.0) ** 4)
+        short = d * (1.0 - 0.2 * np.minimum(2.0 * d / np.maximum(h[::2], 1e-300), 1.0) ** 4)
         h[::2][closing] = np.minimum(h[::2], short + 2e-6)[closing]
         apart = near & ~met
         for way in (h[::2], h[1::2]):
