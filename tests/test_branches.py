@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mechanisms import FourBarFormula, linked_four_bar
+from mechanisms import FourBarFormula, hexapod, linked_four_bar
 from test_assembly_groups import spatial
 
 import mechgraph as mg
+from mechgraph.modes import branches
+from mechgraph.modes.circuits import Circuits
 from mechgraph.modes.homotopy import RealLeg
 
 
@@ -191,6 +193,40 @@ def test_branch_and_circuit_of_every_position_are_those_of_the_closed_form(seed:
     for numbers, formula in ((found.branches, known.branch), (found.circuits, known.circuit)):
         told = {(number, formula(*at)) for number, at in zip(numbers, asked, strict=True)}
         assert len({number for number, _ in told}) == len({name for _, name in told}) == len(told)
+
+
+def test_a_platform_on_legs_that_spin_has_as_many_branches_as_assemblies() -> None:
+    """Legs between balls spin: at a fold nothing but the platform tells its motion from theirs, and they come back elsewhere."""
+    m = hexapod("SPS")
+    b = mg.branches(m, "P1", over=(-1.5, 2.0), samples=4, points=8)
+    assert (sorted(map(len, b.circuits)), b.open_ends) == ([4, 4], 0)
+    found = mg.assemblies(m, dict.fromkeys((f"P{k}" for k in range(2, 7)), 0.0) | {"P1": 0.86})
+    assert sum(low < 0.86 < high for low, high in b.intervals) == len(found)
+    assert len(set(b.defects(list(found)).branches)) == len(found)
+
+
+def test_nothing_is_lost_where_a_leg_passes_length_zero() -> None:
+    """Squares of its length turn back there, between samples."""
+    b = mg.branches(hexapod("UPS"), "P1", over=(-2.5, -1.5), samples=3, points=3)
+    assert (len(b), b.completeness) == (0, "proved")
+
+
+def test_of_assemblies_on_one_circuit_one_is_followed(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = list[Circuits]()
+    monkeypatch.setattr(branches, "Circuits", lambda *given: made.append(Circuits(*given)) or made[-1])
+    m = linked_four_bar(2.0, 1.5, 2.5, 3.0, 0.9)
+    assert mg.branches(m, "O0", samples=6, points=6).circuits == ((0, 1),)
+    assert [(of.V, len(np.unique(of.a.case))) for of in made] == [(2, 1)]
+
+
+def test_a_driver_that_cannot_move_has_no_branches() -> None:
+    """A structure; a five-bar held by two of its three drives."""
+    with pytest.raises(mg.IndeterminateError, match="mobility is 0"):
+        mg.branches(mg.load("prprrh"), "O1")
+    corners, links = ((0, 0), (-1, 1), (0.5, 2.5), (2, 1.5), (1.5, 0)), ("frame", *"abcd", "frame")
+    pairs = [mg.Pair(f"P{i}", "R", *links[i : i + 2], point=(*at, 0), axis=(0, 0, 1)) for i, at in enumerate(corners)]
+    with pytest.raises(mg.IndeterminateError, match=r"P0\.Rz cannot move while P1\.Rz, P4\.Rz rest"):
+        mg.branches(mg.Mechanism("five-bar", pairs=pairs, drives=["P0", "P1", "P4"]), "P0")
 
 
 def test_bad_arguments_of_a_map_are_all_named() -> None:

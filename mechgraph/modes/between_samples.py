@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechgraph.maths.se3 import Mask
+from mechgraph.maths.se3 import Index, Mask
 from mechgraph.maths.tolerances import MODES
 from mechgraph.modes.circuits import root_between
 from mechgraph.modes.family import Array, Member
@@ -87,6 +87,21 @@ class Unreal:
         once = ~np.tril(_same(prints, prints), -1).any(axis=1)
         return Station(value, asked[:, 0], x[:, once], prints[:, once])
 
+    def turning(self, a: Station, b: Station) -> list[Station]:
+        """Stations between two others at which what is asked turns back, as the square of a length does at zero; none where it does not."""
+        step = (b.value - a.value) / 16
+        value = a.value + step * np.arange(17)
+        asked = self.at(value).drive
+        k = int(np.argmax(np.ptp(asked, axis=1)))
+        turns = 1 + np.flatnonzero(np.diff(np.sign(np.diff(asked[k]))))
+        if not turns.size:
+            return []
+        begin, h = value[turns] - step, 1e-3 * step
+        part = root_between(
+            lambda u: np.subtract(*(self.at(begin + 2 * step * u + side).drive[k] for side in (h, -h))), len(turns)
+        )
+        return [self.station(at) for at in (begin + 2 * step * part).tolist()]
+
     def gaps(self, ends: Sequence[tuple[Station, Station]]) -> list[Gap]:
         """What is met between stations; what is lost is led once more, more carefully."""
         out, left = [Gap((), (), (), 0.0)] * len(ends), list(range(len(ends)))
@@ -152,22 +167,24 @@ class Unreal:
         leg = RealLeg(self.equations, Member(self.family.target, begin), Member(self.family.target, end), which)
         came = follow(leg, x, care)
         prints = leg.prints(came.x, came.s, np.arange(len(which)))
-        out = []
-        for i, (a, b, _) in enumerate(legs):
-            mine = which == i
-            left = np.flatnonzero(mine & ~came.arrived)
-            values = self._values(a, b, came.s[left]).tolist()
-            doubles = list(map(Double, values, came.x[:, left].T, prints[:, left].T))
-            lost[i] += [one.value for one, infinite in zip(doubles, came.infinite[left], strict=True) if infinite]
-            doubles = [one for one, infinite in zip(doubles, came.infinite[left], strict=True) if not infinite]
-            out.append((prints[:, mine & came.arrived], doubles))
+        left = np.flatnonzero(~came.arrived)
+        out = [(prints[:, (which == i) & came.arrived], list[Double]()) for i in range(len(legs))]
+        for k, value in zip(left.tolist(), self._values(legs, which[left], came.s[left]).tolist(), strict=True):
+            i = int(which[k])
+            if came.infinite[k]:
+                lost[i].append(value)
+            else:
+                out[i][1].append(Double(value, came.x[:, k], prints[:, k]))
         return out
 
-    def _values(self, a: Station, b: Station, s: Array) -> Array:
-        """Driver values at parts ``s`` of the way."""
-        k, way = int(np.argmax(np.abs(b.asked - a.asked))), b.value - a.value
-        goal = a.asked[k] + s * (b.asked - a.asked)[k]
-        return np.asarray(a.value + way * root_between(lambda u: self.at(a.value + way * u).drive[k] - goal, len(s)))
+    def _values(self, legs: Sequence[tuple[Station, Station, Array | None]], which: Index, s: Array) -> Array:
+        """Driver values at parts ``s`` of the way of some legs."""
+        begin, way = np.array([(a.value, b.value - a.value) for a, b, _ in legs]).T[:, which]
+        change = np.array([b.asked - a.asked for a, b, _ in legs])
+        row = np.argmax(np.abs(change), axis=1)[which]
+        goal = np.array([a.asked for a, _, _ in legs])[which, row] + s * change[which, row]
+        n = np.arange(len(s))
+        return np.asarray(begin + way * root_between(lambda u: self.at(begin + way * u).drive[row, n] - goal, len(s)))
 
 
 def _same(one: Array, other: Array) -> Mask:

@@ -16,8 +16,9 @@ from typing import Annotated, Any, TypeAlias
 import numpy as np
 
 from mechgraph import methods
+from mechgraph.determinacy.report import check, structure_error
 from mechgraph.document import Document, Paragraph, Shown, Table
-from mechgraph.errors import DeclarationError, counted
+from mechgraph.errors import DeclarationError, IndeterminateError, counted
 from mechgraph.files import plain
 from mechgraph.graph.linkgraph import components_of_edges, members
 from mechgraph.kinematics.reach import BEYOND_END
@@ -446,6 +447,13 @@ class _Mapper:
 
     def __init__(self, m: Mechanism, driver: str, over: tuple[float, float] | None, samples: int, points: int) -> None:
         probe = Question(m, _at(m, driver, [0.0]))
+        if not probe.freedoms.mobility:
+            raise structure_error(m, [driver])
+        if probe.freedoms.dependent and not probe.freedoms.undriven:
+            others = ", ".join(name for name in probe.names if name != driver)
+            raise IndeterminateError(
+                f"mechanism {m.name!r}: {driver} cannot move while {others} rest; remove one of these drives", check(m)
+            )
         self.place, L = probe.names.index(driver), probe.system.par.L
         self.unit = float(probe.unit[self.place])
         self.begin = float(probe.declared.x[probe.family.rows[self.place], 0] * self.unit)
@@ -512,13 +520,20 @@ class _Mapper:
         if not finder.starts:
             return every, weakest(words), ("Circuits that lie wholly between samples were not looked for.",)
         tracks = Unreal(finder.form, self.q.drive[self.place])
+
+        def round_to(first: list[Station]) -> list[Station]:
+            """The first station a turn further on, where all comes back."""
+            return [tracks.station(one.value + 2 * np.pi, one.x) for one in first if self.around]
+
         at = [tracks.station(value, found.unreal) for (value, _), found in zip(self.known, solutions, strict=False)]
         if not self.around:
             at = [tracks.station(self.low / self.unit), *at, tracks.station(self.high / self.unit)]
+        at += [one for a, b in pairwise([*at, *round_to(at[:1])]) for one in tracks.turning(a, b)]
+        at.sort(key=lambda one: one.value)
         gaps: dict[tuple[float, float], Gap] = {}
         tried: set[float] = set()
         while True:
-            ends = list(pairwise([*at, tracks.station(at[0].value + 2 * np.pi, at[0].x)] if self.around else at))
+            ends = list(pairwise([*at, *round_to(at[:1])]))
             new = [two for two in ends if (two[0].value, two[1].value) not in gaps]
             gaps |= zip([(a.value, b.value) for a, b in new], tracks.gaps(new), strict=True)
             told = [self._untold(a, b, gaps[a.value, b.value], every[1], finder.ways) for a, b in ends]
@@ -603,7 +618,7 @@ class _Mapper:
             x, met = of.states(step, value)
             there = family.prints(Configuration(s, x))
             for case in range(of.V):
-                if not left[i][start[case]]:
+                if of.twin[case] or not left[i][start[case]]:
                     continue
                 left[i][start[case]] = False
                 still += [prints[i][:, [start[case]]]] * bool(of.dead[case])

@@ -24,7 +24,7 @@ from mechgraph.kinematics.state import Configuration
 from mechgraph.kinematics.system import System
 from mechgraph.maths.linear import inverses
 from mechgraph.maths.newton import cubic
-from mechgraph.maths.se3 import Array, Index, Mask
+from mechgraph.maths.se3 import Array, Index, Mask, finite_twist, multiplied
 from mechgraph.maths.tolerances import MODES, MOTIONS
 from mechgraph.memo import dataclass
 from mechgraph.modes.compiled_tracks import CompiledClosure
@@ -95,6 +95,8 @@ class Circuits:
         The branches through ``x``, by their numbers among all.
     closes, dead (V,)
         Whether a circuit comes back to its beginning; whether the driver stands still there, so that nothing is followed.
+    twin (V,)
+        Whether a state lies on the circuit of one before it, so that nothing is followed: told of states of one system at one driver value.
     turns (V,)
         Turns of the driver after which a circuit without folds comes back, 0 where it does not.
     """
@@ -117,11 +119,18 @@ class Circuits:
         far = 8 * self.period if np.isfinite(self.period) else np.inf
         self.ends: Array = np.outer(rims, np.ones(self.V)) if rims else np.stack([x[self.row] - far, x[self.row] + far])
         self.settled = np.flatnonzero(np.abs(family.idle).max(axis=1, initial=0.0) < MODES.span)
+        # on the way of links from the frame, 1 or -1 of each freedom
+        ways = system.tree.sums(np.ones((6, 1, 1)) * np.eye(len(system.m.pairs)))[0][:, system.pair_of_freedom]
+        passive = family.idle.shape[1] > 0
+        self.links = np.array([k for k in family.settled_links.tolist() if passive and ways[k].any()], dtype=np.intp)
+        self.ways = ways[self.links]
         back = (system.single_rows >= 0) & np.isfinite(family.periods)
         back[column] &= rims is None
         self.back = np.flatnonzero(back)
         self.turns, self.closes = np.zeros(self.V, dtype=np.intp), np.zeros(self.V, dtype=bool)
-        self.gap = np.zeros(self.V)
+        self.gap, self.twin = np.zeros(self.V), np.zeros(self.V, dtype=bool)
+        one = system.par.batch == 1 and self.V > 1 and np.ptp(x[self.row]) == 0
+        self.first = family.prints(Configuration(system, x)) if one else None
         nodes = self._unrolled(self._with_folds(self._whole(self._followed())))
         self.a, self.b = a, b = self._steps(nodes)
         self.rises = np.sign((b.x - a.x)[self.row])
@@ -138,6 +147,13 @@ class Circuits:
     def here(self, x: Array, case: Index) -> Configuration:
         """Mechanisms at states ``(nx, T)``."""
         return Configuration(self.s.cases(case), x)
+
+    def _told(self, here: Configuration, rates: Array) -> Array:
+        """Of rates ``(F, k, T)`` what is no passive motion: those of freedoms and twists of links that none moves, ``(n, k, T)``."""
+        told = [rates[self.settled]]
+        if self.links.size:
+            told += list(np.einsum("lf,ift,fkt->ilkt", self.ways, here.S, rates, optimize=True))
+        return np.concatenate(told)
 
     def at(self, x: Array, case: Index, beside: CircuitNodes | None = None) -> tuple[Array, CircuitNodes]:
         """Least Newton steps ``(F, T)`` at states, and what is known there.
@@ -174,7 +190,8 @@ class Circuits:
                 N = np.linalg.qr(N)[0]
             if N.shape[2] > 1:
                 # passive motions come last: what they do not change moves in one way
-                N = N @ np.linalg.svd(N[:, self.settled])[2].swapaxes(1, 2)
+                told = np.moveaxis(self._told(self.here(x, case), np.moveaxis(N, 0, -1)), -1, 0)
+                N = N @ np.linalg.svd(np.nan_to_num(told))[2].swapaxes(1, 2)
         if beside is None:
             V[:, :, r:] = N
             U, S, V = (np.moveaxis(v, 0, -1) for v in (U, S, V))
@@ -268,10 +285,28 @@ class Circuits:
             wide[on] = self._way(before.taken(on), new)[1]
             out.append(replace(new, t=new.t * sense[on]))
             going &= np.abs(last.x[lengths]).max(axis=0, initial=0.0) <= FARTHEST
+            self._find_twins(here, new)
+            going &= ~self.twin[case]
         nodes = CircuitNodes.joined(out)
         # of nodes that are told twice the second one says whether circuits meet
         again = (np.diff(nodes.case, append=-1) == 0) & (np.diff(nodes.place, append=0) == 0)
-        return nodes.taken(~again)
+        return nodes.taken(~again & ~(self.twin[nodes.case] & (nodes.place != 0)))
+
+    def _find_twins(self, a: CircuitNodes, b: CircuitNodes) -> None:
+        """See which steps lead through the first states of other cases: of two on one circuit the former is followed on."""
+        if self.first is None:
+            return
+        on, value = self._crossed(a.x[self.row], b.x[self.row], self.x[self.row, a.case])
+        if not on.any():
+            return
+        a, b = a.taken(on), b.taken(on)
+        node, last = self._met(a, b, value)
+        there = self.family.prints(self.here(node.x, node.case))
+        gaps = np.abs(there[:, :, None] - self.first[:, None]).max(axis=0, initial=0.0)
+        same = gaps < MODES.arrives * np.maximum(1.0, np.abs(there).max(axis=0, initial=0.0))[:, None]
+        k, other = np.nonzero(same & ((last < 1e-8) & a.leads_to(node) & b.leads_to(node))[:, None])
+        mine = a.case[k]
+        self.twin[np.maximum(mine, other)[mine != other]] = True
 
     def _meet(self, last: CircuitNodes, h: Array, going: Mask, closing: Mask) -> None:
         """See which of both ways come together, and let the first one end at the other."""
@@ -296,7 +331,7 @@ class Circuits:
         going[1::2][met], closing[met] = False, True
         self.gap[closing] = d[closing]
         # a little more than what is left, or less, by what a step may be off
-        short = d * (1.0 - 0.2 * np.minimum(2.0 * d / h[::2], 1.0) ** 4)
+        short = d * (1.0 - 0.2 * np.minimum(2.0 * d / np.maximum(h[::2], 1e-300), 1.0) ** 4)
         h[::2][closing] = np.minimum(h[::2], short + 2e-6)[closing]
         apart = near & ~met
         for way in (h[::2], h[1::2]):
@@ -304,10 +339,16 @@ class Circuits:
 
     def _apart(self, last: CircuitNodes) -> tuple[Array, Array, Array, Array]:
         """How far the ends of both ways are from each other, how far that leads on along each of them, and the cosine between these."""
-        y, t = self.s.difference(last.x[:, 1::2], last.x[:, ::2]), last.t[self.settled]
+        y = self.s.difference(last.x[:, 1::2], last.x[:, ::2])
         y[self.back] -= self.s.rounds(self.back, y[self.back])
         # of what no passive motion changes, along ways of unit size
-        y, a, b = y[self.settled], t[:, ::2], t[:, 1::2]
+        here = self.here(last.x, last.case)
+        y, t = y[self.settled], self._told(here, last.t[:, None])[:, 0]
+        if self.links.size:
+            R, p = here.poses[:, :3, self.links], here.poses[:, 3, self.links]
+            turn = multiplied(R[..., 1::2], R[..., ::2].swapaxes(0, 1))
+            y = np.concatenate([y, *finite_twist(turn, p[..., 1::2], p[..., ::2])])
+        a, b = t[:, ::2], t[:, 1::2]
         size = np.sqrt(np.sqrt((a * a).sum(axis=0) * (b * b).sum(axis=0)))
         y, a, b = y / size, a / size, b / size
         return np.sqrt((y * y).sum(axis=0)), (a * y).sum(axis=0), (b * y).sum(axis=0), (a * b).sum(axis=0)
@@ -367,11 +408,21 @@ class Circuits:
             nodes = CircuitNodes.joined([nodes, more])
         return nodes
 
-    @staticmethod
-    def _steps(nodes: CircuitNodes) -> tuple[CircuitNodes, CircuitNodes]:
-        """Neighbors on the same circuit."""
+    def _steps(self, nodes: CircuitNodes) -> tuple[CircuitNodes, CircuitNodes]:
+        """Neighbors on the same circuit, of the second one bodies in passive motion as near to those of the first as they come."""
         left = np.flatnonzero(nodes.case[1:] == nodes.case[:-1])
-        return nodes.taken(left), nodes.taken(left + 1)
+        a, b = nodes.taken(left), nodes.taken(left + 1)
+        # a circuit comes back with its passive bodies elsewhere; steps that bring them there
+        for _ in range(8):
+            idle = b.V[:, len(b.S) + 1 :]
+            gone = np.einsum("fkt,ft->kt", idle, self.s.difference(a.x, b.x))
+            far = np.flatnonzero(np.abs(gone).max(axis=0, initial=0.0) > 0.1)
+            if not far.size:
+                break
+            off, back = b.taken(far), np.einsum("fkt,kt->ft", idle[..., far], gone[:, far])
+            new, _ = self.closed(self.s.advance(off.x, back), off.case, a.t[:, far])
+            b.put(far, replace(new, place=off.place, meets=off.meets))
+        return a, b
 
     def _unrolled(self, nodes: CircuitNodes) -> CircuitNodes:
         """Closed circuits with folds from the last of these before the first state on, or to the first one behind it, to the same again."""
@@ -405,13 +456,18 @@ class Circuits:
         step = np.arange(len(k)) + np.repeat(
             (np.cumsum(count) - count)[case] - np.cumsum(count[case]) + count[case], count[case]
         )
+        on, value = self._crossed(self.a.x[self.row, step], self.b.x[self.row, step], value[k])
+        return step[on], k[on], value
+
+    def _crossed(self, a: Array, b: Array, value: Array) -> tuple[Mask, Array]:
+        """Which values of the driver, but for whole turns, lie between two others, and what they are there."""
         # rounding of values of the driver (radians, or lengths over L)
-        slip, value = 1e-9, value[k]
-        low, high = np.sort([self.a.x[self.row, step], self.b.x[self.row, step]], axis=0)
+        slip = 1e-9
+        low, high = np.sort([a, b], axis=0)
         if np.isfinite(self.period):
             value = value + self.period * np.ceil((low - slip - value) / self.period)
         on = (value >= low - slip) & (value <= high + slip)
-        return step[on], k[on], value[on]
+        return on, value[on]
 
     def states(self, step: Index, value: Array) -> tuple[Array, Mask]:
         """States on steps between nodes where the driver has some values, and whether they were met there."""

@@ -245,11 +245,14 @@ class _Told:
         unreal = np.abs(self.poses.imag).max(axis=0, initial=0.0) > FAR_APART * size
         self.regular &= (self.least == MODES.one_assembly) | unreal
         some = np.flatnonzero(run.singular)
+        # the mean round an end is the end: what is far from closed there has come to infinity
+        tried = some[Configuration(self.system, self.x[:, some]).closure < FAR_APART * size[some]]
+        doubtful, some = len(some) - len(tried), tried
         closed, error = close_all(self.system, self.x[:, some], family.columns)
         # an assembly at the end of a track is close to it; what closes elsewhere has come to infinity, and Newton leads anywhere from there
         moved = np.abs(family.prints(Configuration(self.system, closed)) - self.poses[:, some]).max(axis=0, initial=0.0)
         near = (error < CLOSED) & (moved <= FAR_APART * size[some])
-        self.doubtful, some = int((~near).sum()), some[near]
+        self.doubtful, some = doubtful + int((~near).sum()), some[near]
         self.x[:, some] = closed[:, near]
         ends = np.union1d(np.flatnonzero(self.regular), some)
         weak = ends[irregular(family, Configuration(self.system, self.x[:, ends]))]
