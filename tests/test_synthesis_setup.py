@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+import re
 import tomllib
 from pathlib import Path
 
@@ -121,6 +122,46 @@ def test_what_is_written_is_read_again(name: str, tmp_path: Path) -> None:
     assert mg.load(tmp_path / "m.toml") == m == pickle.loads(pickle.dumps(m))
     assert mg.load(tmp_path / "m.toml").replace(synthesis=None) != m
     assert type(m.synthesis).__name__ in str(m)
+
+
+SLIDER = """
+schema = 2
+name = "slider"
+planar = true
+start = { D = 0.1 }
+link = [{ name = "frame" }, { name = "crank" }, { name = "rod", points = { tip = [2, 0] } }, { name = "slider" }]
+pair = [
+    { name = "A", type = "R", a = "frame", b = "crank", point = [0, 0] },
+    { name = "B", type = "R", a = "crank", b = "rod", point = [1, 0] },
+    { name = "C", type = "R", a = "rod", b = "slider", point = [3, 0] },
+    { name = "D", type = "P", a = "frame", b = "slider", point = [3, 0], axis = [1, 0] },
+]
+drive = [{ freedom = "D", motion = { sweep = [0.0, 1.0, 0.1] } }]
+synthesis.unknown = ["B.point"]
+synthesis.task = [
+    { kind = "function", input = "A", output = "D", pairs = [[0, 0], [1, 1]] },
+    { kind = "positions", rows = [{ "rod.tip" = [1, 2], "rod.Tx" = 3 }, { "rod.Rz_deg" = 3 }] },
+]
+"""
+
+
+@pytest.mark.parametrize(
+    ("new", "where"),
+    [
+        ("start = { D", "start.D_deg: D"),
+        ("sweep", "drive 1.motion.sweep_deg: D"),
+        ("pairs", "synthesis.task 1.pairs_deg: D"),
+        ('"rod.tip', "synthesis.task 2.rows 0.rod.tip_deg: rod.tip"),
+        ('"rod.Tx', "synthesis.task 2.rows 0.rod.Tx_deg: rod.Tx"),
+    ],
+)
+def test_lengths_are_not_given_in_degrees(tmp_path: Path, new: str, where: str) -> None:
+    file = tmp_path / "slider.toml"
+    file.write_text(SLIDER, encoding="utf-8")
+    assert mg.load(file).turns("A")
+    file.write_text(re.sub(rf"({re.escape(new)})(?= =|\" =)", r"\1_deg", SLIDER), encoding="utf-8")
+    with pytest.raises(mg.DeclarationError, match=f": 1 fault\n  {re.escape(where)} is no angle; leave _deg out"):
+        mg.load(file)
 
 
 def test_angles_of_poses_are_degrees_in_the_file_and_radians_in_the_call(tmp_path: Path) -> None:

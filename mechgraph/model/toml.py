@@ -147,6 +147,8 @@ class _Reader:
         self.faults: list[str] = []
         self.left_out = False
         """Whether things are missing because of their faults, so that others seem to refer to nothing."""
+        self.in_degrees = list[tuple[str, str]]()
+        """Where numbers were read in degrees, and of which freedom, point or link."""
         self.pair_types: dict[str, PairType] = dict(PAIR_TABLE)
 
     def fields(self, kind: str, raw: Any, where: str) -> dict[str, Any]:
@@ -163,6 +165,7 @@ class _Reader:
                 self.faults.append(f"{where}: {table.in_degrees[key]} and {key} are both given; leave one out")
             elif key in table.in_degrees:
                 out[table.in_degrees[key]] = self.radians(value, f"{where}.{key}")
+                self.in_degrees.append((f"{where}.{key}", ""))
             else:
                 self.faults.append(f"{where}: {unknown('field', key, [*table.fields, *table.in_degrees])}")
         missing = [key for key in table.needed if key not in out]
@@ -238,6 +241,7 @@ class _Reader:
         if not isinstance(raw, Mapping):
             self.faults.append(wrong(raw, f"[{where}]", "a table"))
             return {}
+        self.in_degrees += [(f"{where}.{key}", key.removesuffix(DEGREES)) for key in raw if key.endswith(DEGREES)]
         return {
             key.removesuffix(DEGREES): self.radians(value, f"{where}.{key}") if key.endswith(DEGREES) else value
             for key, value in raw.items()
@@ -288,6 +292,13 @@ def _with_lists(reader: _Reader, fields: dict[str, Any], where: str) -> None:
     _with_parts(reader, fields, where)
 
 
+def _with_freedoms(reader: _Reader, fields: dict[str, Any], where: str) -> None:
+    """Of which freedoms a function or a drive has numbers in degrees."""
+    named = [str(fields[key]) for key in ("freedom", "input", "output") if key in fields]
+    own = [at for at, name in reader.in_degrees if not name and at.startswith(f"{where}.")]
+    reader.in_degrees += [(at, name) for at in own for name in named]
+
+
 def _with_six(reader: _Reader, fields: dict[str, Any], where: str) -> None:
     """Twists and wrenches as tuples."""
     formats = {**TABLES_OF_FILE["freedom"].fields, **TABLES_OF_FILE["component"].fields}
@@ -302,7 +313,7 @@ NESTED = ("response", "cam_law", "synthesis")
 """Tables whose arrays of tables hold objects."""
 READ_FIRST = {
     "motion": _with_sweep, "pair": _with_type, "pair_type": _with_parts, "bookkeeping": _with_lists,
-    "freedom": _with_six, "component": _with_six,
+    "freedom": _with_six, "component": _with_six, "synthesis_task": _with_freedoms, "drive": _with_freedoms,
 }  # fmt: skip
 """What is done to the fields of a table before its object is made; without effect where the table is at fault."""
 
@@ -348,11 +359,24 @@ def parse(data: Mapping[str, Any], subject: str) -> Mechanism:
             made = chain(chained.pop("pairs"), drive=None, **chained, **arguments)
         else:
             made = Mechanism(**{**arguments, "links": arguments.get("links") or None})
+        reader.faults += [
+            f"{where}: {name} is no angle; leave {DEGREES} out, with angles in radians"
+            for where, name in reader.in_degrees
+            if _is_length(made, name)
+        ]
     except DeclarationError as error:
         reader.faults += error.faults
     if reader.faults:
         raise DeclarationError(subject, list(dict.fromkeys(reader.faults)))
     return made
+
+
+def _is_length(m: Mechanism, name: str) -> bool:
+    """Whether a name is that of a freedom that slides, or of a link or its point but for turns of the link."""
+    if m.freedom_fault(name, single=True) is None:
+        return not m.turns(name)
+    owner, _, part = name.partition(".")
+    return owner in m.link_names() and part not in ("Rx", "Ry", "Rz")
 
 
 def load(name: str | os.PathLike[str]) -> Mechanism:

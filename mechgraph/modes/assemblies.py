@@ -659,7 +659,7 @@ class Finder:
         poses = np.moveaxis(user_poses(here), 1, 0)
         nearest = np.flatnonzero(found.of[1] == 0)
         place = {
-            k: i for i, k in enumerate(found.of[0, nearest[_ordered(q.family.prints(here)[:, nearest].T)]].tolist())
+            k: i for i, k in enumerate(found.of[0, nearest[in_order_of(q.family.prints(here)[:, nearest].T)]].tolist())
         }
         order = sorted(range(x.shape[1]), key=lambda i: (found.of[1, i], place.get(found.of[0, i], 0)))
         x, poses = x[:, order], poses[order]
@@ -793,7 +793,7 @@ def _said_apart(sure: Sequence[Certificate | None]) -> tuple[str, ...]:
     return ("Of some certificates it is not proved that their roots are two.",)
 
 
-def _ordered(numbers: Array) -> list[int]:
+def in_order_of(numbers: Array) -> list[int]:
     """The order of rows by their numbers, of which smaller differences than rounding do not count."""
     # difference of link poses (and coordinates) below which the next number decides the order of assemblies
     least = 1e-7 * float(np.abs(numbers).max(initial=1.0))

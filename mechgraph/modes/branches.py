@@ -31,6 +31,7 @@ from mechgraph.modes.assemblies import (
     Question,
     Solutions,
     in_degrees,
+    in_order_of,
     unit_of,
     values_text,
     weakest,
@@ -480,7 +481,7 @@ class _Mapper:
         # the position beside the start counts as that of a further sample, which may be the only one on its circuit
         self.row, self.others = int(q.system.single_rows[self.column]), np.delete(q.columns, self.place)
         self.known = [
-            *zip(q.drive[self.place].tolist(), (found.x for found in solutions), strict=True),
+            *zip(q.drive[self.place].tolist(), (self._in_order(found.x) for found in solutions), strict=True),
             (float(q.start.x[self.row, 0]), q.start.x),
         ]
         if progress is not None:
@@ -505,6 +506,10 @@ class _Mapper:
             step,
             open_ends + sum(2 - one.told for one in every),
         )
+
+    def _in_order(self, x: Array) -> Array:
+        """Assemblies at a sample in an order of their own, whichever were found first."""
+        return x[:, in_order_of(self.family.prints(Configuration(self.q.system, x)).T)]
 
     def _within(self, value: float) -> float:
         """A driver value, internal units, as one of the range."""
