@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from mechanisms import FourBarFormula, hexapod, linked_four_bar
+from scipy.spatial.transform import Rotation
 from test_assembly_groups import spatial
 
 import mechgraph as mg
@@ -278,3 +279,26 @@ def test_a_whole_turn_has_no_ends_in_the_table() -> None:
     assert [row[2:] for row in b.document().blocks[0].rows] == [("all round", "yes")] * 2
     swings = mg.branches(mg.load("four-bar"), "D", samples=6, points=60)
     assert all(" .. " in row[2] for row in swings.document().blocks[0].rows)
+
+
+def test_a_circuit_closes_where_both_ways_along_it_end_not_beyond() -> None:
+    """The rod of an RSSR spins; a crank turns back only where the rocker has one position: ``A cos + B sin + C = 0`` of its angle."""
+    rng = np.random.default_rng(1)
+    (one, p), (two, q), a, b = *((rng.normal(size=3), rng.uniform(-1, 1, 3)) for _ in "AD"), *rng.uniform(-1, 1, (2, 3))
+    pairs = [
+        mg.Pair("A", "R", "frame", "crank", point=p, axis=one),
+        mg.Pair("D", "R", "frame", "rocker", point=q, axis=two),
+        mg.Pair("B", "S", "crank", "rod", point=a),
+        mg.Pair("C", "S", "rod", "rocker", point=b),
+    ]
+    found = mg.branches(mg.Mechanism("RSSR", pairs=pairs, drives=["A"]), "A", points=24)
+    assert (found.circuits, found.completeness) == (((0, 1), (2, 3)), "proved")
+
+    def turned(u: float, axis: np.ndarray, center: np.ndarray, at: np.ndarray) -> np.ndarray:
+        return center + Rotation.from_rotvec(u * axis / np.linalg.norm(axis)).apply(at - center)
+
+    for fold in found.folds:
+        tip = turned(fold.value, one, p, a)
+        left = [np.sum((turned(u, two, q, b) - tip) ** 2) - np.sum((a - b) ** 2) for u in (0.0, np.pi / 2, np.pi)]
+        C = 0.5 * (left[0] + left[2])
+        assert np.hypot(left[0] - C, left[1] - C) == pytest.approx(abs(C), abs=1e-8)

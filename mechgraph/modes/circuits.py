@@ -313,7 +313,8 @@ class Circuits:
         d, ahead, behind, facing = self._apart(last)
         # the last step leads to the end of the other way, or straight over it, or these were parts of a circuit that pass each other
         there = closing & going[::2]
-        at = np.flatnonzero(np.repeat(there & (ahead <= 0), 2))
+        # nodes are off their circuit by more than the last step may be short of the other end, or beyond it
+        at = np.flatnonzero(np.repeat(there, 2))
         if at.size:
             last.x[:, at] = self.closed(last.x[:, at], last.case[at], last.t[:, at])[0].x
             d, ahead, behind, facing = self._apart(last)
