@@ -137,6 +137,10 @@ pair = [
     { name = "D", type = "P", a = "frame", b = "slider", point = [3, 0], axis = [1, 0] },
 ]
 drive = [{ freedom = "D", motion = { sweep = [0.0, 1.0, 0.1] } }]
+load = [{ kind = "spring", freedom = "D", stiffness = 1.0, free_length = 1.0 }]
+response.time = [0.0, 1.0]
+response.stop = [{ freedom = "D", upper = 9.0 }, { freedom = "A", lower_deg = -90.0 }]
+response.event = [{ name = "here", of = "D", value = 1.0 }]
 synthesis.unknown = ["B.point"]
 synthesis.task = [
     { kind = "function", input = "A", output = "D", pairs = [[0, 0], [1, 1]] },
@@ -150,6 +154,9 @@ synthesis.task = [
     [
         ("start = { D", "start.D_deg: D"),
         ("sweep", "drive 1.motion.sweep_deg: D"),
+        ("free_length", "load 1.free_length_deg: D"),
+        ("upper", "response.stop 1.upper_deg: D"),
+        ("value", "response.event 'here'.value_deg: D"),
         ("pairs", "synthesis.task 1.pairs_deg: D"),
         ('"rod.tip', "synthesis.task 2.rows 0.rod.tip_deg: rod.tip"),
         ('"rod.Tx', "synthesis.task 2.rows 0.rod.Tx_deg: rod.Tx"),
@@ -161,6 +168,13 @@ def test_lengths_are_not_given_in_degrees(tmp_path: Path, new: str, where: str) 
     assert mg.load(file).turns("A")
     file.write_text(re.sub(rf"({re.escape(new)})(?= =|\" =)", r"\1_deg", SLIDER), encoding="utf-8")
     with pytest.raises(mg.DeclarationError, match=f": 1 fault\n  {re.escape(where)} is no angle; leave _deg out"):
+        mg.load(file)
+
+
+def test_a_number_by_name_is_given_in_radians_or_in_degrees(tmp_path: Path) -> None:
+    file = tmp_path / "slider.toml"
+    file.write_text(SLIDER.replace("start = { D", "start = { A_deg = 2.0, A = 0.1, D"), encoding="utf-8")
+    with pytest.raises(mg.DeclarationError, match=": 1 fault\n  start: A and A_deg are both given; leave one out"):
         mg.load(file)
 
 

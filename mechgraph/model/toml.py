@@ -241,7 +241,11 @@ class _Reader:
         if not isinstance(raw, Mapping):
             self.faults.append(wrong(raw, f"[{where}]", "a table"))
             return {}
-        self.in_degrees += [(f"{where}.{key}", key.removesuffix(DEGREES)) for key in raw if key.endswith(DEGREES)]
+        angles = {key: key.removesuffix(DEGREES) for key in raw if key.endswith(DEGREES)}
+        self.in_degrees += [(f"{where}.{key}", name) for key, name in angles.items()]
+        self.faults += [
+            f"{where}: {name} and {key} are both given; leave one out" for key, name in angles.items() if name in raw
+        ]
         return {
             key.removesuffix(DEGREES): self.radians(value, f"{where}.{key}") if key.endswith(DEGREES) else value
             for key, value in raw.items()
@@ -293,8 +297,8 @@ def _with_lists(reader: _Reader, fields: dict[str, Any], where: str) -> None:
 
 
 def _with_freedoms(reader: _Reader, fields: dict[str, Any], where: str) -> None:
-    """Of which freedoms a function or a drive has numbers in degrees."""
-    named = [str(fields[key]) for key in ("freedom", "input", "output") if key in fields]
+    """Of which freedoms a function, a drive, a spring, a stop or an event has numbers in degrees."""
+    named = [str(fields[key]) for key in ("freedom", "of", "input", "output") if key in fields]
     own = [at for at, name in reader.in_degrees if not name and at.startswith(f"{where}.")]
     reader.in_degrees += [(at, name) for at in own for name in named]
 
@@ -314,6 +318,7 @@ NESTED = ("response", "cam_law", "synthesis")
 READ_FIRST = {
     "motion": _with_sweep, "pair": _with_type, "pair_type": _with_parts, "bookkeeping": _with_lists,
     "freedom": _with_six, "component": _with_six, "synthesis_task": _with_freedoms, "drive": _with_freedoms,
+    "stop": _with_freedoms, "event": _with_freedoms, "load spring": _with_freedoms,
 }  # fmt: skip
 """What is done to the fields of a table before its object is made; without effect where the table is at fault."""
 
