@@ -74,6 +74,14 @@ def test_circuits_that_lie_wholly_between_samples_are_found(reach: float, sample
     assert (len(b.circuits), b.full_turn, b.open_ends, b.completeness) == (2, (False,) * 4, 0, "proved")
 
 
+def test_where_the_range_ends_and_not_the_branch_is_told() -> None:
+    """The crank turns from the ground line to its fold."""
+    m = linked_four_bar(2.0, 0.5, 0.505, 3.0, 0.01)
+    told = [" ".join(str(mg.branches(m, "O0", over=over, samples=3, points=9)).split()) for over in ((0.0, 1.0), None)]
+    assert "At 0 deg the range of O0.Rz ends, not the branch" in told[0]
+    assert "the range of" not in told[1]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_few_samples_tell_the_same_as_many_where_groups_fold_one_after_the_other(seed: int) -> None:

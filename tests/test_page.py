@@ -490,8 +490,11 @@ def test_mechanisms_of_a_synthesis_stand_side_by_side_and_move_through_the_posit
 
 def test_a_synthesis_without_a_driver_is_shown_position_by_position() -> None:
     places = [(0, 0, 0), (1, 0.5, 0.4), (2, 0.4, 1.1)]
-    data = data_of(report_page(mg.synthesize(dyad(), mg.poses("body", places), ["B.point"])))
-    (item,) = data["items"]
+    page = report_page(mg.synthesize(dyad(), mg.poses("body", places), ["B.point"]))
+    (item,) = data_of(page)["items"]
+    # of defects nothing is known
+    assert "without defects" not in page
+    assert "without defects" in report_page(found())
     assert item["motion"]["places"] == [f"position {i}" for i in range(3) for _ in range(8)]
     with pytest.raises(mg.DeclarationError, match="no mechanism to show"):
         report_page(found().taken([]))
@@ -514,6 +517,7 @@ def test_what_is_asked_stands_beside_what_each_does() -> None:
         "error",
     ]
     assert [column[0] for column in turns] == ["body.Rz asked [deg]", "obtained", "error"]
+    assert "size [mm]" in str(s)
     for k, (asked, done, error) in enumerate((slides[:3], slides[3:], turns)):
         want = np.array(places)[:, k] * (np.rad2deg(1.0) if k == 2 else 1.0)
         assert asked[1:] == done[1:] == tuple(f"{v:.6g}" for v in want)

@@ -142,6 +142,8 @@ response.time = [0.0, 1.0]
 response.stop = [{ freedom = "D", upper = 9.0 }, { freedom = "A", lower_deg = -90.0 }]
 response.event = [{ name = "here", of = "D", value = 1.0 }]
 synthesis.unknown = ["B.point"]
+synthesis.bounds = { "B.point.x" = [0, 2] }
+synthesis.conditions = { "size" = [0, 2] }
 synthesis.task = [
     { kind = "function", input = "A", output = "D", pairs = [[0, 0], [1, 1]] },
     { kind = "positions", rows = [{ "rod.tip" = [1, 2], "rod.Tx" = 3 }, { "rod.Rz_deg" = 3 }] },
@@ -158,6 +160,8 @@ synthesis.task = [
         ("upper", "response.stop 1.upper_deg: D"),
         ("value", "response.event 'here'.value_deg: D"),
         ("pairs", "synthesis.task 1.pairs_deg: D"),
+        ('"B.point.x', "synthesis.bounds.B.point.x_deg: B.point.x"),
+        ('"size', "synthesis.conditions.size_deg: size"),
         ('"rod.tip', "synthesis.task 2.rows 0.rod.tip_deg: rod.tip"),
         ('"rod.Tx', "synthesis.task 2.rows 0.rod.Tx_deg: rod.Tx"),
     ],
@@ -244,11 +248,14 @@ def test_the_program_says_where_nothing_is_left_and_what_is_not_there(tmp_path: 
     path.write_text(exact.replace('"D.effort" = [-inf, 40]', "size = [-inf, 0.5]"), encoding="utf-8")
     result = run("synthesize", path)
     assert result.exit_code == 1
+    assert re.search(r"- B\.point\.x = \S+, B\.point\.y = \S+, C\.point\.x = .*: size = ", result.output)
     assert "no [synthesis]" in bad("synthesize", "four-bar")
     path.write_text(exact.replace('conditions = { "D.effort" = [-inf, 40] }', ""), encoding="utf-8")
     page = tmp_path / "s.html"
     assert "there are 3 mechanisms, counted from 0" in bad("synthesize", path, "--solution", "3", "--page", page)
     assert not page.exists()
+    path.write_text(exact.replace('"D.effort" = [-inf, 40]', "size = [-inf, 3.5]"), encoding="utf-8")
+    assert "there is 1 mechanism, counted from 0" in bad("synthesize", path, "--solution", "1")
 
 
 SWEPT = """

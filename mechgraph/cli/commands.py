@@ -705,7 +705,10 @@ def synthesize(
     good: Annotated[bool, typer.Option("--good", help="Only mechanisms without defects.")] = False,
     rank: Annotated[
         Literal["transmission", "size", "ratio", "error"] | None,
-        typer.Option("--rank", help="What the best mechanism is best in. Default: good ones first, then transmission."),
+        typer.Option(
+            "--rank",
+            help="What the best mechanism is best in. Default: good ones first, then transmission; of a sweep as found.",
+        ),
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="Write a mechanism as a TOML file.", metavar="FILE")] = None,
     solution: Annotated[
@@ -738,7 +741,7 @@ def synthesize(
         found = found if rank is None else found.ranked(rank)
         left = sum(map(len, found)) if m.synthesis.sweep else len(found)
         if left and not m.synthesis.sweep and solution >= left:
-            there = f"there are {counted(left, 'mechanism')}, counted from 0"
+            there = f"there {'is' if left == 1 else 'are'} {counted(left, 'mechanism')}, counted from 0"
             opt.refuse("synthesize", f"--solution {solution}: {there}")
         figure = found.plot().figure if plot is not None and left else None
         if page is not None and left:

@@ -377,10 +377,12 @@ def parse(data: Mapping[str, Any], subject: str) -> Mechanism:
 
 
 def _is_length(m: Mechanism, name: str) -> bool:
-    """Whether a name is that of a freedom that slides, or of a link or its point but for turns of the link."""
+    """Whether a name is that of a freedom that slides, of a place or direction, or of a link or its point but for turns of the link."""
     if m.freedom_fault(name, single=True) is None:
         return not m.turns(name)
     owner, _, part = name.partition(".")
+    if part.rpartition(".")[2] in ("x", "y", "z") or name in ("size", "ratio"):
+        return True
     return owner in m.link_names() and part not in ("Rx", "Ry", "Rz")
 
 

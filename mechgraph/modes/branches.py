@@ -312,6 +312,17 @@ class Branches(Shown):
         """
         return methods.call("draw_branches", self, output, ax=ax, current=current)
 
+    @property
+    def _rims(self) -> list[float]:
+        """Ends of branches at which nothing is singular: those of the range."""
+        singular = np.array([*(f.value for f in self.folds), *(b.value for b in self.bifurcations)])
+        ends = sorted({v for b in self.branches if b.full_turn is False for v in b.interval})
+        # part of a step of the samples within which an end is that of a fold
+        near = 1e-6 * self.resolution
+        off = [np.abs(v - singular) for v in ends]
+        turn = 2 * np.pi if self.mechanism.turns(self.driver) else np.inf
+        return [v for v, d in zip(ends, off, strict=True) if not (np.minimum(d, np.abs(d - turn)) < near).any()]
+
     def document(self) -> Document:
         """Branches and folds as tables, turns in degrees."""
         m, driver = self.mechanism, self.driver
@@ -344,6 +355,9 @@ class Branches(Shown):
             words.append(
                 f"{counted(self.open_ends, 'end')} of branches unresolved: the map is incomplete. Increase samples."
             )
+        elif rims := self._rims:
+            at = " and ".join(f"{in_degrees(m, driver, v):.6g}{unit_of(m, driver)}" for v in rims)
+            words.append(f"At {at} the range of {driver} ends, not the branch: over= sets it.")
         words += [
             f"Branches {', '.join(map(str, b.branches))} cross at {values_text(m, {driver: b.value})}, a double point."
             for b in self.bifurcations

@@ -21,6 +21,7 @@ from mechgraph.model.setups import keeps
 from mechgraph.modes.assemblies import weakest
 from mechgraph.modes.certificate import Certificate
 from mechgraph.quantities import items_of, place_among, real_array, unit_of, wrong
+from mechgraph.result.values import bracket
 from mechgraph.synthesis.fitness import Fitness
 from mechgraph.synthesis.labelling import Symmetry
 from mechgraph.synthesis.tasks import Asked
@@ -392,7 +393,11 @@ class Syntheses(Shown, Sequence[Mechanism]):
             )
             for fit in self.fitness
         ]
-        judged: tuple[str, ...] = ("defects", "transmission [deg]", "size")
+        judged: tuple[str, ...] = (
+            "defects",
+            "transmission [deg]",
+            "size" + bracket(unit_of(self.mechanism.units, (1, 0, 0))),
+        )
         if self.total is None:
             judged, fits = (*judged, "error"), [(*a, f"{b.error:.3g}") for a, b in zip(fits, self.fitness, strict=True)]
         parts: list[tuple[tuple[str, ...], Sequence[tuple[str, ...]]]]
@@ -413,9 +418,15 @@ class Syntheses(Shown, Sequence[Mechanism]):
         title = f"{'chains' if self.sources else self.mechanism.name}: {counted(len(self), 'mechanism')}"
         if self.total is not None:
             title += f"; such tasks have {counted(self.total, 'solution')} over the complex numbers"
-        left_out = [f"{', '.join(f'{v:.6g}' for v in one.values)}: {'; '.join(one.reasons)}" for one in self.rejected]
+        left_out = [f"{self._named(one)}: {'; '.join(one.reasons)}" for one in self.rejected]
         blocks: list[Block] = [*tables, Paragraph(told)]
         return Document(title, blocks + ([Heading("Left out", 2), Bullets(left_out)] if left_out else []))
+
+    def _named(self, one: RejectedAnswer) -> str:
+        """Which one it is: what is sought and its values, of chains the mechanism."""
+        if self.sources or one.mechanism.name != self.mechanism.name:
+            return one.mechanism.name
+        return ", ".join(f"{name} = {v:.6g}" for name, v in zip(self.unknown, one.values, strict=False))
 
     @property
     def data(self) -> SynthesesData:

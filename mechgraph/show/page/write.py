@@ -354,7 +354,9 @@ def _answers_content(found: Syntheses | SynthesesOver) -> dict[str, Any]:
     side, word = "good" if good and whole else "fair", whole or "Others may exist"
     if not good:
         word = "None runs through all positions"
-    numbers = ("mechanisms", count), ("without defects", good), ("left out", sum(len(s.rejected) for s in every))
+    known = all(fit.branch is not None for s in every for fit in s.fitness)
+    judged = [("without defects", good)] if known else []
+    numbers = [("mechanisms", count), *judged, ("left out", sum(len(s.rejected) for s in every))]
     title, caption = "Side by side", "Where each begins, with its least transmission angle"
     if isinstance(found, SynthesesOver):
         title, caption = "Where the pairs stand", "Center points at the frame, circle points at the first position"
