@@ -56,6 +56,8 @@ def test_a_hexapod_has_forty_assemblies_whatever_carries_its_legs() -> None:
     assert np.abs(both[0] - both[1]).max() < 1e-9
     # the assembly in which it is declared, legs as they stand there, is among the first
     home = mg.assemblies(m, {f"P{k}": 0.0 for k in range(1, 7)})
+    assert "platform.Tz\n" in str(home)
+    assert "condition" in str(home)
     assert f": {home.postures} postures in {64 * home.postures} modes at " in str(home)
     assert np.abs(home.coordinates[: home.postures]).max(axis=1).min() < 1e-9
 

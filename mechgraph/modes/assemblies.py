@@ -198,12 +198,13 @@ class Assemblies(Shown, Sequence[Mechanism]):
         if not shown or len(set(cells(shown))) < len(kinds):
             shown = [name for name in single if name not in self.at][:4]
         names = [f"{name} [deg]" if unit_of(m, name) else name for name in shown]
-        header = ("mode", *names, "kind", "condition", "unique within")
-        rows = []
+        rows = [("mode", *names, "kind", "condition", "unique within")]
         for i, (kind, told) in enumerate(zip(kinds, cells(shown) if shown else [()] * len(kinds), strict=True)):
             sure = self.certificates[i]
             word = "none" if sure is None else f"{sure.radius:.2g}" if sure.proved else "not proved"
             rows.append((str(i), *told, kind, f"{self.condition[i]:.3g}", word))
+        # columns for which a terminal is wide enough
+        parts = [rows] if len(shown) < 5 else [[row[:4] for row in rows], [(row[0], *row[4:]) for row in rows]]
         several = self.postures < len(self)
         postures = f"{counted(self.postures, 'posture')} in " if several else ""
         title = f"{m.name}: {postures}{counted(len(self), 'mode')} at {values_text(m, self.at)}"
@@ -214,10 +215,8 @@ class Assemblies(Shown, Sequence[Mechanism]):
         if several:
             moving.append(f"{len(self) - self.postures} more modes are the same postures with legs the other way.")
         doubts = () if len(self) else doubted_angles(m, self.at)
-        words = " ".join(
-            [*moving, f"Completeness: {self.completeness}.", *self.evidence, *(f"{one}." for one in doubts)]
-        )
-        return Document(title, (Table(header, tuple(rows)), Paragraph(words)))
+        words = [*moving, f"Completeness: {self.completeness}.", *self.evidence, *(f"{one}." for one in doubts)]
+        return Document(title, (*(Table(part[0], part[1:]) for part in parts), Paragraph(" ".join(words))))
 
     def plot(self) -> Any:
         """Draw all assembly modes side by side.
