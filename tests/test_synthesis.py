@@ -480,9 +480,10 @@ def test_what_is_found_is_told_by_tables_of_whole_words_and_by_how_many_there_ar
     s = mg.synthesize(m, task, unknown)
     assert all(name in str(s) for name in ("D.point.y", "transmission [deg]"))
     rows = str(s.fitness).splitlines()
-    assert all(word in rows[3] for word in ("branch", "circuit", "order", "full turn", "size", "ratio"))
-    assert [row.split()[0] for row in rows[6:]] == ["0", "1"]
-    assert rows[6].split()[1] == ("yes" if s.fitness[0].branch else "no")
+    assert all(word in rows[3] for word in ("branch", "circuit", "order", "full", "size", "ratio"))
+    assert rows[4].split()[:4] == ["defect", "defect", "defect", "turn"]
+    assert [row.split()[0] for row in rows[7:]] == ["0", "1"]
+    assert rows[7].split()[1] == ("yes" if s.fitness[0].branch else "no")
     assert "proved" in str(s.certificates)
     for of in (s, s.fitness):
         with pytest.raises(IndexError, match="9: there are 2 mechanisms"):
@@ -495,7 +496,7 @@ def test_where_no_solution_is_real_none_is_returned_and_all_are_counted() -> Non
     # over the four links
     assert (len(s), s.total, s.poses.shape) == (0, 3, (0, 5, 4, 4, 4))
     assert len(s.complex) + s.infinite + sum(one.count for one in s.degenerate) == 3
-    assert "0 mechanisms, of 3 solutions" in str(s)
+    assert "0 mechanisms; such tasks have 3 solutions" in str(s)
 
 
 DEGENERATE = {
@@ -723,7 +724,7 @@ def test_what_is_found_can_be_sought_again_and_slips_are_told() -> None:
     with pytest.raises(mg.DeclarationError, match=r"bounds\['B.point.x'\]: both ends are 1") as told:
         mg.synthesize(m, task, unknown, fit="minimax", bounds={"B.point.x": (1, 1)}, over={"Q": [1.0]})
     assert "over: unknown freedom 'Q'" in str(told.value)
-    with pytest.warns(mg.MechgraphWarning, match=r"angles are in radians"), pytest.raises(mg.DeclarationError):
+    with pytest.warns(mg.MechgraphWarning, match=r"read as radians, .* np.deg2rad"), pytest.raises(mg.DeclarationError):
         mg.synthesize(m, mg.function("A", "D", np.rad2deg(task.pairs)), unknown[:1])
 
 

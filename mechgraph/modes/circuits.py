@@ -396,7 +396,8 @@ class Circuits:
             least = np.clip(-0.5 * B / np.where(C == 0, 1.0, C), 0.0, 1.0)
             lowest = (ra + least * (B + least * C)) * np.sign(ra)
             dips = (ra * rb > 0) & (lowest < 0.25 * np.minimum(np.abs(ra), np.abs(rb))) & (np.abs(least - 0.5) < 0.45)
-            some = np.flatnonzero(fold | dips)
+            # nodes may lie at one place
+            some = np.flatnonzero((fold | dips) & (w > 0))
             if not some.size:
                 break
             ra, B, C, a, b = ra[some], B[some], C[some], a.taken(some), b.taken(some)
