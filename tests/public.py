@@ -123,6 +123,7 @@ def made() -> tuple[tuple[Any, dict[str, Any]], ...]:
     state = {"state": s.state(0), "position": 0}
     dyad, places = dyad_and_places()
     guided = mg.synthesize(dyad, places, ["B.point"])
+    swept = mg.synthesize(dyad, places, ["B.point"], sweep={"A.point.x": [0.0, 0.1]})
     term = f.equations[0].terms[0]
     return (
         (s, {"name": "crank"}),
@@ -141,6 +142,7 @@ def made() -> tuple[tuple[Any, dict[str, Any]], ...]:
         (study, {"name": "A.effort", "i": 0}),
         (mg.CamLaw(RISE_AND_FALL, turn=2.0), {"angle": 0.1}),
         (guided, {"name": "B.point.x", "which": [0], "by": "size"}),
+        (swept, {"by": "size"}),
     )
 
 
