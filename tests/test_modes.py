@@ -844,3 +844,26 @@ def test_a_mode_is_one_line_of_the_table() -> None:
     rows = lines[rule + 1 :]
     assert [line.split()[0] for line in rows[: len(modes)]] == [str(i) for i in range(len(modes))]
     assert not rows[len(modes)]
+
+
+def test_postures_of_a_planar_mechanism_at_a_coordinate_of_a_point_are_those_of_a_swept_crank() -> None:
+    """The driver is free: of crank angles on both sides of the coupler those at which its point comes there."""
+    m = four_bar()
+    A, B, C, D = (complex(*pair.point[:2]) for pair in m.pairs)
+    tip = complex(*m.link("coupler").points["tip"][:2])
+    angles = np.linspace(0, 2 * np.pi, 100_001)
+    pin = A + (B - A) * np.exp(1j * angles)
+    reach, rod, rocker = D - pin, abs(C - B), abs(C - D)
+    along = (rod**2 - rocker**2 + np.abs(reach) ** 2) / (2 * np.abs(reach))
+    across = np.sqrt((rod**2 - along**2).astype(complex))
+    count = 0
+    for side in (1, -1):
+        joint = pin + reach / np.abs(reach) * (along + 1j * side * across.real)
+        off = (pin + (tip - B) * (joint - pin) / (C - B)).real - 1.4
+        closed = across.imag[1:] + across.imag[:-1] == 0
+        count += int((closed & (off[1:] * off[:-1] < 0)).sum())
+    modes = mg.assemblies(m, {"coupler.tip.Tx": 1.4})
+    assert len(modes) == count == 4
+    places = [mg.kinematics(mode, {"A": mode.start["A.Rz"]}).link("coupler").at("tip").position[0] for mode in modes]
+    assert places == pytest.approx([1.4] * 4)
+    assert "coupler.Rz: read as radians" in str(mg.assemblies(m, {"coupler.Rz": 900.0}))

@@ -30,6 +30,9 @@ from mechgraph.memo import dataclass
 from mechgraph.modes.compiled_tracks import CompiledClosure
 from mechgraph.modes.family import NO_NUMBERS, Family
 
+SAME_VALUE = 1e-9
+"""Difference of two values of the driver (radians, or lengths over L) that is rounding."""
+
 
 @dataclass
 class CircuitNodes:
@@ -119,11 +122,12 @@ class Circuits:
         far = 8 * self.period if np.isfinite(self.period) else np.inf
         self.ends: Array = np.outer(rims, np.ones(self.V)) if rims else np.stack([x[self.row] - far, x[self.row] + far])
         self.settled = np.flatnonzero(np.abs(family.idle).max(axis=1, initial=0.0) < MODES.span)
-        # on the way of links from the frame, 1 or -1 of each freedom
-        ways = system.tree.sums(np.ones((6, 1, 1)) * np.eye(len(system.m.pairs)))[0][:, system.pair_of_freedom]
-        passive = family.idle.shape[1] > 0
-        self.links = np.array([k for k in family.settled_links.tolist() if passive and ways[k].any()], dtype=np.intp)
-        self.ways = ways[self.links]
+        self.links, self.ways = NO_NUMBERS, np.zeros((0, system.n_freedoms))
+        if family.idle.shape[1]:
+            # on the way of links from the frame, 1 or -1 of each freedom
+            ways = system.tree.sums(np.ones((6, 1, 1)) * np.eye(len(system.m.pairs)))[0][:, system.pair_of_freedom]
+            self.links = family.settled_links[ways[family.settled_links].any(axis=1)]
+            self.ways = ways[self.links]
         back = (system.single_rows >= 0) & np.isfinite(family.periods)
         back[column] &= rims is None
         self.back = np.flatnonzero(back)
@@ -148,12 +152,12 @@ class Circuits:
         """Mechanisms at states ``(nx, T)``."""
         return Configuration(self.s.cases(case), x)
 
-    def _told(self, here: Configuration, rates: Array) -> Array:
-        """Of rates ``(F, k, T)`` what is no passive motion: those of freedoms and twists of links that none moves, ``(n, k, T)``."""
-        told = [rates[self.settled]]
-        if self.links.size:
-            told += list(np.einsum("lf,ift,fkt->ilkt", self.ways, here.S, rates, optimize=True))
-        return np.concatenate(told)
+    def _told(self, x: Array, case: Index, rates: Array) -> Array:
+        """Of rates ``(F, k, T)`` at states what is no passive motion: of freedoms, and twists of links, that none moves, ``(n, k, T)``."""
+        if not self.links.size:
+            return rates[self.settled]
+        twists = np.einsum("lf,ift,fkt->ilkt", self.ways, self.here(x, case).S, rates, optimize=True)
+        return np.concatenate([rates[self.settled], *twists])
 
     def at(self, x: Array, case: Index, beside: CircuitNodes | None = None) -> tuple[Array, CircuitNodes]:
         """Least Newton steps ``(F, T)`` at states, and what is known there.
@@ -190,7 +194,7 @@ class Circuits:
                 N = np.linalg.qr(N)[0]
             if N.shape[2] > 1:
                 # passive motions come last: what they do not change moves in one way
-                told = np.moveaxis(self._told(self.here(x, case), np.moveaxis(N, 0, -1)), -1, 0)
+                told = np.moveaxis(self._told(x, case, np.moveaxis(N, 0, -1)), -1, 0)
                 N = N @ np.linalg.svd(np.nan_to_num(told))[2].swapaxes(1, 2)
         if beside is None:
             V[:, :, r:] = N
@@ -296,7 +300,11 @@ class Circuits:
         """See which steps lead through the first states of other cases: of two on one circuit the former is followed on."""
         if self.first is None:
             return
-        on, value = self._crossed(a.x[self.row], b.x[self.row], self.x[self.row, a.case])
+        begin = a.x[self.row]
+        on, value = self._crossed(begin, b.x[self.row], self.x[self.row, a.case])
+        # where a step begins the one before has ended, or it is the case's own first state
+        further = np.abs(value - begin[on]) > SAME_VALUE
+        on[on], value = further, value[further]
         if not on.any():
             return
         a, b = a.taken(on), b.taken(on)
@@ -332,8 +340,9 @@ class Circuits:
         going[1::2][met], closing[met] = False, True
         self.gap[closing] = d[closing]
         # a little more than what is left, or less, by what a step may be off
-        short = d * (1.0 - 0.2 * np.minimum(2.0 * d / np.maximum(h[::2], 1e-300), 1.0) ** 4)
-        h[::2][closing] = np.minimum(h[::2], short + 2e-6)[closing]
+        left, step = d[closing], h[::2][closing]
+        short = left * (1.0 - 0.2 * np.minimum(2.0 * left / step, 1.0) ** 4)
+        h[::2][closing] = np.minimum(step, short + 2e-6)
         apart = near & ~met
         for way in (h[::2], h[1::2]):
             way[apart] = np.minimum(way, np.maximum(d / 3.0, 1e-5))[apart]
@@ -343,9 +352,9 @@ class Circuits:
         y = self.s.difference(last.x[:, 1::2], last.x[:, ::2])
         y[self.back] -= self.s.rounds(self.back, y[self.back])
         # of what no passive motion changes, along ways of unit size
-        here = self.here(last.x, last.case)
-        y, t = y[self.settled], self._told(here, last.t[:, None])[:, 0]
+        y, t = y[self.settled], self._told(last.x, last.case, last.t[:, None])[:, 0]
         if self.links.size:
+            here = self.here(last.x, last.case)
             R, p = here.poses[:, :3, self.links], here.poses[:, 3, self.links]
             turn = multiplied(R[..., 1::2], R[..., ::2].swapaxes(0, 1))
             y = np.concatenate([y, *finite_twist(turn, p[..., 1::2], p[..., ::2])])
@@ -415,7 +424,7 @@ class Circuits:
         left = np.flatnonzero(nodes.case[1:] == nodes.case[:-1])
         a, b = nodes.taken(left), nodes.taken(left + 1)
         # a circuit comes back with its passive bodies elsewhere; steps that bring them there
-        for _ in range(8):
+        for _ in range(8 if self.family.idle.shape[1] else 0):
             idle = b.V[:, len(b.S) + 1 :]
             gone = np.einsum("fkt,ft->kt", idle, self.s.difference(a.x, b.x))
             far = np.flatnonzero(np.abs(gone).max(axis=0, initial=0.0) > 0.1)
@@ -463,12 +472,10 @@ class Circuits:
 
     def _crossed(self, a: Array, b: Array, value: Array) -> tuple[Mask, Array]:
         """Which values of the driver, but for whole turns, lie between two others, and what they are there."""
-        # rounding of values of the driver (radians, or lengths over L)
-        slip = 1e-9
         low, high = np.sort([a, b], axis=0)
         if np.isfinite(self.period):
-            value = value + self.period * np.ceil((low - slip - value) / self.period)
-        on = (value >= low - slip) & (value <= high + slip)
+            value = value + self.period * np.ceil((low - SAME_VALUE - value) / self.period)
+        on = (value >= low - SAME_VALUE) & (value <= high + SAME_VALUE)
         return on, value[on]
 
     def states(self, step: Index, value: Array) -> tuple[Array, Mask]:

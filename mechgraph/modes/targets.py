@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -405,11 +405,13 @@ class EquationGroup:
         names = [full.links[link].name for link in self.links]
         ends = self._first[self._bearers]
         place = {link: i for i, link in enumerate(self.links)}
+        # rows of pairs are those of the plane only in a planar mechanism, in which axes need not be said
+        axis: dict[str, Any] = {} if full.planar else {"axis": (0, 0, 1)}
         pairs = [
-            Pair(name, full.pairs[k].type, full.links[a].name, full.links[b].name, point=(0, 0, 0), axis=(0, 0, 1))
+            Pair(name, full.pairs[k].type, full.links[a].name, full.links[b].name, point=(0, 0, 0), **axis)
             for name, k, a, b in zip(self.names, self.pairs, ends[:P], ends[P : 2 * P], strict=True)
         ]
-        m = Mechanism(full.name, [Link(name) for name in names], pairs, frame=names[0])
+        m = Mechanism(full.name, [Link(name) for name in names], pairs, frame=names[0], planar=full.planar)
         markers = self._carried(here.x[:, :1]).real
         numbers = replace(
             par,

@@ -9,6 +9,7 @@ import numpy as np
 
 from mechgraph.force.friction import Came
 from mechgraph.kinematics.motion_path import Status
+from mechgraph.kinematics.prescribed import coordinate
 from mechgraph.maths.se3 import Index
 from mechgraph.maths.tolerances import MOTIONS
 from mechgraph.memo import dataclass
@@ -140,7 +141,11 @@ def doubted_angles(m: Mechanism, values: Mapping[str, Any]) -> Iterator[Remark]:
     """Angles given by name as whole numbers beyond two turns: radians hardly are, degrees are."""
     for name, at in values.items():
         at = np.atleast_1d(at)
-        told = angle_hint(float(max(at, key=abs, default=0.0))) if m.turns(name) and (at == np.round(at)).all() else ""
+        told = (
+            angle_hint(float(max(at, key=abs, default=0.0)))
+            if coordinate(m, name) is True and (at == np.round(at)).all()
+            else ""
+        )
         if told:
             yield Remark(name, f"{name}: {told}; for degrees write np.deg2rad(...)")
 

@@ -29,7 +29,7 @@ from mechgraph.maths.tolerances import MODES
 from mechgraph.memo import dataclass
 from mechgraph.model.mechanism import Mechanism
 from mechgraph.model.setups import is_interval, two_ends
-from mechgraph.modes.circuits import Circuits, in_order
+from mechgraph.modes.circuits import SAME_VALUE, Circuits, in_order
 from mechgraph.modes.family import Family
 from mechgraph.quantities import wrong
 from mechgraph.result.solution import Solution
@@ -212,8 +212,8 @@ def least_between(
             break
         order = np.lexsort((values, own))
         own, values = own[order], values[order]
-        # of values that are one but for rounding (radians, or lengths over L) the first; no lower one lies between them
-        apart = (np.diff(own, prepend=-1) > 0) | (np.diff(values, prepend=0.0) > 1e-9)
+        # of values that are one but for rounding the first; no lower one lies between them
+        apart = (np.diff(own, prepend=-1) > 0) | (np.diff(values, prepend=0.0) > SAME_VALUE)
         own, values = own[apart], values[apart]
         each = [of.along(of.home[case], values[own == case]) for case in np.unique(own)]
         there, met = of.states(*(np.concatenate(part) for part in zip(*each, strict=True)))
